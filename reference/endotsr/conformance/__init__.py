@@ -1,0 +1,1 @@
+"""The conformance target for ports: golden cases, their manifest and the judge."""

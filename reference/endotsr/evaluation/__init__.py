@@ -1,0 +1,1 @@
+"""Metrics, LPIPS, image-space baselines, protocols and reports."""

@@ -1,0 +1,1 @@
+"""Adam, schedules, the training loop and checkpoints. Knows no file format of sequences."""

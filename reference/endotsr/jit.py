@@ -1,0 +1,65 @@
+"""The one place that says how a kernel is compiled.
+
+Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or
+`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools.
+
+No fast-math: sums keep the order they are written in. The fast path may contract a*b+c into one fused
+multiply-add (`contract=True`), which stays bitwise reproducible on one machine.
+
+Numba's disk cache notices an edit of the file that holds a kernel, but not of the files it calls into.
+The cache therefore lives in a folder named after a hash of all kernel sources: an edited kernel is never stale.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable)
+
+_KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simulator", "evaluation")
+
+
+def kernel_source_hash() -> str:
+    """First 16 hex digits of the SHA-256 over every source file that may define or inline a kernel."""
+    root = Path(__file__).parent
+    files = [Path(__file__), *(f for room in _KERNEL_ROOMS for f in sorted((root / room).glob("*.py")))]
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in files:
+        digest.update(file.name.encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _use_hashed_cache_folder() -> None:
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return  # the caller chose a folder and keeps it fresh
+    from platformdirs import user_cache_dir
+
+    numba.config.CACHE_DIR = os.path.join(user_cache_dir("endotsr"), "kernels", kernel_source_hash())  # type: ignore[attr-defined]
+
+
+_use_hashed_cache_folder()
+
+
+def jit(function: F, *, parallel: bool = False, contract: bool = False) -> F:
+    """Compile `function` on first call, for whatever dtypes it is called with.
+
+    parallel   the body uses `numba.prange`; iterations must write to disjoint cells (never `+=` into a shared one)
+    contract   allow fused multiply-add; for the fast path only
+    """
+    return numba.njit(
+        cache=True,
+        nogil=True,
+        error_model="numpy",  # 1/0 is inf as in NumPy: one meaning with the JIT on or off
+        parallel=parallel,
+        fastmath={"contract"} if contract else False,
+    )(function)
+
+
+def jit_inline(function: F) -> F:
+    """Compile a small helper that other kernels call; it is inlined into them and has no cache entry of its own."""
+    return numba.njit(inline="always", error_model="numpy")(function)

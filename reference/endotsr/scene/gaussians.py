@@ -1,0 +1,47 @@
+"""The Gaussians that are fitted, as a structure of arrays. The Gaussian index is the LAST axis of every array.
+
+Index-last storage makes every hot loop run over contiguous memory and lets one rule (gather along the
+last axis) clone, split, prune and permute every array, its optimiser moments included.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+
+POSITION_CHANNELS = slice(0, 3)  # of the ten deformation channels
+QUATERNION_CHANNELS = slice(3, 7)
+LOG_SCALE_CHANNELS = slice(7, 10)
+DEFORMATION_CHANNELS = 10
+
+
+class Gaussians(NamedTuple):
+    """Raw (pre-activation) parameters of N Gaussians. A component that is switched off is None: no memory, no work."""
+
+    position: FloatArray  # (3, N)  canonical centre mu, scene units
+    quaternion: FloatArray  # (4, N)  w, x, y, z; normalised in the forward pass
+    log_scale: FloatArray  # (3, N)  natural log of the semi-axes, scene units
+    opacity_logit: FloatArray  # (N,)
+    harmonics: FloatArray  # (K, 3, N)  K = (degree + 1)^2; [band, channel, Gaussian]
+    fdm_weight: FloatArray | None = None  # (10, B, N)  w of the flexible deformation model
+    fdm_centre: FloatArray | None = None  # (10, B, N)  theta, normalised time
+    fdm_width: FloatArray | None = None  # (10, B, N)  sigma, normalised time
+    colour_coefficients: FloatArray | None = None  # (3, 2F, N)  A of equation (2)
+    motion_coefficients: FloatArray | None = None  # (3, 2F, N)  C of equation (3), scene units
+
+    @property
+    def count(self) -> int:
+        """Number of Gaussians N."""
+        return self.position.shape[-1]
+
+
+def gather(gaussians: Gaussians, index: NDArray[np.integer]) -> Gaussians:
+    """The Gaussians named by `index` (in that order, repeats allowed), every array copied."""
+    return Gaussians(*(None if a is None else np.ascontiguousarray(a[..., index]) for a in gaussians))
+
+
+def arrays(gaussians: Gaussians) -> dict[str, FloatArray]:
+    """The arrays that exist, by field name, in field order."""
+    return {name: a for name, a in gaussians._asdict().items() if a is not None}

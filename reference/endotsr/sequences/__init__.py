@@ -1,0 +1,1 @@
+"""What is read: EndoNeRF folders, splits, validation, depth priors. Every refusal names file, frame and reason."""

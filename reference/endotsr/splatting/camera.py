@@ -1,0 +1,56 @@
+"""The camera: OpenCV axes (x right, y down, z forward), world-to-camera pose, pinhole intrinsics.
+
+Column i covers [i, i+1) and is sampled at i + 0.5; u = fx x/z + cx in the same coordinates, and
+back-projection uses the same rule. The pose stored is world-to-camera: x_camera = rotation @ x_world + translation.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+
+
+class Camera(NamedTuple):
+    """A pinhole camera. Lengths in the units of the sequence, focal lengths and principal point in pixels."""
+
+    rotation: FloatArray  # (3, 3) world-to-camera rotation
+    translation: FloatArray  # (3,)   world-to-camera translation, scene units
+    fx: float
+    fy: float
+    cx: float  # principal point, pixels from the left edge of column 0
+    cy: float
+    width: int
+    height: int
+
+
+class CameraGrads(NamedTuple):
+    """Derivative of a loss by the camera pose, every entry of the rotation matrix taken as independent."""
+
+    rotation: FloatArray  # (3, 3)
+    translation: FloatArray  # (3,)
+
+
+def camera_centre(camera: Camera) -> FloatArray:
+    """Position of the optical centre in world axes, -rotation^T translation. Shape (3,), scene units."""
+    return -camera.rotation.T @ camera.translation
+
+
+def scale_camera(camera: Camera, width: int, height: int) -> Camera:
+    """The same camera for an image resized to width x height (pixel edges stay aligned)."""
+    sx, sy = width / camera.width, height / camera.height
+    return camera._replace(
+        fx=camera.fx * sx, cx=camera.cx * sx, fy=camera.fy * sy, cy=camera.cy * sy, width=width, height=height
+    )
+
+
+def backproject(camera: Camera, column: FloatArray, row: FloatArray, depth: FloatArray) -> FloatArray:
+    """World positions of pixel centres at view depth `depth` (z > 0, scene units).
+
+    column, row   (M,) integer pixel indices
+    returns       (3, M)
+    """
+    x = (column + 0.5 - camera.cx) / camera.fx * depth
+    y = (row + 0.5 - camera.cy) / camera.fy * depth
+    return camera.rotation.T @ (np.stack([x, y, depth]) - camera.translation[:, None])

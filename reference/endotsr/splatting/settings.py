@@ -1,0 +1,37 @@
+"""Settings of the rasteriser: three named presets, between which every field is a free dial."""
+
+from typing import Literal, NamedTuple
+
+Support = Literal["everywhere", "ellipse", "three_sigma_tiles"]
+
+
+class LegacyDeviations(NamedTuple):
+    """What the released CUDA code does to gradients, each switchable by name (all off = the exact derivative)."""
+
+    drop_depth_to_z: bool = False  # the depth image sends no gradient to z
+    pass_clamped_alpha: bool = False  # the alpha clamp lets the gradient through
+    double_clamp_term: bool = False  # factor 2 instead of 1 in d(Jacobian)/dz where the off-axis clamp is active
+    conic_epsilon: bool = False  # 1/(det^2 + 1e-7) in place of 1/det^2
+
+
+class RasterSettings(NamedTuple):
+    """How a Gaussian reaches a pixel. See the table of presets in the specification."""
+
+    alpha_cutoff: float = 1.0 / 255.0  # a smaller alpha contributes nothing; 0 = no cutoff
+    transmittance_stop: float = 1e-4  # stop before T falls below; 0 = never
+    alpha_max: float = 0.99  # clamp of alpha; 1 = none
+    support: Support = "ellipse"
+    jacobian_clamp: float = 1.3  # times tan(fov/2); 0 = none
+    low_pass: float = 0.3  # px^2 on the diagonal of the projected covariance
+    near: float = 0.2  # scene units; z <= near contributes nothing
+    deviations: LegacyDeviations = LegacyDeviations()
+
+
+EXACT = RasterSettings(
+    alpha_cutoff=0.0, transmittance_stop=0.0, alpha_max=1.0, support="everywhere", jacobian_clamp=0.0
+)
+PAPER = RasterSettings()
+LEGACY = RasterSettings(
+    support="three_sigma_tiles", deviations=LegacyDeviations(True, True, True, True)
+)
+PRESETS = {"exact": EXACT, "paper": PAPER, "legacy": LEGACY}
