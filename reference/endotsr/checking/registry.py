@@ -1,0 +1,50 @@
+"""The registry of forward/reverse pairs: gradient checks, golden cases and the equation table are driven from it.
+
+A pair cannot exist unchecked: `tests/checking` asserts that every `<stage>_forward` of the package appears here.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray]
+
+
+class Pair(NamedTuple):
+    """One forward pass and its reverse pass, wrapped so that a checker needs to know nothing about them.
+
+    name      stage name, as in `<name>_forward`
+    equation  the equation label of the specification ("1" ... "7" for the paper, "B-..." for the base model)
+    inputs    rng -> float64 arrays; every one of them is differentiable; non-vacuous and away from kinks
+    forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())
+    reverse   (inputs, cotangents by output name) -> gradients by input name
+    blocks    inputs -> (input name, boolean mask or slice) by block name: what is probed separately;
+              None = one block per input array
+    trace     inputs -> integer arrays: the discrete decisions (order, contributors, clamps) of the forward
+              pass; a finite difference whose two ends differ in it is refused. None = no decisions
+    function  dotted name of the forward function, for tables
+    """
+
+    name: str
+    equation: str
+    function: str
+    inputs: Callable[[np.random.Generator], dict[str, NDArray]]
+    forward: Callable[[Arrays], dict[str, NDArray]]
+    reverse: Callable[[Arrays, Arrays], dict[str, NDArray]]
+    blocks: Callable[[Arrays], dict[str, tuple[str, object]]] | None = None
+    trace: Callable[[Arrays], dict[str, NDArray]] | None = None
+
+
+def all_pairs() -> dict[str, Pair]:
+    """Every registered pair by name, in the order of the specification."""
+    from endotsr.checking import pairs_equations, pairs_losses, pairs_splatting
+
+    found: dict[str, Pair] = {}
+    for module in (pairs_equations, pairs_splatting, pairs_losses):
+        for pair in module.PAIRS:
+            if pair.name in found:
+                raise ValueError(f"pair {pair.name} is registered twice")
+            found[pair.name] = pair
+    return found

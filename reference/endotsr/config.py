@@ -1,0 +1,312 @@
+"""Every setting of a run in one typed, frozen tree: defaults = the published schedule (preset `paper`).
+
+Read from TOML with `load_config`; an unknown key or a wrong type is an `InputError` that names the key
+and the allowed values. Iterations are counted from 1. Lengths are in scene units (millimetres for EndoNeRF).
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from endotsr.errors import InputError
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0)]
+Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
+
+
+class _Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Common strictness of all sections."""
+
+
+class SequenceConfig(_Section, frozen=True, kw_only=True):
+    """What is read from an EndoNeRF folder."""
+
+    masks: Literal["masks", "gt_masks"] = "masks"
+    """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only"""
+    excluded_value: Literal["white", "black"] = "white"
+    """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
+    allow_mask_share: bool = False
+    """accept a tissue share below 5 % or of exactly 100 %"""
+    frames: str = ""
+    """frame range start:stop[:step] in Python slice notation; empty = all"""
+    scale: Positive = 1.0
+    """image scale, area-averaged; 0.5 halves width and height"""
+    split: Literal["every_eighth", "blocks"] = "every_eighth"
+    """held-out frames: (i - 1) % 8 == 0, or contiguous blocks"""
+    block_length: PositiveCount = 8
+    """frames in a held-out block; a block starts every max(24, 2 x length) frames"""
+    depth_percentiles: tuple[float, float] = (3.0, 99.8)
+    """per-frame clip of the non-zero depth prior, percent"""
+
+
+class ModelConfig(_Section, frozen=True, kw_only=True):
+    """What the model is made of. A component that is off allocates nothing and runs nothing."""
+
+    appearance: bool = True
+    """component A: bounded Fourier colour residual, eq. (1)-(2)"""
+    spectral_motion: bool = True
+    """component S: Fourier translation residual and its Matern penalty, eq. (3)-(4)"""
+    laplacian: bool = True
+    """component L: mask-propagating Laplacian detail loss, eq. (5)"""
+    deformation: bool = True
+    """flexible deformation model; off = a rigid scene"""
+    basis: Literal["quartic", "gaussian"] = "quartic"
+    """FDM time basis: `quartic` is what the released code computes"""
+    bases: PositiveCount = 17
+    """B, time bases per channel"""
+    initial_width: Positive = 0.01
+    """initial sigma of the time bases, normalised time"""
+    harmonics_degree: Annotated[int, msgspec.Meta(ge=0, le=3)] = 3
+    """highest spherical-harmonic degree"""
+    frequencies: PositiveCount = 8
+    """F, log-spaced frequencies"""
+    frequency_min: Positive = 1.0
+    """lowest frequency, cycles per sequence"""
+    frequency_max: Positive = 16.0
+    """highest frequency, cycles per sequence"""
+    beta: Positive = 0.3
+    """bound of the colour residual, display units [0, 1]"""
+    correlation_length: NonNegative = 0.2
+    """l of the Matern-5/2 prior, normalised time"""
+
+
+class RasterConfig(_Section, frozen=True, kw_only=True):
+    """The rasteriser preset used in training and rendering."""
+
+    preset: Literal["paper", "legacy", "exact"] = "paper"
+    """`exact` evaluates every Gaussian at every pixel and is for small scenes"""
+    near: Positive = 0.2
+    """near plane, scene units"""
+
+
+class LossConfig(_Section, frozen=True, kw_only=True):
+    """Weights of the objective, eq. (6), and of the calibration, eq. (7)."""
+
+    ssim_weight: Fraction = 0.1
+    """w of (1 - w) L1 + w (1 - SSIM)"""
+    depth_weight: NonNegative = 1.0
+    """weight of the normalised depth loss"""
+    smoothness_weight: NonNegative = 1e-4
+    """weight of the smoothness terms"""
+    total_variation_factor: NonNegative = 30.0
+    """factor of the two total-variation terms inside the smoothness"""
+    smoothness_from: Count = 1001
+    """first iteration with smoothness"""
+    lambda_msp: NonNegative = 1.0
+    """weight of the Matern spectral penalty"""
+    lambda_lap: NonNegative | Literal["auto"] = 0.83
+    """full detail weight; `auto` = calibrate on this sequence by eq. (7)"""
+    detail_from: Count = 1000
+    """last iteration with detail weight 0"""
+    detail_full: Count = 2500
+    """first iteration with full detail weight"""
+    upsampling: Literal["co_sited", "half_pixel"] = "co_sited"
+    """up-sampling rule of the pyramid"""
+    gradient_ratio: Positive = 0.25
+    """r of the calibration"""
+    calibration_views: PositiveCount = 16
+    """training views used by the calibration"""
+
+
+class OptimiserConfig(_Section, frozen=True, kw_only=True):
+    """Adam and its learning rates. Decaying rates fall exponentially to `final_factor` of their start."""
+
+    position: NonNegative = 1.6e-3
+    """canonical position, scene units per step, decaying"""
+    deformation: NonNegative = 1.6e-3
+    """all FDM coefficients, decaying"""
+    deformation_position_factor: Positive = 1.0
+    """extra factor on the FDM weights of the three position channels"""
+    harmonics_base: NonNegative = 2.5e-3
+    """degree-0 harmonic coefficient"""
+    harmonics_rest: NonNegative = 1.25e-4
+    """harmonics of degree 1 to 3"""
+    opacity: NonNegative = 0.05
+    """opacity logit"""
+    scale: NonNegative = 0.005
+    """log-scale"""
+    rotation: NonNegative = 0.001
+    """quaternion"""
+    motion_residual_factor: NonNegative = 0.1
+    """translation residual C, times `deformation`, decaying"""
+    colour_residual_factor: NonNegative = 31.25 / 16.0
+    """colour residual A, times `deformation`, decaying"""
+    final_factor: Positive = 0.01
+    """final / initial rate of the decaying groups"""
+    restart_residual_schedule: bool = True
+    """residual rates decay over the steps that remain after activation"""
+    beta1: Fraction = 0.9
+    """Adam first-moment decay"""
+    beta2: Fraction = 0.999
+    """Adam second-moment decay"""
+    epsilon: Positive = 1e-15
+    """Adam epsilon"""
+    legacy_skip: bool = False
+    """skip the Adam step on densify iterations, as the released code does"""
+
+
+class DensityConfig(_Section, frozen=True, kw_only=True):
+    """Clone, split and prune."""
+
+    start: Count = 500
+    """densify at iterations > start"""
+    interval: PositiveCount = 100
+    """every so many iterations"""
+    until: Count = 4000
+    """and < until"""
+    gradient_threshold: Positive = 2e-4
+    """mean screen gradient, NDC units"""
+    extent: Positive | Literal["cameras"] = 10.0
+    """scene extent, scene units; `cameras` = 1.1 x the largest camera distance from their mean"""
+    dense_fraction: Positive = 0.01
+    """clone below, split above this fraction of the extent"""
+    prune_opacity: Fraction = 0.005
+    """remove Gaussians with a lower opacity"""
+    maximum: PositiveCount = 400_000
+    """no clone or split beyond this count"""
+
+
+class InitialisationConfig(_Section, frozen=True, kw_only=True):
+    """Back-projected training pixels."""
+
+    first_frame_points: PositiveCount = 35_000
+    """drawn from the first training frame"""
+    other_frame_points: Count = 5_000
+    """spread over the other training frames"""
+    motion_threshold: Positive = 40.0
+    """a pixel of another frame counts as moved when its depth differs by more, scene units"""
+
+
+class TrainingConfig(_Section, frozen=True, kw_only=True):
+    """Length, seed and bookkeeping of a run."""
+
+    iterations: PositiveCount = 6000
+    """one view each"""
+    residual_activation: Count = 3000
+    """K_s: the iteration after which A and S are evaluated"""
+    harmonics_interval: PositiveCount = 500
+    """iterations between raises of the active harmonic degree"""
+    time_jitter: NonNegative = 0.0
+    """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
+    seed: Count = 0
+    """seed of every random draw"""
+    threads: Count = 0
+    """threads; 0 = all cores (results are bitwise equal for any number)"""
+    precision: Literal["float32", "float64"] = "float32"
+    """arithmetic of the run"""
+    checkpoint_every: PositiveCount = 500
+    """iterations between checkpoints"""
+
+
+class Config(_Section, frozen=True, kw_only=True):
+    """All settings of a run."""
+
+    preset: Literal["paper", "sharp", "demo"] = "paper"
+    """where these settings started from"""
+    sequence: SequenceConfig = SequenceConfig()
+    model: ModelConfig = ModelConfig()
+    raster: RasterConfig = RasterConfig()
+    loss: LossConfig = LossConfig()
+    optimiser: OptimiserConfig = OptimiserConfig()
+    density: DensityConfig = DensityConfig()
+    initialisation: InitialisationConfig = InitialisationConfig()
+    training: TrainingConfig = TrainingConfig()
+
+
+PAPER = Config()
+SHARP = Config(
+    preset="sharp",
+    model=ModelConfig(initial_width=0.05),
+    loss=LossConfig(ssim_weight=0.2, lambda_lap="auto"),
+    training=TrainingConfig(time_jitter=1.0),
+)
+PRESETS = {"paper": PAPER, "sharp": SHARP}
+
+# Milestones of the schedule, by section: they stretch with the length of the run.
+MILESTONES = {
+    "loss": ("smoothness_from", "detail_from", "detail_full"),
+    "density": ("start", "until"),
+    "training": ("residual_activation", "harmonics_interval"),
+}
+
+
+def with_iterations(config: Config, iterations: int) -> Config:
+    """The same schedule stretched to `iterations`: every milestone of `MILESTONES` keeps its share of the run."""
+    ratio = iterations / config.training.iterations
+    changed = {}
+    for section, names in MILESTONES.items():
+        old = getattr(config, section)
+        changed[section] = msgspec.structs.replace(
+            old, **{name: max(1, round(getattr(old, name) * ratio)) for name in names}
+        )
+    changed["training"] = msgspec.structs.replace(changed["training"], iterations=iterations)
+    return msgspec.structs.replace(config, **changed)
+
+
+def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Config:
+    """A strict `Config` from nested dictionaries over the preset named in data["preset"] (default `paper`)."""
+    preset = data.get("preset", "paper")
+    if preset not in PRESETS:
+        raise InputError(f"{where}: preset: {preset!r} is not known; allowed: {', '.join(PRESETS)}")
+    _refuse_unknown_keys(data, Config, where, "")
+    merged = _merge(msgspec.to_builtins(PRESETS[preset]), data)
+    try:
+        return msgspec.convert(merged, Config, strict=True)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def load_config(path: Path) -> Config:
+    """Read a TOML file. Raises InputError naming the file, the key and what is allowed."""
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+    return config_from_dict(data, str(path))
+
+
+def _merge(base: dict, override: dict) -> dict:
+    return base | {
+        key: _merge(base[key], value)
+        if isinstance(value, dict) and isinstance(base.get(key), dict)
+        else value
+        for key, value in override.items()
+    }
+
+
+def _refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str) -> None:
+    fields = {f.name: f.type for f in msgspec.structs.fields(struct)}
+    for key, value in data.items():
+        if key not in fields:
+            raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
+        inner = fields[key]
+        if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, msgspec.Struct):
+            _refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
+
+
+def config_to_toml(config: Config) -> str:
+    """The resolved configuration as TOML text that `load_config` reads back to an equal Config."""
+    lines, sections = [], []
+    for key, value in msgspec.to_builtins(config).items():
+        if isinstance(value, dict):
+            sections += ["", f"[{key}]", *(f"{k} = {_toml_value(v)}" for k, v in value.items())]
+        else:
+            lines.append(f"{key} = {_toml_value(value)}")
+    return "\n".join(lines + sections) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
+    return repr(value)

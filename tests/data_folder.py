@@ -1,0 +1,16 @@
+"""Where the real sequences are, for tests that need them: ENDOTSR_DATA or ../shared/data beside the repository."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def data_folder(name: str) -> Path:
+    """The folder `name` of the real data, or a skip that says what is missing."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    root = Path(os.environ.get("ENDOTSR_DATA", beside))
+    folder = root / name
+    if not folder.exists():
+        pytest.skip(f"real data not found: {folder} (set ENDOTSR_DATA)")
+    return folder
