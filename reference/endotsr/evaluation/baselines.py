@@ -1,0 +1,182 @@
+"""Image-space baselines: what a held-out frame looks like without any model.
+
+Four answers, each made from training frames only and printed beside the model in every evaluation:
+
+temporal_mean      per-pixel mean over the training frames in which that pixel is tissue (0 where it never is)
+nearest_frame      copy of the training frame nearest in time (a tie goes to the earlier one)
+two_neighbours     the training frames before and after, blended linearly in time; on the 7:1 split this is their
+                   plain mean, inside a held-out block it is the blend of the two border frames
+flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
+                   the wanted moment and blended with the same weights
+
+Excluded pixels. Only the temporal mean looks at the masks of the training frames: an instrument that passes through
+would otherwise be smeared over the tissue. The other three use the training pixels as they are, instrument included,
+and leave it to the metric to zero what is excluded in the *test* frame. On EndoNeRF `pulling` these choices give
+27.17, 37.71, 40.51 and 41.59 dB (full image, 7:1 split); zeroing the neighbours by their own masks first would
+cost 10 dB, a temporal mean that ignores the masks 1.2 dB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.jit import jit
+
+if TYPE_CHECKING:
+    from endotsr.sequences.sequence import Sequence
+
+FloatArray = NDArray[np.floating]
+RenderFrame = Callable[[int], FloatArray]
+
+SMALLEST_FLOW_SIDE = 12  # the flow estimator needs one side of at least this many pixels
+
+
+class Neighbours(NamedTuple):
+    """Training frames around a moment. A frame before the first or after the last has one neighbour, named twice."""
+
+    before: int  # frame index
+    after: int  # frame index
+    fraction: float  # where the moment lies between them, 0 = before, 1 = after
+
+
+def neighbours(sequence: Sequence, index: int) -> Neighbours:
+    """The training frames next to frame `index` on both sides (never the frame itself) and the time fraction.
+
+    Edges    one-sided: both are the single neighbour, fraction 0; equal times: fraction 0.5
+    Raises   InputError if no other training frame exists
+    """
+    train = np.asarray(sequence.train_index)
+    earlier, later = train[train < index], train[train > index]
+    if not earlier.size and not later.size:
+        raise InputError(f"frame {index}: no training frame to predict it from")
+    if not earlier.size or not later.size:
+        only = int(later.min() if later.size else earlier.max())
+        return Neighbours(only, only, 0.0)
+    before, after = int(earlier.max()), int(later.min())
+    start, end = float(sequence.times[before]), float(sequence.times[after])
+    fraction = (float(sequence.times[index]) - start) / (end - start) if end > start else 0.5
+    return Neighbours(before, after, fraction)
+
+
+def unit_image(sequence: Sequence, index: int) -> FloatArray:
+    """Frame `index` as float32, (3, H, W), display units [0, 1], no mask applied."""
+    return sequence.images[index].astype(np.float32) / np.float32(255)
+
+
+def temporal_mean(sequence: Sequence, index: int) -> FloatArray:
+    """Mean of the training frames, each pixel over the frames in which it is tissue; 0 where it never is.
+
+    index     ignored, the answer is one image for all frames (the frame itself is not excluded)
+    returns   (3, H, W) float32, display units [0, 1]
+    """
+    del index
+    return temporal_mean_image(sequence)
+
+
+def temporal_mean_image(sequence: Sequence) -> FloatArray:
+    """The single image behind `temporal_mean`. Sums are exact integers, so the order of the frames cannot matter."""
+    total = np.zeros(sequence.images.shape[1:], np.int64)
+    seen = np.zeros(sequence.images.shape[2:], np.int64)
+    for i in sequence.train_index:
+        total += np.where(sequence.masks[i], sequence.images[i], np.uint8(0))
+        seen += sequence.masks[i]
+    return (total / (255.0 * np.maximum(seen, 1))).astype(np.float32)
+
+
+def nearest_frame(sequence: Sequence, index: int) -> FloatArray:
+    """Copy of the training frame nearest in time; equally near: the earlier one. (3, H, W) float32 in [0, 1]."""
+    near = neighbours(sequence, index)
+    # 1e-9: times such as i / n are equally far only up to rounding
+    return unit_image(sequence, near.after if near.fraction > 0.5 + 1e-9 else near.before)
+
+
+def two_neighbours(sequence: Sequence, index: int) -> FloatArray:
+    """(1 - s) before + s after with s the time fraction. (3, H, W) float32 in [0, 1]."""
+    near = neighbours(sequence, index)
+    return _blend(unit_image(sequence, near.before), unit_image(sequence, near.after), near.fraction)
+
+
+def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
+    """Both neighbours moved along the optical flow to the wanted moment, then blended as in `two_neighbours`.
+
+    With flows f (before -> after) and g (after -> before) and time fraction s, the pixel p of the answer is
+    (1 - s) before(p - s f(p)) + s after(p - (1 - s) g(p)), bilinear, border pixels repeated.
+
+    returns   (3, H, W) float32, display units [0, 1]
+    Edges     one neighbour only: its copy
+    Raises    InputError if both image sides are below 12 px (no flow can be estimated)
+    """
+    from endotsr.opencv import dis_flow
+
+    near = neighbours(sequence, index)
+    height, width = sequence.images.shape[2:]
+    if max(height, width) < SMALLEST_FLOW_SIDE:
+        raise InputError(f"optical flow needs an image side of {SMALLEST_FLOW_SIDE} px or more, got {width}x{height}")
+    before, after = unit_image(sequence, near.before), unit_image(sequence, near.after)
+    if near.before == near.after:
+        return before
+    a, b = sequence.images[near.before], sequence.images[near.after]
+    moved_before = warp(before, dis_flow(a, b), -near.fraction)
+    moved_after = warp(after, dis_flow(b, a), near.fraction - 1.0)
+    return _blend(moved_before, moved_after, near.fraction)
+
+
+def warp(image: FloatArray, flow: FloatArray, factor: float) -> FloatArray:
+    """image(p + factor flow(p)) at every pixel p, bilinear; outside, the nearest border pixel is repeated.
+
+    image     (3, H, W)
+    flow      (2, H, W) displacement in pixels, [0] along columns (right), [1] along rows (down), finite
+    returns   (3, H, W), dtype of `image`
+
+    Reverse   none (a baseline is never differentiated)
+    """
+    if flow.shape != (2, *image.shape[1:]):
+        raise ValueError(f"flow has shape {flow.shape}, expected {(2, *image.shape[1:])}")
+    displacement = np.ascontiguousarray(flow, image.dtype) * image.dtype.type(factor)
+    out = np.empty_like(image)
+    _warp_kernel(np.ascontiguousarray(image), displacement, out)
+    return out
+
+
+def _warp(image, displacement, out):
+    real = image.dtype.type
+    channels, height, width = image.shape
+    for y in range(height):
+        for x in range(width):
+            u = min(max(real(x) + displacement[0, y, x], real(0)), real(width - 1))
+            v = min(max(real(y) + displacement[1, y, x], real(0)), real(height - 1))
+            x0, y0 = int(u), int(v)
+            x1, y1 = min(x0 + 1, width - 1), min(y0 + 1, height - 1)
+            right, down = u - real(x0), v - real(y0)
+            left, up = real(1) - right, real(1) - down
+            for c in range(channels):
+                top = left * image[c, y0, x0] + right * image[c, y0, x1]
+                bottom = left * image[c, y1, x0] + right * image[c, y1, x1]
+                out[c, y, x] = up * top + down * bottom
+
+
+_warp_kernel = jit(_warp)
+
+
+def _blend(before: FloatArray, after: FloatArray, fraction: float) -> FloatArray:
+    weight = before.dtype.type(fraction)
+    return (before.dtype.type(1) - weight) * before + weight * after
+
+
+def _temporal_mean_once(sequence: Sequence) -> RenderFrame:
+    image = temporal_mean_image(sequence)
+    return lambda index: image
+
+
+BASELINES: dict[str, tuple[str, Callable[[Sequence], RenderFrame]]] = {
+    "temporal_mean": ("Temporal mean of the training frames", _temporal_mean_once),
+    "nearest_frame": ("Copy of the nearest training frame", lambda s: lambda i: nearest_frame(s, i)),
+    "two_neighbours": ("Blend of the two neighbouring training frames", lambda s: lambda i: two_neighbours(s, i)),
+    "flow_interpolation": ("Optical-flow interpolation (DIS)", lambda s: lambda i: flow_interpolation(s, i)),
+}
+"""Key in metrics.json -> (name for a person, maker of the function frame index -> image)."""
