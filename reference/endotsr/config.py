@@ -4,9 +4,12 @@ Read from TOML with `load_config`; an unknown key or a wrong type is an `InputEr
 and the allowed values. Iterations are counted from 1. Lengths are in scene units (millimetres for EndoNeRF).
 """
 
+import math
+import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import msgspec
 
@@ -225,7 +228,6 @@ SHARP = Config(
     loss=LossConfig(ssim_weight=0.2, lambda_lap="auto"),
     training=TrainingConfig(time_jitter=1.0),
 )
-PRESETS = {"paper": PAPER, "sharp": SHARP}
 
 # Milestones of the schedule, by section: they stretch with the length of the run.
 MILESTONES = {
@@ -248,17 +250,24 @@ def with_iterations(config: Config, iterations: int) -> Config:
     return msgspec.structs.replace(config, **changed)
 
 
+DEMO = msgspec.structs.replace(with_iterations(PAPER, 600), preset="demo")
+PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
+
+
 def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Config:
     """A strict `Config` from nested dictionaries over the preset named in data["preset"] (default `paper`)."""
     preset = data.get("preset", "paper")
-    if preset not in PRESETS:
-        raise InputError(f"{where}: preset: {preset!r} is not known; allowed: {', '.join(PRESETS)}")
+    if not isinstance(preset, str) or preset not in PRESETS:
+        raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
     _refuse_unknown_keys(data, Config, where, "")
     merged = _merge(msgspec.to_builtins(PRESETS[preset]), data)
+    _refuse_non_finite(merged, where, "")
     try:
-        return msgspec.convert(merged, Config, strict=True)
+        config = msgspec.convert(merged, Config, strict=True)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"{where}: {_explain(str(error), merged)}") from None
+    _refuse_contradictions(config, where)
+    return config
 
 
 def load_config(path: Path) -> Config:
@@ -274,9 +283,7 @@ def load_config(path: Path) -> Config:
 
 def _merge(base: dict, override: dict) -> dict:
     return base | {
-        key: _merge(base[key], value)
-        if isinstance(value, dict) and isinstance(base.get(key), dict)
-        else value
+        key: _merge(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
         for key, value in override.items()
     }
 
@@ -289,6 +296,66 @@ def _refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str) -> N
         inner = fields[key]
         if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, msgspec.Struct):
             _refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
+
+
+def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
+    for key, value in data.items():
+        if isinstance(value, dict):
+            _refuse_non_finite(value, where, f"{prefix}{key}.")
+        for number in value if isinstance(value, list | tuple) else [value]:
+            if isinstance(number, float) and not math.isfinite(number):
+                raise InputError(f"{where}: {prefix}{key} = {value!r} is not allowed; allowed: finite numbers")
+
+
+def _explain(message: str, data: dict) -> str:
+    """The key, its value and what is allowed, from the message `... - at `$.section.key`` of the type check."""
+    found = re.search(r"`\$\.([\w.]+)", message)
+    if not found:
+        return message
+    kind, value = Config, data
+    for name in found[1].split("."):
+        kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
+        value = value[name]
+    return f"{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
+
+
+def allowed_values(kind: Any) -> str:
+    """In words, what a setting of this type may be: `a number > 0`, `quartic, gaussian`, ..."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return ", ".join(map(str, arguments))
+    if origin in (Union, UnionType):
+        return " or ".join(map(allowed_values, arguments))
+    if origin is tuple:
+        return f"{len(arguments)} values, each {allowed_values(arguments[0])}"
+    if origin is Annotated:
+        limits = [(">", arguments[1].gt), (">=", arguments[1].ge), ("<", arguments[1].lt), ("<=", arguments[1].le)]
+        words = " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
+        return f"{allowed_values(arguments[0])} {words}"
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return "a section of settings"
+    return {bool: "true, false", int: "an integer", float: "a number", str: "text"}[kind]
+
+
+def _refuse_contradictions(config: Config, where: str) -> None:
+    """Settings that are each allowed but not together."""
+    model, loss, (low, high) = config.model, config.loss, config.sequence.depth_percentiles
+    if model.frequency_max < model.frequency_min or (
+        model.frequencies > 1 and model.frequency_max == model.frequency_min
+    ):
+        raise InputError(
+            f"{where}: model.frequency_max = {model.frequency_max:g} is not allowed; "
+            f"allowed: a number > model.frequency_min = {model.frequency_min:g}"
+        )
+    if loss.detail_full < loss.detail_from:
+        raise InputError(
+            f"{where}: loss.detail_full = {loss.detail_full} is not allowed; "
+            f"allowed: an integer >= loss.detail_from = {loss.detail_from}"
+        )
+    if not 0 <= low < high <= 100:
+        raise InputError(
+            f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: 0 <= low < high <= 100"
+        )
 
 
 def config_to_toml(config: Config) -> str:
