@@ -1,0 +1,173 @@
+"""The one importer of OpenCV: picture files, Canny edges, DIS optical flow and area resizing.
+
+In and out are NumPy arrays in this project's conventions (RGB order, planar flow); OpenCV's own conventions (BGR,
+interleaved flow, one-dimensional arrays that differ between versions 4 and 5) end here. `cv2` is imported on
+first use, so that commands which read no picture start without it. Nothing that a golden vector records may depend on
+this module except the Canny edges, which take part in the smoothness loss as given data.
+"""
+
+import struct
+import zlib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+
+Array = NDArray[Any]
+
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
+
+
+@cache
+def _cv2() -> Any:
+    import cv2
+
+    return cv2
+
+
+def check_png_bytes(data: bytes, name: object) -> None:
+    """Refuse PNG bytes that a decoder might repair in silence: walks the chunks up to IEND and checks every CRC.
+
+    Raises InputError naming `name` if the signature, a chunk length, a checksum or the end chunk is wrong.
+    """
+    if data[:8] != PNG_SIGNATURE:
+        reason = "is empty" if not data else "does not start with the PNG signature"
+        raise InputError(f"{name}: not a PNG file: it {reason}")
+    position = 8
+    while True:
+        if position + 12 > len(data):
+            raise InputError(f"{name}: truncated PNG: the file ends after {len(data)} bytes, before its IEND chunk")
+        (length,) = struct.unpack_from(">I", data, position)
+        kind = data[position + 4 : position + 8]
+        end = position + 12 + length
+        if end > len(data):
+            raise InputError(
+                f"{name}: truncated PNG: chunk {kind.decode('latin-1')} needs {end} bytes, the file has {len(data)}"
+            )
+        (stored,) = struct.unpack_from(">I", data, end - 4)
+        if zlib.crc32(memoryview(data)[position + 4 : end - 4]) != stored:
+            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {kind.decode('latin-1')}")
+        if kind == b"IEND":
+            return
+        position = end
+
+
+def decode_png(data: bytes, name: object) -> Array:
+    """Pixels of a PNG held in memory; `name` is used in messages only. See `read_png`."""
+    check_png_bytes(data, name)
+    cv2 = _cv2()
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise InputError(f"{name}: cannot be decoded: {str(error).strip().splitlines()[-1]}") from None
+    if pixels is None:
+        raise InputError(f"{name}: cannot be decoded as a PNG picture")
+    if pixels.ndim == 3 and pixels.shape[2] == 1:
+        pixels = pixels[:, :, 0]
+    if pixels.ndim == 3:
+        pixels = pixels[:, :, 2::-1]  # BGR(A) to RGB; a fourth channel is transparency and is dropped
+    return np.ascontiguousarray(pixels)
+
+
+def read_png(path: Path) -> Array:
+    """Pixels of a PNG file.
+
+    returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored; transparency is dropped
+
+    Raises:  InputError naming the file if it is missing, not a PNG, truncated or damaged. OpenCV decodes a cut file
+             into a half-grey picture without complaint, so the chunk structure is checked first.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    return decode_png(data, path)
+
+
+def write_png(path: Path, pixels: Array) -> None:
+    """Write (H, W) grey or (H, W, 3) RGB pixels, uint8 or uint16. `read_png` returns the same array.
+
+    Raises:  ValueError for another shape or dtype; InputError if the file cannot be written.
+    """
+    pixels = np.asarray(pixels)
+    if pixels.dtype not in (np.uint8, np.uint16) or not (pixels.ndim == 2 or pixels.shape[2:] == (3,)):
+        raise ValueError(f"{path}: PNG needs (H, W) or (H, W, 3) of uint8 or uint16, not {pixels.shape} {pixels.dtype}")
+    cv2 = _cv2()
+    ordered = np.ascontiguousarray(pixels[:, :, ::-1] if pixels.ndim == 3 else pixels)
+    done, encoded = cv2.imencode(".png", ordered)
+    if not done:
+        raise InputError(f"{path}: the picture cannot be encoded as PNG")
+    try:
+        Path(path).write_bytes(encoded.tobytes())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def canny_edges(depth: Array) -> NDArray[np.bool_]:
+    """Edges of a rendered depth image, for the smoothness loss (equation B9). A constant: no gradient passes.
+
+    depth    (H, W) scene units; cut to 8 bits by saturation to [0, 255] and truncation (a depth of 300 is 255 and does
+             not wrap to 44); not-a-number counts as 0
+    returns  (H, W) bool, True on an edge; Sobel 3x3, |gx| + |gy|, thresholds 20 and 200
+    """
+    eight_bit = np.clip(np.nan_to_num(depth, nan=0.0, posinf=255.0, neginf=0.0), 0.0, 255.0).astype(np.uint8)
+    return _cv2().Canny(np.ascontiguousarray(eight_bit), CANNY_LOW, CANNY_HIGH) > 0
+
+
+def dis_flow(source: Array, target: Array) -> NDArray[np.float32]:
+    """Dense inverse-search optical flow (DIS, medium preset) from one grey picture to another.
+
+    source, target  (H, W) uint8, or (3, H, W) uint8 planar RGB, reduced to grey by their mean
+    returns         (2, H, W) float32 pixels: source[y, x] is found at target[y + flow[1], x + flow[0]]
+
+    Pictures too small for the coarsest level of the method (a side under 16 pixels) give zero flow.
+    """
+    cv2 = _cv2()
+    grey = [
+        np.ascontiguousarray(a if a.ndim == 2 else a.mean(axis=0).round().astype(np.uint8)) for a in (source, target)
+    ]
+    if grey[0].shape != grey[1].shape or grey[0].dtype != np.uint8:
+        raise ValueError(f"dis_flow: two uint8 pictures of one size expected, got {grey[0].shape} and {grey[1].shape}")
+    if min(grey[0].shape) < 16:
+        return np.zeros((2, *grey[0].shape), np.float32)
+    method = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    return np.ascontiguousarray(method.calc(grey[0], grey[1], None).transpose(2, 0, 1))
+
+
+def warp_bilinear(image: Array, flow: Array) -> Array:
+    """image[..., y + flow[1], x + flow[0]] by bilinear interpolation; outside, the nearest border value.
+
+    image    (..., H, W) float
+    flow     (2, H, W) pixels, x first
+    returns  (..., H, W), dtype of the image
+
+    Plain NumPy: OpenCV's own remap interpolates from a table of 1/32 pixel.
+    """
+    height, width = image.shape[-2:]
+    x = np.clip(np.arange(width)[None, :] + flow[0], 0, width - 1)
+    y = np.clip(np.arange(height)[:, None] + flow[1], 0, height - 1)
+    left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    across, down = (x - left).astype(image.dtype), (y - top).astype(image.dtype)
+    upper = image[..., top, left] * (1 - across) + image[..., top, right] * across
+    lower = image[..., bottom, left] * (1 - across) + image[..., bottom, right] * across
+    return upper * (1 - down) + lower * down
+
+
+def area_resize(image: Array, width: int, height: int) -> Array:
+    """Shrink (H, W) or (H, W, C) to height x width: every new pixel is the mean over the old area it covers.
+
+    uint8 input is rounded to uint8; float32 and float64 stay as they are.
+    Raises:  ValueError when asked to enlarge.
+    """
+    if width > image.shape[1] or height > image.shape[0]:
+        raise ValueError(f"area_resize shrinks only: {image.shape[1]}x{image.shape[0]} to {width}x{height}")
+    if (height, width) == image.shape[:2]:
+        return image
+    cv2 = _cv2()
+    return cv2.resize(np.ascontiguousarray(image), (width, height), interpolation=cv2.INTER_AREA)

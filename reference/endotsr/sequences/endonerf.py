@@ -1,0 +1,242 @@
+"""EndoNeRF folders, read and written.
+
+    images/*.png     RGB                              poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
+    depth/*.png      z in millimetres, 0 = none
+    masks/*.png      or gt_masks/*.png, white = excluded unless the configuration says otherwise
+
+File names are free; frames are ordered and paired by the number in the name. In: a folder and the `SequenceConfig`.
+Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an `InputError` of one
+line that names file, frame and reason. Knows nothing of models or training.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.opencv import area_resize, read_png, write_png
+from endotsr.sequences.files import check_pairing, hash_files, list_pictures
+from endotsr.sequences.masks import check_polarity, check_tissue_share, threshold_masks
+from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
+from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.splits import parse_frame_range, split_frames, time_stamps
+from endotsr.splatting.camera import scale_camera
+
+NEAR = 0.2  # near plane of every preset, scene units
+LEAST_SIDE = 16  # pixels; below, the three-level pyramid has nothing left to compare
+UNIT = "mm"
+
+
+class Folder(NamedTuple):
+    """The files of a sequence that a configuration selects, in time order."""
+
+    images: list[Path]
+    masks: list[Path]
+    depth: list[Path]
+    poses: Path
+    frames: range  # selected frames, as numbers within the folder
+    total: int  # frames in the folder
+
+
+def select_files(folder: Path, config: SequenceConfig) -> Folder:
+    """List, pair and select the files to read.
+
+    Raises:  InputError for a missing folder, a file without its partner, a bad frame range or an impossible split.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: sequence folder not found")
+    images, masks, depth = (list_pictures(folder / name) for name in ("images", config.masks, "depth"))
+    check_pairing(images, masks)
+    check_pairing(images, depth)
+    try:
+        total = len(images)
+        frames = parse_frame_range(config.frames, total)
+        split_frames(len(frames), config.split, config.block_length)  # an impossible split is refused before reading
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from None
+    images, masks, depth = ([files[i] for i in frames] for files in (images, masks, depth))
+    return Folder(images, masks, depth, find_pose_file(folder), frames, total)
+
+
+def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> Sequence:
+    """Read the frames that `config` selects.
+
+    near     near plane in millimetres, stored with the sequence
+
+    Order of the steps: frame range, split and t = i / n over the selected frames; masks thresholded and turned to
+    True = tissue; depth clipped per frame to percentiles of its non-zero values (0 stays 0); then everything is
+    scaled by `config.scale`: images by area, a pixel is tissue only if all pixels it covers are, depth is the mean
+    of the non-zero values it covers, the camera follows.
+
+    Raises:  InputError (see the module docstring).
+    """
+    files = select_files(folder, config)
+    rows = read_pose_rows(files.poses, files.total)
+    notes: list[str] = []
+    images, white, depth = _read_pictures(files, config, notes)
+    masks = ~white if config.excluded_value == "white" else white
+    where = str(Path(folder) / config.masks)
+    share = check_tissue_share(masks, where, config.excluded_value, config.allow_mask_share)
+    evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_mask_share)
+    notes += [
+        f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
+        _depth_note(depth, near, files.depth[0].parent),
+    ]
+    height, width = images.shape[2:]
+    cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
+    if config.scale != 1.0:
+        images, masks, depth = _scaled(images, masks, depth, config.scale, str(folder))
+        height, width = images.shape[2:]
+        scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
+        cameras = [scaled[id(camera)] for camera in cameras]
+        notes.append(f"scaled to {width}x{height}; tissue share {masks.mean():.4f}")
+        check_tissue_share(masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_mask_share)
+    if min(width, height) < LEAST_SIDE:
+        raise InputError(f"{folder}: images of {width}x{height} pixels: no side may be under {LEAST_SIDE}")
+    train, test = split_frames(len(images), config.split, config.block_length)
+    return Sequence(
+        images=images,
+        masks=masks,
+        depth=depth,
+        times=time_stamps(len(images)),
+        cameras=cameras,
+        names=[file.stem for file in files.images],
+        near=near,
+        unit=UNIT,
+        static_camera=static,
+        train_index=train,
+        test_index=test,
+        notes=notes,
+    )
+
+
+def input_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
+    """SHA-256 (hex) of every file that `read_endonerf` reads with this configuration, by path inside the folder."""
+    files = select_files(folder, config)
+    return hash_files(Path(folder), [*files.images, *files.masks, *files.depth, files.poses])
+
+
+def write_endonerf(sequence: Sequence, folder: Path) -> None:
+    """Write a sequence in this layout: images, depth as 16-bit whole millimetres, masks with white = excluded, poses.
+
+    Depth is rounded, to no less than 1 where there is depth. Names become 000000.png, 000001.png, ...
+    Raises:  InputError if the folder already holds images, a depth exceeds 65535, or a camera does not fit the format.
+    """
+    folder = Path(folder)
+    if (folder / "images").exists():
+        raise InputError(f"{folder}: already holds a sequence (images/)")
+    if sequence.depth.max() > 65535:
+        frame = int(sequence.depth.reshape(sequence.count, -1).max(axis=1).argmax())
+        raise InputError(f"{folder}: frame {frame}: depth {sequence.depth.max():g} does not fit into 16 bits")
+    rows = rows_from_cameras(sequence.cameras, sequence.depth.reshape(sequence.count, -1).max(axis=1))
+    for name in ("images", "masks", "depth"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    np.save(folder / "poses_bounds.npy", rows)
+    for i in range(sequence.count):
+        depth = sequence.depth[i]
+        millimetres = np.where(depth > 0, np.maximum(np.rint(depth), 1), 0).astype(np.uint16)
+        write_png(folder / "images" / f"{i:06d}.png", sequence.images[i].transpose(1, 2, 0))
+        write_png(folder / "masks" / f"{i:06d}.png", np.where(sequence.masks[i], 0, 255).astype(np.uint8))
+        write_png(folder / "depth" / f"{i:06d}.png", millimetres)
+
+
+def _read_pictures(
+    files: Folder, config: SequenceConfig, notes: list[str]
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
+    """All selected pictures: images (n, 3, H, W), white mask pixels (n, H, W), clipped depth (n, H, W)."""
+    first = read_png(files.images[0])
+    height, width = first.shape[:2]
+    n = len(files.images)
+    images = np.empty((n, 3, height, width), np.uint8)
+    depth = np.empty((n, height, width), np.float32)
+    masks: list[NDArray] = [first] * n
+
+    def read_frame(i: int) -> None:
+        images[i] = _read_colour(files.images[i], width, height)
+        masks[i] = _read_grey(files.masks[i], width, height)
+        depth[i] = clip_depth(_read_grey(files.depth[i], width, height), config.depth_percentiles)
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame that has one
+    return images, threshold_masks(masks, [str(file) for file in files.masks], notes), depth
+
+
+def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.float32]:
+    """Depth clipped to two percentiles of its non-zero values; 0 (no depth) stays 0. (H, W) to (H, W) float32."""
+    result = depth.astype(np.float32)
+    valid = result > 0
+    if valid.any():
+        low, high = np.percentile(result[valid], percentiles)
+        result[valid] = np.clip(result[valid], low, high)
+    return result
+
+
+def _read_colour(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+    pixels = _read_sized(path, width, height)
+    if pixels.dtype != np.uint8:
+        raise InputError(f"{path}: 16-bit picture; images must have 8 bits a channel")
+    if pixels.ndim == 2:
+        raise InputError(f"{path}: grey picture; images must be RGB")
+    return pixels.transpose(2, 0, 1)
+
+
+def _read_grey(path: Path, width: int, height: int) -> NDArray:
+    pixels = _read_sized(path, width, height)
+    if pixels.ndim == 3:
+        if (pixels != pixels[:, :, :1]).any():
+            raise InputError(f"{path}: coloured picture; one grey channel expected")
+        pixels = np.ascontiguousarray(pixels[:, :, 0])
+    return pixels
+
+
+def _read_sized(path: Path, width: int, height: int) -> NDArray:
+    pixels = read_png(path)
+    if pixels.shape[:2] != (height, width):
+        raise InputError(f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, the first image has {width}x{height}")
+    return pixels
+
+
+def _depth_note(depth: NDArray[np.float32], near: float, where: Path) -> str:
+    """A sentence on the depth prior; refuses a sequence without any."""
+    valid = depth > 0
+    if not valid.any():
+        raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
+    values = depth[valid]
+    if values.max() <= near:
+        raise InputError(f"{where}: the largest depth is {values.max():g}, in front of the near plane at {near:g}")
+    empty = np.flatnonzero(~valid.any(axis=(1, 2)))
+    behind = float((values <= near).mean())
+    return (
+        f"depth in {UNIT}, {values.min():g} to {values.max():g} after clipping;"
+        f" missing on {1 - valid.mean():.4f} of the pixels"
+        + (f"; frames without any: {', '.join(map(str, empty))}" if empty.size else "")
+        + (f"; {behind:.1%} of it lies in front of the near plane at {near:g}" if behind else "")
+    )
+
+
+def _scaled(
+    images: NDArray[np.uint8], masks: NDArray[np.bool_], depth: NDArray[np.float32], scale: float, where: str
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
+    if scale > 1:
+        raise InputError(f"{where}: scale {scale:g}: images can only be made smaller, allowed are values in (0, 1]")
+    n, _, old_height, old_width = images.shape
+    width, height = round(old_width * scale), round(old_height * scale)
+    if min(width, height) < LEAST_SIDE:
+        raise InputError(
+            f"{where}: scale {scale:g} makes {width}x{height} pixels of {old_width}x{old_height};"
+            f" no side may be under {LEAST_SIDE}"
+        )
+    small = np.empty((n, 3, height, width), np.uint8)
+    tissue = np.empty((n, height, width), bool)
+    prior = np.zeros((n, height, width), np.float32)
+    for i in range(n):
+        small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
+        tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
+        share = area_resize((depth[i] > 0).astype(np.float32), width, height)
+        np.divide(area_resize(depth[i], width, height), share, out=prior[i], where=share > 0)
+    return small, tissue, prior

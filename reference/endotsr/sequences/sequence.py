@@ -1,0 +1,103 @@
+"""A sequence in memory: what every reader and the simulator deliver, and all that the trainer and the evaluation see.
+
+Pictures stay 8-bit (one byte a channel); `Sequence.frame` converts one of them on demand. No file format and no
+mask polarity is known here: a mask is True on tissue, a depth of 0 is no depth.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from endotsr.splatting.camera import Camera
+
+
+class Frame(NamedTuple):
+    """One frame as the losses take it. Image and depth have the precision that was asked for."""
+
+    image: NDArray[np.floating]  # (3, H, W) display RGB in [0, 1]
+    mask: NDArray[np.bool_]  # (H, W)    True = tissue
+    depth: NDArray[np.floating]  # (H, W)    view-space z, scene units; 0 = no depth
+    time: float  # normalised, in [0, 1)
+    camera: Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """n frames of H x W pixels with masks, depth prior, cameras and a split.
+
+    The notes say in full sentences what the reader assumed and found: polarity, shares, thresholds, repairs.
+    """
+
+    images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
+    masks: NDArray[np.bool_]  # (n, H, W)    True = tissue
+    depth: NDArray[np.float32]  # (n, H, W)    view-space z, scene units; 0 = no depth
+    times: NDArray[np.float64]  # (n,)         normalised, in [0, 1)
+    cameras: list[Camera]  # n entries; one and the same object when the camera is static
+    names: list[str]  # n names, for messages and written pictures
+    near: float  # near plane, scene units
+    unit: str  # the scene unit, in words
+    static_camera: bool
+    train_index: NDArray[np.intp]  # ascending
+    test_index: NDArray[np.intp]  # ascending, disjoint from train_index
+    notes: list[str] = field(default_factory=list)
+    keep_frames: bool = False  # hold converted frames in memory (15 bytes a pixel in float32)
+    _kept: dict[tuple[int, str], Frame] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        n, _, height, width = self.images.shape
+        expected: dict[str, tuple[Any, tuple[int, ...], type]] = {
+            "images": (self.images, (n, 3, height, width), np.uint8),
+            "masks": (self.masks, (n, height, width), np.bool_),
+            "depth": (self.depth, (n, height, width), np.float32),
+            "times": (self.times, (n,), np.float64),
+        }
+        for name, (array, shape, dtype) in expected.items():
+            if array.shape != shape or array.dtype != dtype:
+                raise ValueError(f"{name}: {shape} of {np.dtype(dtype)} expected, got {array.shape} of {array.dtype}")
+        if len(self.cameras) != n or len(self.names) != n:
+            raise ValueError(f"{n} frames, but {len(self.cameras)} cameras and {len(self.names)} names")
+        if np.intersect1d(self.train_index, self.test_index).size:
+            raise ValueError("a frame is both training and held out")
+
+    @property
+    def count(self) -> int:
+        """Number of frames n."""
+        return len(self.images)
+
+    @property
+    def height(self) -> int:
+        """Rows of a frame."""
+        return self.images.shape[2]
+
+    @property
+    def width(self) -> int:
+        """Columns of a frame."""
+        return self.images.shape[3]
+
+    @property
+    def tissue_share(self) -> float:
+        """Share of all pixels of all frames that are tissue."""
+        return float(self.masks.mean())
+
+    def frame(self, index: int, dtype: DTypeLike = np.float32) -> Frame:
+        """Frame `index` with image and depth in `dtype`; image = 8-bit value / 255.
+
+        Raises:  IndexError outside 0 .. n-1.
+        """
+        if not 0 <= index < self.count:
+            raise IndexError(f"frame {index} of a sequence of {self.count}")
+        key = (int(index), np.dtype(dtype).name)
+        if key in self._kept:
+            return self._kept[key]
+        frame = Frame(
+            image=np.divide(self.images[index], 255, dtype=dtype),
+            mask=self.masks[index],
+            depth=self.depth[index].astype(dtype),
+            time=float(self.times[index]),
+            camera=self.cameras[index],
+        )
+        if self.keep_frames:
+            self._kept[key] = frame
+        return frame

@@ -1,0 +1,100 @@
+"""Which frames are held out, and at which normalised time a frame lies.
+
+In: the number of frames that were selected (a frame range is applied before the split). Out: two sorted index
+arrays. Nothing here looks at the pictures.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+
+IndexArray = NDArray[np.intp]
+
+LEAST_FRAMES = 3
+LEAST_TRAINING_FRAMES = 2
+LEAST_BLOCK_PERIOD = 24
+
+
+def time_stamps(count: int) -> NDArray[np.float64]:
+    """t_i = i / n for i = 0 .. n-1 (ruling: 1 is never reached). Shape (n,)."""
+    return np.arange(count) / count
+
+
+def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:
+    """The published split: frame i is held out when (i - 1) % 8 == 0, that is 1, 9, 17, ...
+
+    returns  (train (n_train,), test (n_test,)), ascending
+    """
+    index = np.arange(count)
+    held_out = (index - 1) % 8 == 0
+    return index[~held_out], index[held_out]
+
+
+def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
+    """Contiguous held-out blocks, which ask for more than the mean of two neighbours.
+
+    The sequence is cut into periods of max(24, 2 length) frames and a block of `length` frames is held out in the
+    middle of each. A block that would leave no training frame behind it is dropped: held-out frames always have
+    a training frame on both sides.
+
+    returns  (train (n_train,), test (n_test,)), ascending
+    Raises:  InputError if no block fits.
+    """
+    period = max(LEAST_BLOCK_PERIOD, 2 * length)
+    first = (period - length) // 2
+    held_out = np.zeros(count, bool)
+    for start in range(first, count - length, period):
+        held_out[start : start + length] = True
+    if not held_out.any():
+        raise InputError(
+            f"split blocks: no held-out block of {length} frames fits into {count} frames;"
+            f" at least {first + length + 1} frames are needed"
+        )
+    index = np.arange(count)
+    return index[~held_out], index[held_out]
+
+
+def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray, IndexArray]:
+    """The split named in the configuration.
+
+    Raises:  InputError if there are fewer than 3 frames, fewer than 2 training frames, or no block fits.
+    """
+    if count < LEAST_FRAMES:
+        raise InputError(f"{count} frames are too few: at least {LEAST_FRAMES} are needed")
+    train, test = blocks(count, block_length) if split == "blocks" else every_eighth(count)
+    if len(train) < LEAST_TRAINING_FRAMES:
+        raise InputError(
+            f"the split {split} leaves {len(train)} training frames: at least {LEAST_TRAINING_FRAMES} are needed"
+        )
+    return train, test
+
+
+def parse_frame_range(text: str, count: int) -> range:
+    """Frames named by "start:stop[:step]" in Python's slice notation; "" is all of them.
+
+    Negative numbers count from the end. Unlike a Python slice, an end beyond the sequence is refused rather than
+    cut off, and the step is at least 1.
+    Raises:  InputError that repeats the text and says what is allowed.
+    """
+    if not text.strip():
+        return range(count)
+    parts = text.split(":")
+    try:
+        numbers = [int(part) if part.strip() else None for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3):
+        raise InputError(f"frames {text!r}: not a range; write start:stop or start:stop:step")
+    start, stop, step = (*numbers, None)[:3]
+    if step is not None and step < 1:
+        raise InputError(f"frames {text!r}: the step must be 1 or more")
+    for bound in (start, stop):
+        if bound is not None and not -count <= bound <= count:
+            raise InputError(f"frames {text!r}: {bound} lies outside the {count} frames of the sequence")
+    chosen = range(count)[slice(start, stop, step)]
+    if len(chosen) < LEAST_FRAMES:
+        raise InputError(
+            f"frames {text!r}: selects {len(chosen)} of {count} frames; at least {LEAST_FRAMES} are needed"
+        )
+    return chosen
