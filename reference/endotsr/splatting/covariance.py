@@ -1,0 +1,173 @@
+"""Quaternion and log-scale to a covariance in factored form (specification B2).
+
+Sigma = (R S)(R S)^T with R the rotation of the normalised quaternion and S = diag(exp(log_scale)). The
+projection works on R and S themselves: the determinant of a needle seen at an angle is lost once Sigma is formed.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.jit import jit, jit_inline
+
+FloatArray = NDArray[np.floating]
+
+LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
+BLOCK = 256  # Gaussians per parallel block: a few arrays of this length stay in the first-level cache
+
+
+class Shape(NamedTuple):
+    """Factored covariance: Sigma = (rotation * scale) (rotation * scale)^T."""
+
+    rotation: FloatArray  # (3, 3, N)
+    scale: FloatArray  # (3, N) semi-axes, scene units, > 0
+
+
+class CovarianceSaved(NamedTuple):
+    """What the reverse pass needs: the inputs."""
+
+    quaternion: FloatArray
+    log_scale: FloatArray
+
+
+class CovarianceGrads(NamedTuple):
+    """Gradients by the raw parameters."""
+
+    quaternion: FloatArray  # (4, N)
+    log_scale: FloatArray  # (3, N)
+
+
+def _unit_quaternion(w, x, y, z):
+    """The normalised quaternion and 1/norm; (1, 0, 0, 0) and 0 for the zero quaternion.
+
+    Dividing by the largest entry first keeps the squares inside the exponent range for norms of 1e-300 to 1e300.
+    """
+    zero = w - w
+    one = zero + type(zero)(1)
+    largest = max(max(abs(w), abs(x)), max(abs(y), abs(z)))
+    if largest == zero:
+        return one, zero, zero, zero, zero
+    w /= largest
+    x /= largest
+    y /= largest
+    z /= largest
+    n = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / n, x / n, y / n, z / n, (one / n) / largest
+
+
+unit_quaternion = jit_inline(_unit_quaternion)
+
+
+def _covariance_forward(quaternion, log_scale, rotation, scale):
+    real = quaternion.dtype.type
+    one, two, limit = real(1), real(2), real(LOG_SCALE_LIMIT)
+    for i in range(quaternion.shape[1]):
+        w, x, y, z, _ = unit_quaternion(quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i])
+        rotation[0, 0, i] = one - two * (y * y + z * z)
+        rotation[0, 1, i] = two * (x * y - w * z)
+        rotation[0, 2, i] = two * (x * z + w * y)
+        rotation[1, 0, i] = two * (x * y + w * z)
+        rotation[1, 1, i] = one - two * (x * x + z * z)
+        rotation[1, 2, i] = two * (y * z - w * x)
+        rotation[2, 0, i] = two * (x * z - w * y)
+        rotation[2, 1, i] = two * (y * z + w * x)
+        rotation[2, 2, i] = one - two * (x * x + y * y)
+        for k in range(3):
+            scale[k, i] = math.exp(min(max(log_scale[k, i], -limit), limit))
+
+
+def _covariance_reverse(quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
+    real = quaternion.dtype.type
+    two, limit = real(2), real(LOG_SCALE_LIMIT)
+    for i in range(quaternion.shape[1]):
+        w, x, y, z, inverse_norm = unit_quaternion(
+            quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i]
+        )
+        g00, g01, g02 = d_rotation[0, 0, i], d_rotation[0, 1, i], d_rotation[0, 2, i]
+        g10, g11, g12 = d_rotation[1, 0, i], d_rotation[1, 1, i], d_rotation[1, 2, i]
+        g20, g21, g22 = d_rotation[2, 0, i], d_rotation[2, 1, i], d_rotation[2, 2, i]
+        gw = two * (x * (g21 - g12) + y * (g02 - g20) + z * (g10 - g01))
+        gx = two * (-two * x * (g11 + g22) + y * (g01 + g10) + z * (g02 + g20) + w * (g21 - g12))
+        gy = two * (x * (g01 + g10) - two * y * (g00 + g22) + z * (g12 + g21) + w * (g02 - g20))
+        gz = two * (x * (g02 + g20) + y * (g12 + g21) - two * z * (g00 + g11) + w * (g10 - g01))
+        # normalisation: remove the part along q, divide by the norm (inverse_norm is 0 for the zero quaternion)
+        along = gw * w + gx * x + gy * y + gz * z
+        d_quaternion[0, i] = (gw - along * w) * inverse_norm
+        d_quaternion[1, i] = (gx - along * x) * inverse_norm
+        d_quaternion[2, i] = (gy - along * y) * inverse_norm
+        d_quaternion[3, i] = (gz - along * z) * inverse_norm
+        for k in range(3):
+            s = log_scale[k, i]
+            inside = abs(s) <= limit
+            d_log_scale[k, i] = d_scale[k, i] * math.exp(s) if inside else real(0)
+
+
+_forward_kernel = jit(_covariance_forward)
+_reverse_kernel = jit(_covariance_reverse)
+
+
+def _forward_blocks(quaternion, log_scale, rotation, scale):
+    n = quaternion.shape[1]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        _forward_kernel(quaternion[:, a:e], log_scale[:, a:e], rotation[:, :, a:e], scale[:, a:e])
+
+
+def _reverse_blocks(quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
+    n = quaternion.shape[1]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        _reverse_kernel(
+            quaternion[:, a:e],
+            log_scale[:, a:e],
+            d_rotation[:, :, a:e],
+            d_scale[:, a:e],
+            d_quaternion[:, a:e],
+            d_log_scale[:, a:e],
+        )
+
+
+_forward_parallel = jit(_forward_blocks, parallel=True)
+_reverse_parallel = jit(_reverse_blocks, parallel=True)
+
+
+def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[Shape, CovarianceSaved]:
+    """Factored covariance of N Gaussians (specification B2).
+
+    quaternion  (4, N) raw w, x, y, z of any nonzero length; normalised here
+    log_scale   (3, N) natural log of the semi-axes; clipped to +-40
+    returns     Shape(rotation (3, 3, N), scale (3, N) scene units)
+
+    Reverse: `covariance_reverse`; the gradient is orthogonal to the quaternion and scales with 1/|q|.
+    Edges:   the zero quaternion is the identity with zero gradient; a clipped log-scale has zero gradient
+             (`covariance_degenerate` counts both).
+    Oracle:  scipy.spatial.transform.Rotation; tests/oracle/splatting_oracle.py.
+    """
+    n = quaternion.shape[1]
+    rotation = np.empty((3, 3, n), quaternion.dtype)
+    scale = np.empty((3, n), quaternion.dtype)
+    _forward_parallel(quaternion, log_scale, rotation, scale)
+    return Shape(rotation, scale), CovarianceSaved(quaternion, log_scale)
+
+
+def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrads:
+    """Gradients by quaternion and log-scale from those by rotation (all nine entries independent) and scale."""
+    d_quaternion = np.empty_like(saved.quaternion)
+    d_log_scale = np.empty_like(saved.log_scale)
+    _reverse_parallel(saved.quaternion, saved.log_scale, d_shape.rotation, d_shape.scale, d_quaternion, d_log_scale)
+    return CovarianceGrads(d_quaternion, d_log_scale)
+
+
+def covariance_degenerate(quaternion: FloatArray, log_scale: FloatArray) -> tuple[int, int]:
+    """How many quaternions are zero and how many log-scales are clipped."""
+    zero = int(np.sum(~np.any(quaternion != 0, axis=0)))
+    return zero, int(np.sum(np.abs(log_scale) > LOG_SCALE_LIMIT))
+
+
+def covariance_matrix(shape: Shape) -> FloatArray:
+    """Sigma itself, (3, 3, N), scene units squared; for oracles and exports, not used by the rasteriser."""
+    factor = shape.rotation * shape.scale
+    return np.einsum("ikn,jkn->ijn", factor, factor)
