@@ -1,0 +1,251 @@
+"""Colour from real spherical harmonics of degree 0 to 3, with the gradient through the view direction (B4).
+
+colour = max(0, 1/2 + sum_k Y_k(direction) h_k), direction from the camera centre to the (deformed) Gaussian.
+A colour residual is added to the degree-0 coefficient before the sum: with zero residual nothing changes, bit by bit.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.jit import jit
+
+FloatArray = NDArray[np.floating]
+
+BLOCK = 256
+
+Y00 = 0.28209479177387814  # 1 / sqrt(4 pi), the degree-0 harmonic
+C1 = 0.4886025119029199
+C2A, C2B, C2C = 1.0925484305920792, 0.31539156525252005, 0.5462742152960396
+C3A, C3B, C3C = 0.5900435899266435, 2.890611442640554, 0.4570457994644658
+C3D, C3E = 0.3731763325901154, 1.445305721320277
+
+
+class HarmonicsSaved(NamedTuple):
+    """Inputs of the forward pass and which channels were clamped at zero."""
+
+    harmonics: FloatArray
+    residual: FloatArray | None
+    position: FloatArray
+    centre: FloatArray
+    degree: int
+    clamped: NDArray[np.bool_]  # (3, N)
+
+
+class HarmonicsGrads(NamedTuple):
+    """Gradients of the colour stage."""
+
+    harmonics: FloatArray  # (K, 3, N); bands above the active degree are zero
+    residual: FloatArray | None  # (3, N), None when there was no residual
+    position: FloatArray  # (3, N) through the view direction
+    centre: FloatArray  # (3,) camera centre
+
+
+def _directions(position, centre, x, y, z, inverse_distance):
+    """Unit directions; a Gaussian at the camera centre gets direction and inverse distance zero (band 0 only)."""
+    real = position.dtype.type
+    for i in range(x.size):
+        dx, dy, dz = position[0, i] - centre[0], position[1, i] - centre[1], position[2, i] - centre[2]
+        r = math.sqrt(dx * dx + dy * dy + dz * dz)
+        inverse = real(1) / r if r > real(0) else real(0)
+        x[i], y[i], z[i], inverse_distance[i] = dx * inverse, dy * inverse, dz * inverse, inverse
+
+
+def _basis(degree, x, y, z, basis):
+    """Y_k for k >= 1 up to the active degree, (15, n); formulas in the specification."""
+    real = x.dtype.type
+    c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
+    c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)
+    two, three, four = real(2), real(3), real(4)
+    for i in range(x.size):
+        a, b, c = x[i], y[i], z[i]
+        basis[0, i], basis[1, i], basis[2, i] = -c1 * b, c1 * c, -c1 * a
+        if degree < 2:
+            continue
+        aa, bb, cc = a * a, b * b, c * c
+        basis[3, i], basis[4, i] = c2a * a * b, -c2a * b * c
+        basis[5, i] = c2b * (two * cc - aa - bb)
+        basis[6, i], basis[7, i] = -c2a * a * c, c2c * (aa - bb)
+        if degree < 3:
+            continue
+        basis[8, i] = -c3a * b * (three * aa - bb)
+        basis[9, i] = c3b * a * b * c
+        basis[10, i] = -c3c * b * (four * cc - aa - bb)
+        basis[11, i] = c3d * c * (two * cc - three * aa - three * bb)
+        basis[12, i] = -c3c * a * (four * cc - aa - bb)
+        basis[13, i] = c3e * c * (aa - bb)
+        basis[14, i] = -c3a * a * (aa - three * bb)
+
+
+def _basis_gradient(degree, x, y, z, weight, gx, gy, gz):
+    """g += sum_k weight_k dY_k/d(x, y, z), the three taken as independent."""
+    real = x.dtype.type
+    c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
+    c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)
+    two, three, four, six, eight = real(2), real(3), real(4), real(6), real(8)
+    for i in range(x.size):
+        a, b, c = x[i], y[i], z[i]
+        u, v, w = -c1 * weight[2, i], -c1 * weight[0, i], c1 * weight[1, i]
+        if degree > 1:
+            w4, w5, w6, w7, w8 = weight[3, i], weight[4, i], weight[5, i], weight[6, i], weight[7, i]
+            u += c2a * (b * w4 - c * w7) - two * c2b * a * w6 + two * c2c * a * w8
+            v += c2a * (a * w4 - c * w5) - two * c2b * b * w6 - two * c2c * b * w8
+            w += -c2a * (b * w5 + a * w7) + four * c2b * c * w6
+        if degree > 2:
+            aa, bb, cc = a * a, b * b, c * c
+            w9, w10, w11, w12 = weight[8, i], weight[9, i], weight[10, i], weight[11, i]
+            w13, w14, w15 = weight[12, i], weight[13, i], weight[14, i]
+            u += -c3a * six * a * b * w9 + c3b * b * c * w10 + c3c * two * a * b * w11 - c3d * six * a * c * w12
+            u += -c3c * (four * cc - three * aa - bb) * w13 + c3e * two * a * c * w14 - c3a * three * (aa - bb) * w15
+            v += -c3a * three * (aa - bb) * w9 + c3b * a * c * w10 - c3c * (four * cc - aa - three * bb) * w11
+            v += -c3d * six * b * c * w12 + c3c * two * a * b * w13 - c3e * two * b * c * w14 + c3a * six * a * b * w15
+            w += c3b * a * b * w10 - c3c * eight * b * c * w11 + c3d * (six * cc - three * aa - three * bb) * w12
+            w += -c3c * eight * a * c * w13 + c3e * (aa - bb) * w14
+        gx[i], gy[i], gz[i] = u, v, w
+
+
+_directions_kernel = jit(_directions)
+_basis_kernel = jit(_basis)
+_basis_gradient_kernel = jit(_basis_gradient)
+
+
+def _colour_blocks(harmonics, residual, position, centre, degree, colour, clamped):
+    real = position.dtype.type
+    y00, half, zero = real(Y00), real(0.5), real(0)
+    n = position.shape[1]
+    bands = (degree + 1) * (degree + 1)
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        basis = np.empty((15, e - a), position.dtype)
+        if degree > 0:
+            d = np.empty((4, e - a), position.dtype)
+            _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
+            _basis_kernel(degree, d[0], d[1], d[2], basis)
+        for channel in range(3):
+            out, flag, base = colour[channel, a:e], clamped[channel, a:e], harmonics[0, channel, a:e]
+            if residual.shape[1] > 0:
+                extra = residual[channel, a:e]
+                for i in range(out.size):
+                    out[i] = half + y00 * (base[i] + extra[i])
+            else:
+                for i in range(out.size):
+                    out[i] = half + y00 * base[i]
+            for k in range(1, bands):
+                y, h = basis[k - 1], harmonics[k, channel, a:e]
+                for i in range(out.size):
+                    out[i] += y[i] * h[i]
+            for i in range(out.size):
+                flag[i] = out[i] < zero
+                out[i] = max(out[i], zero)
+
+
+def _colour_reverse_blocks(
+    harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centres
+):
+    """`d_base` is the gradient of the residual, shape (3, 0) when there is none."""
+    real = position.dtype.type
+    y00, zero = real(Y00), real(0)
+    n = position.shape[1]
+    bands = (degree + 1) * (degree + 1)
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        g = np.empty((3, e - a), position.dtype)
+        d = np.empty((4, e - a), position.dtype)
+        basis = np.empty((15, e - a), position.dtype)
+        weight = np.zeros((15, e - a), position.dtype)  # sum over channels of g h_k
+        if degree > 0:
+            _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
+            _basis_kernel(degree, d[0], d[1], d[2], basis)
+        for channel in range(3):
+            gc, up, flag = g[channel], d_colour[channel, a:e], clamped[channel, a:e]
+            out = d_harmonics[0, channel, a:e]
+            for i in range(gc.size):
+                gc[i] = zero if flag[i] else up[i]
+                out[i] = y00 * gc[i]
+            if d_base.shape[1] > 0:
+                extra = d_base[channel, a:e]
+                for i in range(gc.size):
+                    extra[i] = out[i]
+            for k in range(1, harmonics.shape[0]):
+                out = d_harmonics[k, channel, a:e]
+                if k >= bands:
+                    for i in range(out.size):
+                        out[i] = zero
+                    continue
+                y, h, w = basis[k - 1], harmonics[k, channel, a:e], weight[k - 1]
+                for i in range(out.size):
+                    out[i] = y[i] * gc[i]
+                    w[i] += gc[i] * h[i]
+        _direction_to_position(degree, d, weight, d_position[:, a:e], d_centres[block])
+
+
+def _direction_to_position_block(degree, d, weight, d_position, d_centre):
+    """From direction to position: project out the radial part, divide by the distance; the centre gets minus the sum."""
+    real = d.dtype.type
+    zero = real(0)
+    d_centre[0] = d_centre[1] = d_centre[2] = zero
+    if degree == 0:
+        for k in range(3):
+            for i in range(d_position.shape[1]):
+                d_position[k, i] = zero
+        return
+    gx, gy, gz = d_position[0], d_position[1], d_position[2]
+    _basis_gradient_kernel(degree, d[0], d[1], d[2], weight, gx, gy, gz)
+    for i in range(gx.size):
+        x, y, z, inverse = d[0, i], d[1, i], d[2, i], d[3, i]
+        along = gx[i] * x + gy[i] * y + gz[i] * z
+        gx[i], gy[i], gz[i] = (gx[i] - along * x) * inverse, (gy[i] - along * y) * inverse, (gz[i] - along * z) * inverse
+        d_centre[0] -= gx[i]
+        d_centre[1] -= gy[i]
+        d_centre[2] -= gz[i]
+
+
+_direction_to_position = jit(_direction_to_position_block)
+_colour_parallel = jit(_colour_blocks, parallel=True)
+_colour_reverse_parallel = jit(_colour_reverse_blocks, parallel=True)
+
+
+def harmonics_forward(
+    harmonics: FloatArray, residual: FloatArray | None, position: FloatArray, centre: FloatArray, degree: int
+) -> tuple[FloatArray, HarmonicsSaved]:
+    """Colour of N Gaussians seen from a camera centre (specification B4).
+
+    harmonics  (K, 3, N) coefficients [band, channel, Gaussian], K >= (degree + 1)^2
+    residual   (3, N) added to the degree-0 coefficient (equation 2), or None
+    position   (3, N) deformed centre, scene units
+    centre     (3,)   camera centre in world axes
+    degree     0..3   active degree; higher bands are not read
+    returns    (3, N) display colour, >= 0, no upper clamp
+
+    Reverse: `harmonics_reverse`; the gradient is zero for a channel whose value before the clamp is < 0.
+    Edges:   a Gaussian at the camera centre uses band 0 only.
+    Oracle:  tests/oracle/splatting_oracle.py; rotation invariance of every band.
+    """
+    dtype = position.dtype
+    if not 0 <= degree <= 3 or harmonics.shape[0] < (degree + 1) ** 2:
+        raise ValueError(f"degree {degree} needs {(degree + 1) ** 2} bands, harmonics has {harmonics.shape[0]}; 0..3")
+    centre = np.ascontiguousarray(centre, dtype)
+    colour = np.empty((3, position.shape[1]), dtype)
+    clamped = np.empty(colour.shape, np.bool_)
+    extra = np.empty((3, 0), dtype) if residual is None else residual
+    _colour_parallel(harmonics, extra, position, centre, degree, colour, clamped)
+    return colour, HarmonicsSaved(harmonics, residual, position, centre, degree, clamped)
+
+
+def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsGrads:
+    """Gradients by coefficients, residual, position and camera centre from dL/dcolour (3, N)."""
+    n = saved.position.shape[1]
+    dtype = saved.position.dtype
+    d_harmonics = np.empty_like(saved.harmonics)
+    d_residual = np.empty((3, 0 if saved.residual is None else n), dtype)
+    d_position = np.empty((3, n), dtype)
+    d_centres = np.empty(((n + BLOCK - 1) // BLOCK, 3), dtype)
+    _colour_reverse_parallel(
+        saved.harmonics, saved.position, saved.centre, saved.degree, saved.clamped,
+        d_colour, d_harmonics, d_residual, d_position, d_centres,
+    )  # fmt: skip
+    residual = None if saved.residual is None else d_residual
+    return HarmonicsGrads(d_harmonics, residual, d_position, d_centres.sum(axis=0))
