@@ -1,0 +1,231 @@
+"""The flexible deformation model (FDM), equation (B1): ten curves over time per Gaussian.
+
+    psi_c(t) = sum_j weight_cj basis(t; centre_cj, width_cj),     S = width^2 + 1e-4
+    quartic:   basis = exp(-u^2),  u = (t - centre)^2 / S         (what the released code computes)
+    gaussian:  basis = exp(-u),    u = (t - centre)^2 / (2 S)     (the textbook form)
+
+Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before
+activation. In: three arrays (10, B, N) and one time; out: ten offsets a Gaussian. This module knows nothing
+of what the offsets are used for.
+
+The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,
+basis) row is streamed once, in pieces that stay in the first-level cache.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.jit import jit, jit_inline
+from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
+
+FloatArray = NDArray[np.floating]
+Basis = Literal["quartic", "gaussian"]
+BASES: tuple[Basis, ...] = ("quartic", "gaussian")
+
+CHANNELS = 10
+WIDTH_FLOOR = 1e-4  # added to width^2; keeps u finite at width 0
+SMALLEST_EXPONENT = -60.0  # a basis value below 2^-60 (below float64 rounding of 1) is exactly 0: no subnormal numbers
+LARGEST_U = 128.0  # above it the basis value is 0 for either basis; keeps u^2 finite far from the centre
+PIECE = 1024  # Gaussians in one piece of a row
+
+
+class DeformationSaved(NamedTuple):
+    """What the reverse pass needs: the inputs themselves (references, not copies)."""
+
+    weight: FloatArray  # (10, B, N)
+    centre: FloatArray  # (10, B, N)
+    width: FloatArray  # (10, B, N)
+    t: float
+    basis: Basis
+
+
+class DeformationGrads(NamedTuple):
+    """Derivative of a loss by the inputs of the deformation."""
+
+    weight: FloatArray  # (10, B, N)
+    centre: FloatArray  # (10, B, N)
+    width: FloatArray  # (10, B, N)
+    t: float
+
+
+def deformation_forward(
+    fdm_weight: FloatArray, fdm_centre: FloatArray, fdm_width: FloatArray, t: float, basis: Basis = "quartic"
+) -> tuple[FloatArray, DeformationSaved]:
+    """Offsets of all Gaussians at time t, equation (B1).
+
+    fdm_weight  (10, B, N)  w; position, quaternion or log-scale units by channel
+    fdm_centre  (10, B, N)  theta, normalised time
+    fdm_width   (10, B, N)  sigma, normalised time, any sign (only its square counts)
+    t           normalised time; outside [0, 1] the model fades to the canonical pose
+    returns     (10, N) offsets in the dtype of the input, and what the reverse pass needs
+
+    Reverse: `deformation_reverse`.
+    Edges:   all weights 0 -> offsets exactly 0; B = 0 -> 0; N = 0 -> empty; width 0 is finite. A basis of initial
+             width 0.01 reaches 0.014 in time: frames between two of 17 centres are hardly moved at first.
+    Raises:  ValueError if shapes or dtypes disagree or the basis is not known.
+    Oracle:  tests/oracle/deformation.py.
+    """
+    _check(fdm_weight, fdm_centre, fdm_width, basis)
+    offsets = np.empty((CHANNELS, fdm_weight.shape[2]), fdm_weight.dtype)
+    _forward_kernel(fdm_weight, fdm_centre, fdm_width, float(t), basis == "quartic", offsets)
+    return offsets, DeformationSaved(fdm_weight, fdm_centre, fdm_width, float(t), basis)
+
+
+def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> DeformationGrads:
+    """Reverse of `deformation_forward`.
+
+        quartic:  d/d centre = 4 w e u (t - centre) / S,   d/d width = 4 w e u^2 width / S
+        gaussian: d/d centre =   w e   (t - centre) / S,   d/d width = 2 w e u   width / S
+        both:     d/d weight = e,   d/dt = - sum d/d centre            (e = basis value)
+
+    d_offsets  (10, N)
+    returns    gradients (10, B, N) in the dtype of the parameters; t as a float, summed in float64 in fixed order
+
+    Edges: weights 0 -> gradients of centre and width exactly 0; width 0 -> gradient of width exactly 0 (stuck).
+    """
+    weight, centre, width, t, basis = saved
+    if d_offsets.shape != (CHANNELS, weight.shape[2]) or d_offsets.dtype != weight.dtype:
+        raise ValueError(f"d_offsets: expected {weight.dtype} (10, {weight.shape[2]}), got {d_offsets.shape}")
+    d_weight, d_centre, d_width = np.empty_like(weight), np.empty_like(weight), np.empty_like(weight)
+    row_sums = np.empty(weight.shape[:2], np.float64)
+    _reverse_kernel(weight, centre, width, t, basis == "quartic", d_offsets, d_weight, d_centre, d_width, row_sums)
+    return DeformationGrads(d_weight, d_centre, d_width, -float(row_sums.sum()))
+
+
+def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str) -> None:
+    if basis not in BASES:
+        raise ValueError(f"basis: {basis!r} is not known; allowed: {', '.join(BASES)}")
+    if weight.ndim != 3 or weight.shape[0] != CHANNELS:
+        raise ValueError(f"fdm_weight: expected (10, B, N), got {weight.shape}")
+    for name, array in (("fdm_centre", centre), ("fdm_width", width)):
+        if array.shape != weight.shape or array.dtype != weight.dtype:
+            raise ValueError(f"{name}: expected {weight.dtype} {weight.shape}, got {array.dtype} {array.shape}")
+
+
+def _add_quartic(weight, centre, width, t, out):
+    """out += weight exp(-u^2) over one piece of a row."""
+    real = out.dtype.type
+    floor, far, cut, scale = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT), real(-LOG2_E)
+    for i in range(out.size):
+        distance = t - centre[i]
+        ratio = distance / (width[i] * width[i] + floor)
+        u = distance * ratio
+        u = far if u > far else u
+        exponent = scale * (u * u)
+        value = exp2_nonpositive(exponent)
+        out[i] += weight[i] * (real(0) if exponent < cut else value)
+
+
+def _add_gaussian(weight, centre, width, t, out):
+    """out += weight exp(-u) over one piece of a row."""
+    real = out.dtype.type
+    floor, far, cut = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT)
+    scale = real(-0.5 * LOG2_E)
+    for i in range(out.size):
+        distance = t - centre[i]
+        ratio = distance / (width[i] * width[i] + floor)
+        twice = distance * ratio
+        twice = real(2) * far if twice > real(2) * far else twice
+        exponent = scale * twice
+        value = exp2_nonpositive(exponent)
+        out[i] += weight[i] * (real(0) if exponent < cut else value)
+
+
+def _reverse_quartic(weight, centre, width, t, d_offset, d_weight, d_centre, d_width):
+    """Gradients of one piece of a row, quartic basis."""
+    real = d_offset.dtype.type
+    floor, far, cut, scale = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT), real(-LOG2_E)
+    for i in range(d_offset.size):
+        distance = t - centre[i]
+        inverse = real(1) / (width[i] * width[i] + floor)
+        ratio = distance * inverse
+        u = distance * ratio
+        u = far if u > far else u
+        exponent = scale * (u * u)
+        value = exp2_nonpositive(exponent) * d_offset[i]
+        value = real(0) if exponent < cut else value
+        ratio = real(0) if exponent < cut else ratio
+        common = real(4) * weight[i] * value * u
+        d_weight[i] = value
+        d_centre[i] = common * ratio
+        d_width[i] = common * u * (width[i] * inverse)
+
+
+def _reverse_gaussian(weight, centre, width, t, d_offset, d_weight, d_centre, d_width):
+    """Gradients of one piece of a row, Gaussian basis."""
+    real = d_offset.dtype.type
+    floor, far, cut = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT)
+    scale = real(-0.5 * LOG2_E)
+    for i in range(d_offset.size):
+        distance = t - centre[i]
+        inverse = real(1) / (width[i] * width[i] + floor)
+        ratio = distance * inverse
+        twice = distance * ratio
+        twice = real(2) * far if twice > real(2) * far else twice
+        exponent = scale * twice
+        value = exp2_nonpositive(exponent) * d_offset[i]
+        value = real(0) if exponent < cut else value
+        ratio = real(0) if exponent < cut else ratio
+        common = weight[i] * value
+        d_weight[i] = value
+        d_centre[i] = common * ratio
+        d_width[i] = common * twice * (width[i] * inverse)
+
+
+_add_quartic_row = jit(_add_quartic)
+_add_gaussian_row = jit(_add_gaussian)
+_reverse_quartic_row = jit(_reverse_quartic)
+_reverse_gaussian_row = jit(_reverse_gaussian)
+
+
+def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
+    """One piece of a row with either basis: the choice is made outside of the lane loop."""
+    if quartic:
+        _reverse_quartic_row(weight, centre, width, t, d_offset, d_weight, d_centre, d_width)
+    else:
+        _reverse_gaussian_row(weight, centre, width, t, d_offset, d_weight, d_centre, d_width)
+
+
+reverse_row = jit_inline(_reverse_row)
+
+
+def _forward(weight, centre, width, t, quartic, offsets):
+    """Each task owns one piece of one channel, so no cell is written twice."""
+    channels, bases, count = weight.shape
+    pieces = (count + PIECE - 1) // PIECE
+    time = weight.dtype.type(t)
+    for task in prange(channels * pieces):
+        c, start = task // pieces, (task % pieces) * PIECE
+        stop = min(count, start + PIECE)
+        out = offsets[c, start:stop]
+        out[:] = weight.dtype.type(0)
+        for j in range(bases):
+            w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
+            if quartic:
+                _add_quartic_row(w, m, s, time, out)
+            else:
+                _add_gaussian_row(w, m, s, time, out)
+
+
+def _reverse(weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d_width, row_sums):
+    """Each task owns one (channel, basis) row; its sum over Gaussians is taken in fixed order in float64."""
+    channels, bases, count = weight.shape
+    time = weight.dtype.type(t)
+    for row in prange(channels * bases):
+        c, j = row // bases, row % bases
+        total = 0.0
+        for start in range(0, count, PIECE):
+            stop = min(count, start + PIECE)
+            w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
+            d_w, d_m, d_s = d_weight[c, j, start:stop], d_centre[c, j, start:stop], d_width[c, j, start:stop]
+            reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)
+            for i in range(d_m.size):
+                total += np.float64(d_m[i])
+        row_sums[c, j] = total
+
+
+_forward_kernel = jit(_forward, parallel=True)
+_reverse_kernel = jit(_reverse, parallel=True)

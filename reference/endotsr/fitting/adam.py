@@ -1,0 +1,153 @@
+"""Adam, equation (B10): elementwise, in place, the same bits for any number of threads.
+
+    m <- beta1 m + (1 - beta1) g            v <- beta2 v + (1 - beta2) g^2
+    p <- p - rate (m / (1 - beta1^k)) / (sqrt(v / (1 - beta2^k)) + epsilon)
+
+k counts the steps of one array, so arrays that are born during a run start with k = 0 and zero moments.
+In: parameters and gradients by name, one rate a name (or one per part of the leading axis). This module
+knows no schedule and no Gaussians.
+
+Consequences to know: a zero gradient still moves a parameter by its momentum; with epsilon 1e-15 a gradient
+that is pure rounding noise moves a parameter by up to a full rate, which is why gradients are summed in fixed order.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.jit import jit
+
+FloatArray = NDArray[np.floating]
+Rate = float | tuple[tuple[slice, float], ...]
+"""One learning rate, or one per part of the leading axis: ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))."""
+
+PIECE = 4096  # numbers in one task
+SMALLEST_MOMENT = (
+    1.1754943508222875e-38  # smallest normal float32; a smaller first moment becomes 0, in both precisions
+)
+
+
+@dataclass
+class AdamState:
+    """Moments and step counters by array name; arrays are changed in place."""
+
+    first: dict[str, FloatArray] = field(default_factory=dict)  # m, shape of the parameter
+    second: dict[str, FloatArray] = field(default_factory=dict)  # v, shape of the parameter
+    step: dict[str, int] = field(default_factory=dict)  # k, steps taken so far
+
+
+def adam_state(parameters: Mapping[str, FloatArray]) -> AdamState:
+    """Fresh state (zero moments, step 0) for the given arrays."""
+    state = AdamState()
+    for name, array in parameters.items():
+        add_array(state, name, array)
+    return state
+
+
+def add_array(state: AdamState, name: str, array: FloatArray) -> None:
+    """Fresh moments and step 0 for one more array; what is there under this name is replaced."""
+    state.first[name], state.second[name], state.step[name] = np.zeros_like(array), np.zeros_like(array), 0
+
+
+def adam_update(
+    state: AdamState,
+    parameters: Mapping[str, FloatArray],
+    gradients: Mapping[str, FloatArray],
+    rates: Mapping[str, Rate],
+    beta1: float,
+    beta2: float,
+    epsilon: float,
+) -> None:
+    """One step of every array named in `gradients`; the others keep values, moments and step counter."""
+    for name, gradient in gradients.items():
+        parameter, first, second = parameters[name], state.first[name], state.second[name]
+        state.step[name] += 1
+        for part, rate in rate_parts(rates[name]):
+            adam_step(
+                parameter[part],
+                gradient[part],
+                first[part],
+                second[part],
+                state.step[name],
+                rate,
+                beta1,
+                beta2,
+                epsilon,
+            )
+
+
+def rate_parts(rate: Rate) -> tuple[tuple[slice, float], ...]:
+    """The rate as parts of the leading axis."""
+    return rate if isinstance(rate, tuple) else ((slice(None), rate),)
+
+
+def adam_step(
+    parameter: FloatArray,
+    gradient: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    step: int,
+    learning_rate: float,
+    beta1: float,
+    beta2: float,
+    epsilon: float,
+) -> None:
+    """One Adam step in place.
+
+    parameter, gradient, first, second   one shape, one dtype, C-contiguous; all but the gradient are changed
+    step                                 1 at the first step of this array
+    learning_rate, beta1, beta2, epsilon scalars; the bias corrections are formed in float64
+
+    Edges:  empty arrays pass; gradient and moments 0 -> the parameter keeps its bits. A first moment below
+            SMALLEST_MOMENT becomes 0 (it would decay into subnormal numbers, which are slow, and moves nothing).
+    Raises: ValueError on unequal shapes or dtypes, arrays that are not contiguous, step < 1.
+    Oracle: tests/oracle/adam.py.
+    """
+    for name, array in (("gradient", gradient), ("first", first), ("second", second)):
+        if array.shape != parameter.shape or array.dtype != parameter.dtype:
+            raise ValueError(f"{name}: expected {parameter.dtype} {parameter.shape}, got {array.dtype} {array.shape}")
+    if not all(a.flags.c_contiguous for a in (parameter, gradient, first, second)):
+        raise ValueError("adam_step: arrays must be C-contiguous, or the update would go to a copy")
+    rate, root = step_factors(step, learning_rate, beta1, beta2)
+    p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous
+    _adam_kernel(p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
+
+
+def step_factors(step: int, learning_rate: float, beta1: float, beta2: float) -> tuple[float, float]:
+    """rate / (1 - beta1^k) and 1 / sqrt(1 - beta2^k): the bias corrections, in float64."""
+    if step < 1:
+        raise ValueError(f"step: {step} < 1")
+    return learning_rate / (1.0 - beta1**step), 1.0 / (1.0 - beta2**step) ** 0.5
+
+
+def _adam_row(parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
+    """One piece of a row; scalars are float64 and rounded once, here, to the dtype of the arrays."""
+    real = parameter.dtype.type
+    keep1, keep2, new1, new2 = real(beta1), real(beta2), real(1.0 - beta1), real(1.0 - beta2)
+    rate, root, epsilon = real(rate), real(root), real(epsilon)
+    tiny = real(SMALLEST_MOMENT)
+    for i in range(parameter.size):
+        g = gradient[i]
+        m = keep1 * first[i] + new1 * g
+        v = keep2 * second[i] + new2 * (g * g)
+        m = real(0) if abs(m) < tiny else m
+        first[i] = m
+        second[i] = v
+        parameter[i] -= rate * m / (np.sqrt(v) * root + epsilon)
+
+
+adam_row = jit(_adam_row)
+
+
+def _adam(parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
+    for task in prange((parameter.size + PIECE - 1) // PIECE):
+        start = task * PIECE
+        stop = min(parameter.size, start + PIECE)
+        p, g, m, v = parameter[start:stop], gradient[start:stop], first[start:stop], second[start:stop]
+        adam_row(p, g, m, v, rate, root, beta1, beta2, epsilon)
+
+
+_adam_kernel = jit(_adam, parallel=True)

@@ -1,0 +1,98 @@
+"""When and how much: every schedule of the training, as pure functions of (iteration, configuration).
+
+Iterations count from 1. This module knows no array and no state, so any iteration can be asked for at any
+time: a resumed run asks the same questions and gets the same answers.
+"""
+
+from endotsr.config import Config
+from endotsr.fitting.adam import Rate
+from endotsr.scene.gaussians import DEFORMATION_CHANNELS, POSITION_CHANNELS
+
+
+def exponential_decay(step: int, steps: int, initial: float, final: float) -> float:
+    """initial^(1 - tau) final^tau, tau = clip(step / steps, 0, 1), 1 if steps = 0; 0 if an end is not positive."""
+    if initial <= 0.0 or final <= 0.0:
+        return 0.0
+    share = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
+    return initial * (final / initial) ** share
+
+
+def residuals_active(iteration: int, config: Config) -> bool:
+    """Whether the spectral residuals are evaluated and trained at this iteration: after K_s, if the model has any."""
+    has_any = config.model.appearance or config.model.spectral_motion
+    return has_any and iteration > config.training.residual_activation
+
+
+def residuals_born(iteration: int, config: Config) -> bool:
+    """Whether this is the first iteration with residuals: their arrays and fresh moments are made before it."""
+    return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
+
+
+def residual_decay(iteration: int, config: Config) -> float:
+    """Factor on the residual rates, from 1 to `final_factor`.
+
+    With `restart_residual_schedule` it runs over the steps K_s .. iterations, else it is that of the base model.
+    """
+    born = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
+    return exponential_decay(iteration - born, config.training.iterations - born, 1.0, config.optimiser.final_factor)
+
+
+def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
+    """Adam rates by field name of `Gaussians` at this iteration; the spectral residuals only while they are active.
+
+    position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
+    harmonics         constant; degree 0 and the higher degrees have their own rate
+    fdm_weight        the position channels have the extra `deformation_position_factor`
+    *_coefficients    their factor x deformation rate x `residual_decay`
+    """
+    o = config.optimiser
+    decay = exponential_decay(iteration, config.training.iterations, 1.0, o.final_factor)
+    deformation = o.deformation * decay
+    rates: dict[str, Rate] = {
+        "position": o.position * decay,
+        "quaternion": o.rotation,
+        "log_scale": o.scale,
+        "opacity_logit": o.opacity,
+        "harmonics": ((slice(0, 1), o.harmonics_base), (slice(1, None), o.harmonics_rest)),
+        "fdm_weight": (
+            (POSITION_CHANNELS, deformation * o.deformation_position_factor),
+            (slice(POSITION_CHANNELS.stop, DEFORMATION_CHANNELS), deformation),
+        ),
+        "fdm_centre": deformation,
+        "fdm_width": deformation,
+    }
+    if residuals_active(iteration, config):
+        residual = o.deformation * residual_decay(iteration, config)
+        rates["colour_coefficients"] = residual * o.colour_residual_factor
+        rates["motion_coefficients"] = residual * o.motion_residual_factor
+    return rates
+
+
+def detail_share(iteration: int, config: Config) -> float:
+    """Share of lambda_lap in force: 0 up to `detail_from`, linear, 1 from `detail_full` on; 0 without component L."""
+    if not config.model.laplacian or iteration <= config.loss.detail_from:
+        return 0.0
+    if iteration >= config.loss.detail_full:
+        return 1.0
+    return (iteration - config.loss.detail_from) / (config.loss.detail_full - config.loss.detail_from)
+
+
+def smoothness_active(iteration: int, config: Config) -> bool:
+    """Whether the smoothness terms count at this iteration."""
+    return config.loss.smoothness_weight > 0.0 and iteration >= config.loss.smoothness_from
+
+
+def active_degree(iteration: int, config: Config) -> int:
+    """Active harmonic degree: one more every `harmonics_interval` iterations, the interval's own iteration included."""
+    return min(config.model.harmonics_degree, iteration // config.training.harmonics_interval)
+
+
+def statistics_active(iteration: int, config: Config) -> bool:
+    """Whether screen gradients are gathered: until the last densification."""
+    return iteration < config.density.until
+
+
+def densify_now(iteration: int, config: Config) -> bool:
+    """Whether Gaussians are cloned, split and pruned at this iteration: start < iteration < until, every `interval`."""
+    density = config.density
+    return density.start < iteration < density.until and iteration % density.interval == 0

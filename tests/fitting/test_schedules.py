@@ -1,0 +1,103 @@
+"""Schedules: the values at the milestones and on both sides of them."""
+
+import msgspec
+import pytest
+
+from endotsr.config import PAPER, Config, LossConfig, ModelConfig, OptimiserConfig, with_iterations
+from endotsr.fitting import schedules
+
+
+def changed(section: str, **values) -> Config:
+    return msgspec.structs.replace(PAPER, **{section: msgspec.structs.replace(getattr(PAPER, section), **values)})
+
+
+def test_exponential_decay_end_points_middle_and_clip():
+    decay = schedules.exponential_decay
+    assert decay(0, 6000, 1.6e-3, 1.6e-5) == 1.6e-3
+    assert decay(6000, 6000, 1.6e-3, 1.6e-5) == pytest.approx(1.6e-5, rel=1e-14)
+    assert decay(3000, 6000, 1.6e-3, 1.6e-5) == pytest.approx(1.6e-4, rel=1e-14)
+    assert decay(9000, 6000, 1.0, 0.01) == pytest.approx(0.01, rel=1e-14)
+    assert decay(-5, 6000, 1.0, 0.01) == 1.0
+    assert decay(1, 0, 1.0, 0.01) == pytest.approx(0.01)
+    assert decay(1, 10, 0.0, 0.0) == 0.0
+
+
+def test_rates_of_the_paper_preset():
+    rates = schedules.learning_rates(6000, PAPER)
+    assert rates["position"] == pytest.approx(1.6e-5)
+    assert rates["fdm_centre"] == rates["fdm_width"] == pytest.approx(1.6e-5)
+    assert rates["fdm_weight"] == ((slice(0, 3), rates["fdm_centre"]), (slice(3, 10), rates["fdm_centre"]))
+    assert rates["harmonics"] == ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))
+    assert (rates["opacity_logit"], rates["log_scale"], rates["quaternion"]) == (0.05, 0.005, 0.001)
+
+
+def test_residuals_start_after_the_activation_with_the_rates_of_the_paper():
+    assert not schedules.residuals_active(3000, PAPER)
+    assert schedules.residuals_active(3001, PAPER)
+    assert [i for i in range(2990, 3010) if schedules.residuals_born(i, PAPER)] == [3001]
+    assert "motion_coefficients" not in schedules.learning_rates(3000, PAPER)
+    decay = 0.01 ** (1 / 3000)
+    rates = schedules.learning_rates(3001, PAPER)
+    assert rates["motion_coefficients"] == pytest.approx(1.6e-4 * decay)
+    assert rates["colour_coefficients"] == pytest.approx(3.125e-3 * decay)
+    last = schedules.learning_rates(6000, PAPER)
+    assert last["motion_coefficients"] == pytest.approx(1.6e-6)
+
+
+def test_residual_schedule_not_restarted_continues_the_base_decay():
+    config = changed("optimiser", restart_residual_schedule=False)
+    assert schedules.residual_decay(3000, config) == pytest.approx(0.1)
+    assert schedules.residual_decay(3000, PAPER) == 1.0
+    assert schedules.residual_decay(6000, config) == pytest.approx(schedules.residual_decay(6000, PAPER))
+
+
+def test_a_model_without_residuals_never_activates_them():
+    config = Config(model=ModelConfig(appearance=False, spectral_motion=False))
+    assert not schedules.residuals_active(5000, config)
+    assert not any(schedules.residuals_born(i, config) for i in (3000, 3001, 3002))
+
+
+def test_residuals_from_the_first_iteration():
+    config = changed("training", residual_activation=0)
+    assert schedules.residuals_born(1, config)
+
+
+def test_detail_ramp():
+    share = schedules.detail_share
+    assert share(1000, PAPER) == 0.0
+    assert share(1001, PAPER) == pytest.approx(1 / 1500)
+    assert share(1750, PAPER) == pytest.approx(0.5)
+    assert share(2499, PAPER) < 1.0
+    assert share(2500, PAPER) == share(6000, PAPER) == 1.0
+    step = Config(loss=LossConfig(detail_from=100, detail_full=100))
+    assert (share(100, step), share(101, step)) == (0.0, 1.0)
+    assert share(6000, Config(model=ModelConfig(laplacian=False))) == 0.0
+
+
+def test_smoothness_and_degree():
+    assert not schedules.smoothness_active(1000, PAPER)
+    assert schedules.smoothness_active(1001, PAPER)
+    assert not schedules.smoothness_active(2000, Config(loss=LossConfig(smoothness_weight=0.0)))
+    assert [schedules.active_degree(i, PAPER) for i in (1, 499, 500, 999, 1000, 1500, 6000)] == [0, 0, 1, 1, 2, 3, 3]
+    assert schedules.active_degree(6000, Config(model=ModelConfig(harmonics_degree=1))) == 1
+
+
+def test_densify_iterations():
+    found = [i for i in range(1, 6001) if schedules.densify_now(i, PAPER)]
+    assert found == list(range(600, 4000, 100))
+    assert schedules.statistics_active(3999, PAPER)
+    assert not schedules.statistics_active(4000, PAPER)
+
+
+def test_stretched_run_keeps_its_shares():
+    short = with_iterations(PAPER, 600)
+    assert schedules.residuals_born(301, short)
+    assert schedules.detail_share(250, short) == 1.0
+    assert schedules.learning_rates(600, short)["position"] == pytest.approx(1.6e-5)
+
+
+def test_position_channels_of_the_deformation_can_have_an_extra_factor():
+    config = Config(optimiser=OptimiserConfig(deformation_position_factor=10.0))
+    rates = schedules.learning_rates(1, config)
+    (_, position), (_, rest) = rates["fdm_weight"]
+    assert position == pytest.approx(10 * rest)
