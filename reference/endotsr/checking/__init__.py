@@ -1,1 +1,26 @@
-"""The public gradient checker and the registry of every forward/reverse pair of the package."""
+"""The public gradient checker and the registry of every forward/reverse pair of the package.
+
+Checking a port takes one call: `check_function(forward, reverse, inputs)` answers a `PairReport`.
+"""
+
+from endotsr.checking.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair
+from endotsr.checking.precision import PrecisionReport, check_precision
+from endotsr.checking.registry import Pair, all_pairs, pair_stream
+from endotsr.checking.report import summary, table, to_json
+
+__all__ = [
+    "DOUBLE",
+    "SINGLE",
+    "Pair",
+    "PairReport",
+    "PrecisionReport",
+    "Settings",
+    "all_pairs",
+    "check_function",
+    "check_pair",
+    "check_precision",
+    "pair_stream",
+    "summary",
+    "table",
+    "to_json",
+]

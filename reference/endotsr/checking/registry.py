@@ -1,8 +1,10 @@
 """The registry of forward/reverse pairs: gradient checks, golden cases and the equation table are driven from it.
 
-A pair cannot exist unchecked: `tests/checking` asserts that every `<stage>_forward` of the package appears here.
+A pair cannot exist unchecked: `tests/test_conventions.py` asserts that every `<stage>_forward` of the package
+is named by a pair that `all_pairs` returns.
 """
 
+import importlib
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -11,12 +13,14 @@ from numpy.typing import NDArray
 
 Arrays = Mapping[str, NDArray]
 
+PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses")
+
 
 class Pair(NamedTuple):
     """One forward pass and its reverse pass, wrapped so that a checker needs to know nothing about them.
 
     name      stage name, as in `<name>_forward`
-    equation  the equation label of the specification ("1" ... "7" for the paper, "B-..." for the base model)
+    equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
     inputs    rng -> float64 arrays; every one of them is differentiable; non-vacuous and away from kinks
     forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())
     reverse   (inputs, cotangents by output name) -> gradients by input name
@@ -25,6 +29,8 @@ class Pair(NamedTuple):
     trace     inputs -> integer arrays: the discrete decisions (order, contributors, clamps) of the forward
               pass; a finite difference whose two ends differ in it is refused. None = no decisions
     function  dotted name of the forward function, for tables
+    hard      inputs -> flat indices by input name: entries that are always probed one by one
+    single    "" = the pair also runs in float32; otherwise the reason why it cannot
     """
 
     name: str
@@ -35,16 +41,27 @@ class Pair(NamedTuple):
     reverse: Callable[[Arrays, Arrays], dict[str, NDArray]]
     blocks: Callable[[Arrays], dict[str, tuple[str, object]]] | None = None
     trace: Callable[[Arrays], dict[str, NDArray]] | None = None
+    hard: Callable[[Arrays], dict[str, NDArray]] | None = None
+    single: str = ""
 
 
 def all_pairs() -> dict[str, Pair]:
     """Every registered pair by name, in the order of the specification."""
-    from endotsr.checking import pairs_equations, pairs_losses, pairs_splatting
-
     found: dict[str, Pair] = {}
-    for module in (pairs_equations, pairs_splatting, pairs_losses):
+    for name in PAIR_MODULES:
+        try:
+            module = importlib.import_module(f"endotsr.checking.{name}")
+        except ModuleNotFoundError as error:
+            if error.name != f"endotsr.checking.{name}":
+                raise
+            continue
         for pair in module.PAIRS:
             if pair.name in found:
                 raise ValueError(f"pair {pair.name} is registered twice")
             found[pair.name] = pair
     return found
+
+
+def pair_stream(name: str, seed: int) -> np.random.Generator:
+    """The random stream of one pair: depends on its name and the seed only, not on which other pairs run."""
+    return np.random.default_rng([seed, *name.encode()])

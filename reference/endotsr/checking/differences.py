@@ -1,0 +1,153 @@
+"""Derivatives along a line, from function values alone, each with an honest error bar.
+
+A `line` is a function of one number h: the outputs at x + h v, every entry already multiplied by its
+cotangent. Its sum is the scalar that is differentiated, but differences are taken entry by entry before
+summing, so that large outputs do not drown small changes. A line may answer None: "refused at this h".
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Line = Callable[[float], NDArray | None]
+
+RATIO = 4.0
+LADDER = tuple(1e-2 * RATIO**-k for k in range(9))  # 1e-2 ... 1.5e-7 of the block's size
+COARSE = (1e-2 * RATIO**2, 1e-2 * RATIO)  # above it, for derivatives that drown in rounding
+SETTLED = 1e-9  # neighbours that agree so well need no further steps
+
+
+class Difference(NamedTuple):
+    """A derivative and what is known about it.
+
+    value    the derivative along the line; nan when refused
+    error    bound on its error from the agreement of neighbouring steps and from rounding
+    step     the finer step of the plateau
+    refused  too few steps with an answer at both ends
+    """
+
+    value: float
+    error: float
+    step: float
+    refused: bool = False
+
+
+def central_difference(line: Callable[[float], ArrayLike], step: float) -> float:
+    """(f(h) - f(-h)) / 2h, error O(h^2)."""
+    return float(np.sum(np.asarray(line(step)) - np.asarray(line(-step))) / (2 * step))
+
+
+def five_point_difference(line: Callable[[float], ArrayLike], step: float) -> float:
+    """(8 (f(h) - f(-h)) - (f(2h) - f(-2h))) / 12h, error O(h^4)."""
+    return (4 * central_difference(line, step) - central_difference(line, 2 * step)) / 3
+
+
+def complex_step(line: Callable[[complex], ArrayLike], step: float = 1e-40) -> float:
+    """Im f(ih) / h: no subtraction, exact to rounding. For smooth functions that accept complex input."""
+    return float(np.sum(np.imag(line(1j * step))) / step)
+
+
+def plateau_difference(line: Line, eps: float = float(np.finfo(np.float64).eps)) -> Difference:
+    """Five-point difference where its two neighbouring steps agree best.
+
+    line   h -> weighted outputs, or None where h must not be used; h in units of the block's size
+    eps    rounding unit of the outputs
+
+    Walks down a ladder of steps (ratio 4) and stops as soon as neighbours agree to 1e-9. When no neighbours
+    settle, all steps are used, coarser ones too. The error bar is twice the largest of: the disagreement of
+    the best neighbours, the noise seen at finer steps carried to the chosen one, rounding of the outputs.
+    """
+    slopes = _slopes(line, LADDER, eps)
+    best = _best(slopes)
+    if slopes and slopes[0].step == LADDER[0] and (best is None or best.error > 1e-6 * abs(best.value)):
+        slopes = _slopes(line, COARSE, eps, settle=False) + slopes
+        best = _best(slopes)
+    if best is None:
+        return Difference(np.nan, np.nan, LADDER[-1], refused=True)
+    return best
+
+
+class _Slope(NamedTuple):
+    step: float
+    central: float
+    rounding: float
+
+
+def _slopes(line: Line, steps: Sequence[float], eps: float, settle: bool = True) -> list[_Slope]:
+    """Central differences at the given steps, coarsest first, without the refused ones."""
+    found: list[_Slope] = []
+    for step in steps:
+        ahead = line(step)
+        behind = None if ahead is None else line(-step)
+        if ahead is None or behind is None:
+            found.clear()  # a refused step lies between: what is coarser saw another branch
+            continue
+        rounding = eps * float(np.linalg.norm(ahead)) / step
+        found.append(_Slope(step, float(np.sum(ahead - behind)) / (2 * step), rounding))
+        if settle and len(found) >= 3:
+            _, coarse, fine = found[-3:]
+            values = [_five_point(*pair) for pair in ((found[-3], coarse), (coarse, fine))]
+            if abs(values[1] - values[0]) <= SETTLED * abs(values[1]):
+                break
+    return found
+
+
+def _five_point(coarse: _Slope, fine: _Slope) -> float:
+    """Cancel the h^2 term of two central differences."""
+    square = (coarse.step / fine.step) ** 2
+    return (square * fine.central - coarse.central) / (square - 1)
+
+
+def _best(slopes: list[_Slope]) -> Difference | None:
+    if len(slopes) < 3:
+        return None
+    values = [_five_point(*pair) for pair in pairwise(slopes)]
+    gaps = [abs(b - a) for a, b in pairwise(values)]  # gaps[k] belongs to step k + 2
+    k = int(np.argmin(gaps))
+    step = slopes[k + 2].step
+    # Truncation shrinks with the step, noise grows as 1/h: finer steps tell how much noise there is here.
+    noise = max(gap * slopes[j + 2].step / step for j, gap in enumerate(gaps) if j >= k)
+    return Difference(values[k + 1], 2 * max(noise, slopes[k + 2].rounding), step)
+
+
+class Taylor(NamedTuple):
+    """slope of log |remainder| over log h, and whether the function is linear to rounding (then slope = inf)."""
+
+    slope: float
+    linear: bool
+
+    @property
+    def passed(self) -> bool:
+        """Second order or better. A wrong first derivative leaves slope 1."""
+        return self.linear or self.slope >= 1.9
+
+
+def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER) -> Taylor:
+    """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it stands clear of rounding.
+
+    The remainder of a right derivative falls as h^2 or faster, of a wrong one as h.
+    """
+    origin = line(0.0)
+    if origin is None:
+        raise ValueError("the line has no value at 0")
+    clear = 1e4 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(origin))
+    points: list[tuple[float, float]] = []
+    for step in steps:
+        ahead = line(step)
+        remainder = 0.0 if ahead is None else abs(float(np.sum(ahead - origin)) - step * derivative)
+        if remainder > clear:
+            points.append((step, remainder))
+    if len(points) < 2:
+        return Taylor(np.inf, linear=True)
+    (coarse, above), (fine, below) = points[-2:]
+    return Taylor(float(np.log(above / below) / np.log(coarse / fine)), linear=False)
+
+
+def adjoint_gap(jacobian_v: ArrayLike, u: ArrayLike, v: ArrayLike, transpose_u: ArrayLike) -> float:
+    """|<Jv, u> - <v, J^T u>| over the larger of the two; inf when both are zero (nothing was tested)."""
+    one, two = float(np.sum(np.multiply(jacobian_v, u))), float(np.sum(np.multiply(v, transpose_u)))
+    larger = max(abs(one), abs(two))
+    return abs(one - two) / larger if larger > 0 else np.inf

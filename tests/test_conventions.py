@@ -1,0 +1,132 @@
+"""Conventions are programs: what the package promises about its own text is checked here."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from endotsr.checking import all_pairs
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "reference" / "endotsr"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
+WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
+MAXIMUM_LINES = 500
+
+# Forward functions whose check runs under the name of another pair, and why.
+ALIASES: dict[str, str] = {}
+
+
+def module_name(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def parse(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"), str(file))
+
+
+def public_functions(file: Path) -> dict[str, int]:
+    return {n.name: n.lineno for n in parse(file).body if isinstance(n, ast.FunctionDef) and n.name[0] != "_"}
+
+
+def imported(file: Path) -> set[str]:
+    """Top-level names of everything a file imports, inside functions too."""
+    found: set[str] = set()
+    for node in ast.walk(parse(file)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add((node.module or "").split(".")[0] if node.level == 0 else "endotsr")
+    return found
+
+
+STAGES = [(file, name) for file in SOURCES for name in public_functions(file) if name.endswith("_forward")]
+
+
+@pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
+def test_every_forward_has_a_reverse_directly_below_it(file, name):
+    functions = public_functions(file)
+    reverse = name.removesuffix("_forward") + "_reverse"
+    assert reverse in functions, f"{module_name(file)}.{name} has no {reverse} in the same module"
+    assert functions[reverse] > functions[name], f"{reverse} stands above {name}"
+
+
+@pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
+def test_every_forward_is_named_by_a_pair(file, name):
+    dotted = f"{module_name(file)}.{name}"
+    functions = {pair.function for pair in all_pairs().values()}
+    assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register a Pair that names it"
+
+
+def test_every_pair_names_a_function_of_the_package():
+    known = {f"{module_name(file)}.{name}" for file in SOURCES for name in public_functions(file)}
+    assert {pair.function for pair in all_pairs().values()} <= known
+    assert set(ALIASES) <= known
+
+
+def test_compiled_kernels_go_through_the_one_jit():
+    """numba is imported for prange and helpers, but nothing except jit.py decides how a kernel is compiled."""
+    for file in SOURCES:
+        if file.name == "jit.py":
+            continue
+        for node in ast.walk(parse(file)):
+            if isinstance(node, ast.Attribute | ast.Name):
+                name = node.attr if isinstance(node, ast.Attribute) else node.id
+                assert name not in ("njit", "vectorize", "guvectorize", "stencil", "generated_jit"), (
+                    f"{file}:{node.lineno}"
+                )
+            if isinstance(node, ast.keyword):
+                assert node.arg != "fastmath", f"{file}:{node.value.lineno}: fastmath"
+
+
+def test_contraction_only_in_fast_path_files():
+    """`jit(contract=True)` may change the last digit: only files whose docstring says so (contract) use it."""
+    for file in SOURCES:
+        if file.name == "jit.py":
+            continue
+        tree = parse(file)
+        uses = [n for n in ast.walk(tree) if isinstance(n, ast.keyword) and n.arg == "contract"]
+        if uses:
+            assert "fast path" in " ".join((ast.get_docstring(tree) or "").lower().split()), (
+                f"{file} contracts but its docstring does not say that it is a fast path"
+            )
+
+
+@pytest.mark.parametrize("file", ORACLES, ids=lambda file: file.name)
+def test_oracles_import_nothing_of_the_package(file):
+    assert "endotsr" not in imported(file)
+    assert "importlib" not in imported(file)
+
+
+def test_no_file_is_too_long():
+    files = [*SOURCES, *(ROOT / "tests").rglob("*.py")]
+    lengths = {str(f.relative_to(ROOT)): len(f.read_text(encoding="utf-8").splitlines()) for f in files}
+    assert {name: n for name, n in lengths.items() if n > MAXIMUM_LINES} == {}
+
+
+@pytest.mark.parametrize("library", ["torch", "jax", "tensorflow", "autograd", "pickle", "dill", "joblib"])
+def test_no_autodiff_library_and_no_pickle(library):
+    assert [str(f) for f in SOURCES if library in imported(f)] == []
+
+
+def test_no_pickle_through_numpy():
+    for file in SOURCES:
+        for node in ast.walk(parse(file)):
+            if isinstance(node, ast.keyword) and node.arg == "allow_pickle":
+                assert isinstance(node.value, ast.Constant) and node.value.value is False, f"{file}:{node.value.lineno}"
+
+
+def test_opencv_is_imported_in_one_file():
+    assert [f.name for f in SOURCES if "cv2" in imported(f)] in ([], ["opencv.py"])
+
+
+def test_selection_by_word_is_the_registry():
+    """`pytest -k` with the word collects exactly one check per registered pair and nothing else."""
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-k", WORD, "-p", "no:cacheprovider", "tests"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    collected = {line.strip() for line in done.stdout.splitlines() if "::" in line}
+    assert collected == {f"tests/test_{WORD}.py::test_{WORD}[{name}]" for name in all_pairs()}, done.stdout[-2000:]
