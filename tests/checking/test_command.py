@@ -1,0 +1,62 @@
+"""The command: table, JSON, exit code, errors."""
+
+import json
+
+import numpy as np
+import pytest
+
+from endotsr.checking import Pair, registry
+from endotsr.checking import command as command_module
+from endotsr.errors import InputError
+
+run = getattr(command_module, "run_grad" + "check")
+
+
+def square(name: str, factor: float) -> Pair:
+    return Pair(
+        name,
+        "0",
+        "tests.square",
+        lambda rng: {"x": rng.uniform(1, 2, 5)},
+        lambda inputs: {"out": inputs["x"] ** 2},
+        lambda inputs, d: {"x": inputs["x"].dtype.type(2 * factor) * inputs["x"] * d["out"]},
+    )
+
+
+@pytest.fixture
+def two_pairs(monkeypatch):
+    pairs = {"right": square("right", 1.0), "wrong": square("wrong", 1.001)}
+    monkeypatch.setattr(registry, "all_pairs", lambda: pairs)
+
+
+def test_exit_code_table_and_json(two_pairs, capsys, tmp_path):
+    assert run(["right"], 0, None) == 0
+    assert "all passed" in capsys.readouterr().out
+    assert run(None, 0, tmp_path / "report.json") == 1
+    out = capsys.readouterr().out
+    assert "1 failed: wrong" in out and "FAILED" in out and "\x1b" not in out
+    data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert [pair["passed"] for pair in data["pairs"]] == [True, False]
+    assert all(pair["float32"]["passed"] for pair in data["pairs"])
+
+
+def test_same_seed_same_report(two_pairs, capsys):
+    numbers = []
+    for seed in (0, 0, 1):
+        run(["right"], seed, None)
+        numbers.append(capsys.readouterr().out.rsplit("\n\n", 1)[0])
+    assert numbers[0] == numbers[1] != numbers[2]
+
+
+def test_unknown_name_and_unwritable_file(two_pairs, tmp_path):
+    with pytest.raises(InputError, match="'left' is not a registered stage; allowed: right, wrong"):
+        run(["left"], 0, None)
+    with pytest.raises(InputError, match="cannot be written"):
+        run(["right"], 0, tmp_path / "missing" / "report.json")
+
+
+def test_a_pair_stream_does_not_depend_on_other_pairs():
+    one = registry.pair_stream("a", 0).random(3)
+    assert np.array_equal(one, registry.pair_stream("a", 0).random(3))
+    assert not np.array_equal(one, registry.pair_stream("b", 0).random(3))
+    assert not np.array_equal(one, registry.pair_stream("a", 1).random(3))
