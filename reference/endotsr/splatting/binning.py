@@ -1,0 +1,201 @@
+"""Which Gaussians reach which tile, in depth order (B5, support and order).
+
+Three steps: a pixel box for every Gaussian (its support), a stable sort by view depth with ties in index
+order, and a counting sort of (tile, Gaussian) pairs. Every pair owns one slot: the reverse pass writes its
+gradient there and a gather adds the slots of a Gaussian in tile order, so no two threads share a cell and
+the sum does not depend on the number of threads.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.jit import jit
+from endotsr.splatting.projection import Projected
+from endotsr.splatting.settings import RasterSettings
+
+FloatArray = NDArray[np.floating]
+IntArray = NDArray[np.integer]
+
+BLOCK = 512
+CHUNKS = 16  # fixed, so that the lists do not depend on the number of threads
+LEGACY_TILE = 16
+_RADIX_BITS = 11
+
+_EVERYWHERE, _ELLIPSE, _THREE_SIGMA_TILES = 0, 1, 2
+_SUPPORT_CODE = {"everywhere": _EVERYWHERE, "ellipse": _ELLIPSE, "three_sigma_tiles": _THREE_SIGMA_TILES}
+
+
+class TileLists(NamedTuple):
+    """Tiles in row-major order; each lists the depth ranks of its Gaussians, nearest first."""
+
+    starts: IntArray  # (tiles + 1,) range of each tile in `ranks`
+    ranks: IntArray  # (pairs,) int32 depth rank
+    pair_starts: IntArray  # (n + 1,) range of each depth rank in `slots`
+    slots: IntArray  # (pairs,) position of the pair in `ranks`, in tile order
+
+
+def _boxes(mean2d, covariance2d, determinant, log_opacity, visible, support, log_cutoff, width, height, box):
+    """Inclusive pixel box x0, x1, y0, y1 of each Gaussian; clears `visible` when the box is empty.
+
+    The ellipse box is the exact extent of alpha >= cutoff plus a margin far above rounding: lossless.
+    """
+    real = mean2d.dtype.type
+    half, one, two, three, zero, tenth = real(0.5), real(1), real(2), real(3), real(0), real(0.1)
+    margin, right, bottom = real(1e-3), real(width - 1), real(height - 1)
+    n = mean2d.shape[1]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        for i in range(block * BLOCK, min(n, block * BLOCK + BLOCK)):
+            if not visible[i]:
+                continue
+            x, y = mean2d[0, i], mean2d[1, i]
+            a, c = covariance2d[0, i], covariance2d[2, i]
+            if support == _EVERYWHERE:
+                box[i, 0], box[i, 1], box[i, 2], box[i, 3] = 0, width - 1, 0, height - 1
+                continue
+            if support == _ELLIPSE:
+                reach = two * (log_opacity[i] - log_cutoff)
+                if reach < zero:
+                    visible[i] = False
+                    continue
+                ex, ey = math.sqrt(reach * a), math.sqrt(reach * c)
+                ex += (ex + abs(x)) * real(1e-5) + margin
+                ey += (ey + abs(y)) * real(1e-5) + margin
+                # clip in floating point before the conversion to int: a huge splat must not overflow
+                x0, x1 = math.ceil(max(x - ex - half, zero)), math.floor(min(x + ex - half, right))
+                y0, y1 = math.ceil(max(y - ey - half, zero)), math.floor(min(y + ey - half, bottom))
+            else:
+                middle = half * (a + c)
+                radius = math.ceil(three * math.sqrt(middle + math.sqrt(max(tenth, middle * middle - determinant[i]))))
+                tile = real(LEGACY_TILE)
+                limit_x, limit_y = right + tile, bottom + tile
+                # the released code truncates toward zero, in integer-pixel coordinates (mean - 1/2)
+                x0 = tile * math.floor(min(max((x - half - radius) / tile, zero), limit_x))
+                x1 = tile * math.floor(min(max((x - half + radius + tile - one) / tile, zero), limit_x)) - one
+                y0 = tile * math.floor(min(max((y - half - radius) / tile, zero), limit_y))
+                y1 = tile * math.floor(min(max((y - half + radius + tile - one) / tile, zero), limit_y)) - one
+                x1, y1 = min(x1, right), min(y1, bottom)
+            if x0 > x1 or y0 > y1:
+                visible[i] = False
+                continue
+            box[i, 0], box[i, 1], box[i, 2], box[i, 3] = int(x0), int(x1), int(y0), int(y1)
+
+
+def _radix_order(key, visible):
+    """Indices of the visible entries by ascending unsigned key, stable (least significant digit first)."""
+    count = 0
+    for i in range(key.size):
+        if visible[i]:
+            count += 1
+    keys, index = np.empty(count, key.dtype), np.empty(count, np.int32)
+    keys_next, index_next = np.empty(count, key.dtype), np.empty(count, np.int32)
+    m = 0
+    for i in range(key.size):
+        if visible[i]:
+            keys[m], index[m] = key[i], i
+            m += 1
+    mask = np.uint64((1 << _RADIX_BITS) - 1)
+    histogram = np.empty(1 << _RADIX_BITS, np.int64)
+    for shift in range(0, 8 * key.itemsize, _RADIX_BITS):
+        histogram[:] = 0
+        for i in range(count):
+            histogram[np.int64((np.uint64(keys[i]) >> np.uint64(shift)) & mask)] += 1
+        total = 0
+        for d in range(histogram.size):
+            here = histogram[d]
+            histogram[d] = total
+            total += here
+        for i in range(count):
+            d = np.int64((np.uint64(keys[i]) >> np.uint64(shift)) & mask)
+            at = histogram[d]
+            histogram[d] = at + 1
+            keys_next[at], index_next[at] = keys[i], index[i]
+        keys, keys_next = keys_next, keys
+        index, index_next = index_next, index
+    return index
+
+
+def _bin(box, order, tile_width, tile_height, tiles_x, tiles_y):
+    """Counting sort of (tile, Gaussian) pairs in CHUNKS independent chunks of the depth order."""
+    n = order.size
+    tiles = tiles_x * tiles_y
+    counts = np.zeros((CHUNKS, tiles), np.int64)
+    pair_starts = np.zeros(n + 1, np.int64)
+    for chunk in prange(CHUNKS):
+        mine = counts[chunk]
+        for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            i = order[k]
+            tx0, tx1 = box[i, 0] // tile_width, box[i, 1] // tile_width
+            ty0, ty1 = box[i, 2] // tile_height, box[i, 3] // tile_height
+            pair_starts[k + 1] = (tx1 - tx0 + 1) * (ty1 - ty0 + 1)
+            for ty in range(ty0, ty1 + 1):
+                for tx in range(tx0, tx1 + 1):
+                    mine[ty * tiles_x + tx] += 1
+    starts = np.empty(tiles + 1, np.int64)
+    total = 0
+    for t in range(tiles):
+        starts[t] = total
+        for chunk in range(CHUNKS):
+            here = counts[chunk, t]
+            counts[chunk, t] = total
+            total += here
+    starts[tiles] = total
+    for k in range(n):
+        pair_starts[k + 1] += pair_starts[k]
+    ranks, slots = np.empty(total, np.int32), np.empty(total, np.int32)
+    for chunk in prange(CHUNKS):
+        position = counts[chunk]
+        for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
+            i = order[k]
+            at = pair_starts[k]
+            for ty in range(box[i, 2] // tile_height, box[i, 3] // tile_height + 1):
+                for tx in range(box[i, 0] // tile_width, box[i, 1] // tile_width + 1):
+                    t = ty * tiles_x + tx
+                    ranks[position[t]] = k
+                    slots[at] = position[t]
+                    position[t] += 1
+                    at += 1
+    return starts, ranks, pair_starts, slots
+
+
+_boxes_kernel = jit(_boxes, parallel=True)
+_radix_kernel = jit(_radix_order)
+_bin_kernel = jit(_bin, parallel=True)
+
+
+def screen_boxes(
+    projected: Projected, log_opacity: FloatArray, settings: RasterSettings, width: int, height: int
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Pixel boxes (N, 4) x0, x1, y0, y1 inclusive, and which Gaussians reach at least one pixel box (N,).
+
+    log_opacity  (N,) natural log of the opacity
+    Edges:       without an alpha cutoff the ellipse has no end: every Gaussian reaches every pixel
+    """
+    support = settings.support if settings.alpha_cutoff > 0 or settings.support != "ellipse" else "everywhere"
+    box = np.zeros((projected.depth.size, 4), np.int32)
+    visible = projected.visible.copy()
+    log_cutoff = projected.depth.dtype.type(math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0)
+    _boxes_kernel(
+        projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, visible,
+        _SUPPORT_CODE[support], log_cutoff, width, height, box,
+    )  # fmt: skip
+    return box, visible
+
+
+def depth_order(depth: FloatArray, visible: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Indices of the visible Gaussians, nearest first, ties in index order. Depth must be > 0 where visible.
+
+    The bit pattern of a positive float ascends with its value, so an integer radix sort is an exact sort.
+    """
+    return _radix_kernel(depth.view(np.uint32 if depth.dtype == np.float32 else np.uint64), visible)
+
+
+def tile_lists(
+    box: NDArray[np.int32], order: NDArray[np.int32], tile_width: int, tile_height: int, width: int, height: int
+) -> TileLists:
+    """Depth-ordered lists of the Gaussians whose box touches each tile."""
+    tiles_x, tiles_y = -(-width // tile_width), -(-height // tile_height)
+    return TileLists(*_bin_kernel(box, order, tile_width, tile_height, tiles_x, tiles_y))

@@ -1,0 +1,181 @@
+"""One view of the Gaussians at one instant: all splatting stages composed, forward and reverse.
+
+Comes in: deformed raw parameters and a camera. Goes out: colour, depth, opacity and, in reverse, gradients to
+every parameter and, when asked for, to the background and the camera pose. Knows nothing of time.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
+from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
+from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
+from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse
+from endotsr.splatting.records import gather_gradients, log_opacity, pack_records
+from endotsr.splatting.settings import RasterSettings
+
+FloatArray = NDArray[np.floating]
+
+CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
+
+Path = Literal["auto", "definition", "rows"]
+
+
+class Scene(NamedTuple):
+    """Deformed, raw (pre-activation) parameters of N Gaussians at one instant."""
+
+    position: FloatArray  # (3, N) scene units
+    quaternion: FloatArray  # (4, N)
+    log_scale: FloatArray  # (3, N)
+    opacity_logit: FloatArray  # (N,)
+    harmonics: FloatArray  # (K, 3, N)
+    residual: FloatArray | None = None  # (3, N) added to the degree-0 coefficient, equation (2)
+
+
+class RenderOut(NamedTuple):
+    """Images of one view."""
+
+    colour: FloatArray  # (3, H, W)
+    depth: FloatArray  # (H, W) scene units, not normalised
+    opacity: FloatArray  # (H, W)
+
+
+class RenderSaved(NamedTuple):
+    """The saved tuples of the stages."""
+
+    scene: Scene
+    settings: RasterSettings
+    camera: Camera
+    covariance: CovarianceSaved
+    projection: ProjectionSaved
+    harmonics: HarmonicsSaved
+    projected: Projected
+    order: NDArray[np.int32]
+    visible: NDArray[np.bool_]
+    composite: compositing.CompositeSaved | compositing_rows.RowsSaved
+
+
+class RenderGrads(NamedTuple):
+    """Gradients of one view; `background` and `camera` are None unless they were asked for."""
+
+    position: FloatArray
+    quaternion: FloatArray
+    log_scale: FloatArray
+    opacity_logit: FloatArray
+    harmonics: FloatArray
+    residual: FloatArray | None
+    mean2d: FloatArray  # (2, N) dL/d(u, v) per px, for density control
+    visible: NDArray[np.bool_]  # (N,) reached at least one pixel box
+    background: FloatArray | None
+    camera: CameraGrads | None
+
+
+def choose_path(settings: RasterSettings, path: Path) -> Path:
+    """`auto` takes the fast path wherever it computes the settings."""
+    if path == "auto":
+        return "rows" if compositing_rows.supports(settings) else "definition"
+    if path == "rows" and not compositing_rows.supports(settings):
+        raise ValueError("path 'rows' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'")
+    return path
+
+
+def render_forward(
+    scene: Scene,
+    camera: Camera,
+    settings: RasterSettings,
+    *,
+    degree: int = 3,
+    background: FloatArray | None = None,
+    path: Path = "auto",
+) -> tuple[RenderOut, RenderSaved]:
+    """Render one view (specification B2-B5).
+
+    scene       raw parameters, N >= 0 Gaussians
+    settings    a preset of `settings.PRESETS` or any point between
+    degree      active degree of the harmonics, 0..3
+    background  (3,) colour, default black
+    returns     RenderOut in the dtype of scene.position
+
+    Reverse: `render_reverse`.
+    Edges:   N = 0 or nothing visible gives the background and zero depth.
+    Oracle:  tests/oracle/splatting_oracle.py.
+    """
+    dtype = scene.position.dtype
+    width, height = camera.width, camera.height
+    back = np.zeros(3, dtype) if background is None else np.ascontiguousarray(background, dtype)
+    shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
+    centre = camera_centre(camera)
+    colour, harmonics_saved = harmonics_forward(scene.harmonics, scene.residual, scene.position, centre, degree)
+    log_alpha = log_opacity(scene.opacity_logit)
+    box, visible = screen_boxes(projected, log_alpha, settings, width, height)
+    order = depth_order(projected.depth, visible)
+    log_cutoff = math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0
+    records = pack_records(order, projected, log_alpha, colour, log_cutoff)
+    if choose_path(settings, path) == "rows":
+        lists = tile_lists(box, order, compositing_rows.TILE_WIDTH, compositing_rows.TILE_HEIGHT, width, height)
+        out, saved = compositing_rows.composite_rows_forward(records, lists, settings, back, width, height)
+    else:
+        lists = tile_lists(box, order, compositing.TILE_WIDTH, compositing.TILE_HEIGHT, width, height)
+        out, saved = compositing.composite_forward(records, lists, settings, back, width, height)
+    stages = (covariance_saved, projection_saved, harmonics_saved, projected, order, visible, saved)
+    return RenderOut(out.colour, out.depth, out.opacity), RenderSaved(scene, settings, camera, *stages)
+
+
+def render_reverse(
+    d_colour: FloatArray,
+    d_depth: FloatArray,
+    d_opacity: FloatArray | None,
+    saved: RenderSaved,
+    *,
+    background_gradient: bool = False,
+    pose_gradient: bool = False,
+) -> RenderGrads:
+    """Gradients of a loss by everything the view depends on.
+
+    d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
+    """
+    composite = saved.composite
+    if isinstance(composite, compositing_rows.RowsSaved):
+        pairs = compositing_rows.composite_rows_reverse(d_colour, d_depth, d_opacity, composite)
+    else:
+        d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
+        pairs = compositing.composite_reverse(d_colour, d_depth, d_opacity, composite)
+    deviations = saved.settings.deviations
+    d_mean2d, d_covariance2d, d_logit, d_rgb, d_z = gather_gradients(
+        saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
+        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
+        keep_depth=not deviations.drop_depth_to_z,
+    )  # fmt: skip
+    harmonics = harmonics_reverse(d_rgb, saved.harmonics)
+    projection = projection_reverse(d_mean2d, d_covariance2d, d_z, saved.projection, pose_gradient=pose_gradient)
+    covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
+    return RenderGrads(
+        position=projection.position + harmonics.position,
+        quaternion=covariance.quaternion,
+        log_scale=covariance.log_scale,
+        opacity_logit=d_logit,
+        harmonics=harmonics.harmonics,
+        residual=harmonics.residual,
+        mean2d=d_mean2d,
+        visible=saved.visible,
+        background=compositing.background_gradient(d_colour, composite.out.transmittance)
+        if background_gradient
+        else None,
+        camera=_pose_gradient(projection.camera, harmonics.centre, saved.camera) if pose_gradient else None,
+    )
+
+
+def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera: Camera) -> CameraGrads:
+    """Add the share that reaches the pose through the view direction: centre = -rotation^T translation."""
+    assert projection is not None
+    translation = np.asarray(camera.translation, d_centre.dtype)
+    rotation = np.asarray(camera.rotation, d_centre.dtype)
+    return CameraGrads(
+        projection.rotation - np.outer(translation, d_centre), projection.translation - rotation @ d_centre
+    )
