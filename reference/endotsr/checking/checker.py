@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from endotsr.checking.differences import Difference, plateau_difference, taylor_slope
 from endotsr.checking.probes import Probe, block_probes, joint_probes, make_blocks, uncovered
 from endotsr.checking.registry import Arrays, Pair
-
-LINEAR = 1e5  # reverse passes are linear in the cotangents up to so many rounding units
+from endotsr.checking.session import Session, norm
 
 
 class Settings(NamedTuple):
@@ -121,130 +120,33 @@ def check_function(
     returns   PairReport; never raises for a wrong gradient
     """
     start = time.perf_counter()
-    session = _Session(forward, reverse, inputs, trace, rng or np.random.default_rng(0))
+    session = Session(forward, reverse, inputs, trace, rng or np.random.default_rng(0))
     failures = list(session.faults)
     reports: list[BlockReport] = []
     slope = np.nan
     if not failures:
         parts = make_blocks(session.inputs, blocks)
         failures += [f"input {name} is not covered by the blocks" for name in uncovered(session.inputs, parts)]
-        joint = [session.judge(probe, settings) for probe in joint_probes(session.inputs, session.rng)]
-        reports.append(_block_report("(all)", _norm(*session.gradient.values()), joint))
+        joint = [_measure(session, probe, settings) for probe in joint_probes(session.inputs, session.rng)]
+        reports.append(_block_report("(all)", norm(*session.gradient.values()), joint))
         for block in parts:
             gradient = session.gradient[block.input]
             places = None if hard is None else hard.get(block.input)
             probes = block_probes(block, session.inputs[block.input], gradient, places, session.rng)
-            results = [session.judge(probe, settings) for probe in probes]
-            reports.append(_block_report(block.name, _norm(gradient[block.mask]), results))
+            results = [_measure(session, probe, settings) for probe in probes]
+            reports.append(_block_report(block.name, norm(gradient[block.mask]), results))
         failures += _verdicts(reports, settings)
-        slope = session.taylor()
+        first = joint_probes(session.inputs, session.rng)[0].direction
+        slope = taylor_slope(session.line(first), session.analytic(first)).slope
     return PairReport(*label, tuple(reports), tuple(failures), slope, time.perf_counter() - start)
 
 
-class _Session:
-    """Inputs, outputs, dense cotangents and gradient of one check, and what was wrong with them already."""
-
-    def __init__(self, forward, reverse, inputs: Arrays, trace, rng: np.random.Generator):
-        self.inputs = {name: np.array(value) for name, value in inputs.items()}
-        self.rng, self._trace, self.faults = rng, trace, []
-        self._forward, self._reverse = forward, reverse
-        self.decisions = trace(self.inputs) if trace else {}
-        answer = forward(dict(self.inputs))
-        self.bare = not isinstance(answer, Mapping)
-        outputs = self._named(answer)
-        self._check_outputs(outputs)
-        self.cotangents = {name: self._cotangent(value) for name, value in outputs.items()}
-        floats = [v.dtype for v in outputs.values() if v.ndim] or [v.dtype for v in self.inputs.values()]
-        self.eps = max(float(np.finfo(t).eps) for t in floats if t.kind == "f")
-        self.gradient = {}
-        if not self.faults:
-            self.gradient = self._gradient(self.cotangents)
-            self._check_gradient()
-        if not self.faults:
-            self._check_linear()
-        for name, value in inputs.items():
-            if not np.array_equal(value, self.inputs[name], equal_nan=True):
-                self.faults.append(f"input {name} was modified by the function")
-
-    def _named(self, answer) -> dict[str, NDArray]:
-        return {"output": np.asarray(answer)} if self.bare else {k: np.asarray(v) for k, v in answer.items()}
-
-    def _cotangent(self, output: NDArray) -> NDArray:
-        """Dense, never near zero, scaled so that every output has a say."""
-        size = float(np.sqrt(np.mean(np.square(output, dtype=np.float64)))) if output.size else 1.0
-        draw = self.rng.choice([-1.0, 1.0], output.shape) * self.rng.uniform(0.5, 1.5, output.shape)
-        return np.asarray(draw / (size if size > 0 and np.isfinite(size) else 1.0), output.dtype)
-
-    def _gradient(self, cotangents: dict[str, NDArray]) -> dict[str, NDArray]:
-        given = {name: value.copy() for name, value in cotangents.items()}
-        answer = self._reverse(dict(self.inputs), given["output"] if self.bare else given)
-        return {name: np.array(value) for name, value in answer.items()}
-
-    def _check_outputs(self, outputs: dict[str, NDArray]) -> None:
-        for name, value in outputs.items():
-            if value.dtype.kind != "f":
-                self.faults.append(f"output {name} has dtype {value.dtype}, not a float")
-            elif not np.isfinite(value).all():
-                self.faults.append(f"output {name} is not finite")
-            elif value.size > 1 and np.ptp(value) == 0:
-                self.faults.append(f"output {name} is constant: nothing is tested")
-
-    def _check_gradient(self) -> None:
-        for name, value in self.inputs.items():
-            gradient = self.gradient.get(name)
-            if gradient is None:
-                self.faults.append(f"no gradient for input {name}")
-            elif gradient.shape != value.shape:
-                self.faults.append(f"gradient of {name} has shape {gradient.shape}, the input {value.shape}")
-            elif not np.isfinite(gradient).all():
-                self.faults.append(f"gradient of {name} is not finite at {_first(~np.isfinite(gradient))}")
-        self.gradient = {name: value for name, value in self.gradient.items() if name in self.inputs}
-
-    def _check_linear(self) -> None:
-        """Each output's cotangent alone, halved: the parts must add up to half the gradient."""
-        total = {name: np.zeros(value.shape) for name, value in self.gradient.items()}
-        for one in self.cotangents:
-            alone = {k: v * v.dtype.type(0.5) if k == one else np.zeros_like(v) for k, v in self.cotangents.items()}
-            for name, value in self._gradient(alone).items():
-                if name in total:
-                    total[name] = total[name] + value
-        for name, value in self.gradient.items():
-            gap, size = _norm(total[name] - 0.5 * value), 0.5 * _norm(value)
-            if not gap <= LINEAR * self.eps * size:
-                self.faults.append(f"gradient of {name} is not linear in the cotangents: {gap:.1e} of {size:.1e}")
-
-    def line(self, direction: Mapping[str, NDArray]) -> Callable[[float], NDArray | None]:
-        """h -> outputs times cotangents at inputs + h direction; None where the decisions differ."""
-
-        def at(step: float) -> NDArray | None:
-            moved = dict(self.inputs)
-            for name, v in direction.items():
-                moved[name] = (self.inputs[name] + step * v).astype(self.inputs[name].dtype)
-            if self._trace is not None and not _equal(self._trace(moved), self.decisions):
-                return None
-            outputs = self._named(self._forward(moved))
-            terms = [(np.float64(self.cotangents[k]) * np.float64(v)).ravel() for k, v in outputs.items()]
-            return terms[0] if len(terms) == 1 else np.concatenate(terms)
-
-        return at
-
-    def analytic(self, direction: Mapping[str, NDArray]) -> float:
-        """Sum over the inputs of <gradient, direction>."""
-        return float(sum(np.sum(np.float64(self.gradient[name]) * v) for name, v in direction.items()))
-
-    def judge(self, probe: Probe, settings: Settings) -> ProbeResult:
-        """Measure one probe and give its verdict."""
-        difference = plateau_difference(self.line(probe.direction), self.eps)
-        analytic = self.analytic(probe.direction)
-        verdict = judge(analytic, difference, settings)
-        gap = abs(difference.value - analytic)
-        error = 0.0 if gap == 0 else gap / abs(analytic) if analytic else np.inf
-        return ProbeResult(probe.block, probe.kind, analytic, difference, error, verdict)
-
-    def taylor(self) -> float:
-        """Order of the Taylor remainder along the first joint direction (inf = linear)."""
-        probe = joint_probes(self.inputs, self.rng)[0]
-        return taylor_slope(self.line(probe.direction), self.analytic(probe.direction)).slope
+def _measure(session: Session, probe: Probe, settings: Settings) -> ProbeResult:
+    difference = plateau_difference(session.line(probe.direction), session.eps)
+    analytic = session.analytic(probe.direction)
+    gap = abs(difference.value - analytic)
+    error = 0.0 if gap == 0 else gap / abs(analytic) if analytic else np.inf
+    return ProbeResult(probe.block, probe.kind, analytic, difference, error, judge(analytic, difference, settings))
 
 
 def judge(analytic: float, difference: Difference, settings: Settings = DOUBLE) -> str:
@@ -265,22 +167,29 @@ def _agrees(analytic: float, difference: Difference, settings: Settings) -> bool
     return bool(gap <= settings.rtol * abs(analytic) + difference.error)  # False for nan
 
 
-def _block_report(name: str, norm: float, results: list[ProbeResult]) -> BlockReport:
+def _block_report(name: str, gradient_norm: float, results: list[ProbeResult]) -> BlockReport:
     def count(verdict: str) -> int:
         return sum(r.verdict == verdict for r in results)
 
+    passed, failed = count("passed"), count("failed")
     counted = [r for r in results if r.verdict == "failed"] or [r for r in results if r.verdict == "passed"]
     return BlockReport(
         block=name,
-        gradient_norm=norm,
+        gradient_norm=gradient_norm,
         probes=len(results),
-        passed=count("passed"),
+        passed=passed,
         zero=count("zero"),
         unresolved=count("unresolved"),
         refused=count("refused"),
-        failed=count("failed"),
+        failed=failed,
         worst=max(counted, key=lambda r: np.nan_to_num(r.relative_error, nan=np.inf), default=None),
-        verdict="FAILED" if count("failed") else "VACUOUS" if norm == 0 else "ok" if count("passed") else "BLIND",
+        verdict="FAILED"
+        if count("failed")
+        else "VACUOUS"
+        if gradient_norm == 0
+        else "ok"
+        if count("passed")
+        else "BLIND",
     )
 
 
@@ -310,15 +219,3 @@ def _verdicts(reports: list[BlockReport], settings: Settings) -> list[str]:
         if count > cap * total:
             reasons.append(f"{count} of {total} probes {word}, more than {cap:.0%}")
     return reasons
-
-
-def _equal(one: Mapping[str, NDArray], two: Mapping[str, NDArray]) -> bool:
-    return one.keys() == two.keys() and all(np.array_equal(one[k], two[k]) for k in one)
-
-
-def _norm(*values: NDArray) -> float:
-    return float(np.sqrt(sum(np.sum(np.square(v, dtype=np.float64)) for v in values)))
-
-
-def _first(mask: NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(i[0]) for i in np.nonzero(mask))

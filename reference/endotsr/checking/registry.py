@@ -37,11 +37,11 @@ class Pair(NamedTuple):
     equation: str
     function: str
     inputs: Callable[[np.random.Generator], dict[str, NDArray]]
-    forward: Callable[[Arrays], dict[str, NDArray]]
-    reverse: Callable[[Arrays, Arrays], dict[str, NDArray]]
-    blocks: Callable[[Arrays], dict[str, tuple[str, object]]] | None = None
-    trace: Callable[[Arrays], dict[str, NDArray]] | None = None
-    hard: Callable[[Arrays], dict[str, NDArray]] | None = None
+    forward: Callable[[Arrays], Mapping[str, NDArray]]
+    reverse: Callable[[Arrays, Arrays], Mapping[str, NDArray]]
+    blocks: Callable[[Arrays], Mapping[str, tuple[str, object]]] | None = None
+    trace: Callable[[Arrays], Mapping[str, NDArray]] | None = None
+    hard: Callable[[Arrays], Mapping[str, NDArray]] | None = None
     single: str = ""
 
 
