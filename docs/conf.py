@@ -1,0 +1,59 @@
+"""Sphinx configuration. Build: sphinx-build -W -b html docs docs/_build/html (extra `docs`)."""
+
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_extensions"))
+
+project = "endotsr"
+author = "the endotsr authors"
+copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
+
+extensions = ["myst_nb", "paper_equations"]
+exclude_patterns = ["_build", "_extensions", "results/README.md", "**/*.json"]
+source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
+
+# To add API pages: append "autodoc2" here and set
+#   autodoc2_packages = [{"path": "../reference/endotsr", "auto_mode": False}]
+#   autodoc2_render_plugin = "myst"
+#   autodoc2_docstring_parser_regexes = [(r".*", "myst")]
+
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
+myst_heading_anchors = 3
+nb_execution_mode = "off"
+
+# The label is the number: `eq-b5` is displayed as (B5), see _extensions/paper_equations.py.
+numfig = True
+math_numfig = False
+
+html_theme = "sphinx_book_theme"
+html_title = "endotsr"
+html_static_path = ["_static"]
+html_css_files = ["endotsr.css"]
+html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True}
+html_show_sphinx = False
+
+MATHJAX_CDN = "https://cdn.jsdelivr.net/npm/mathjax@3/es5/tex-chtml.js"
+
+
+def _copy_mathjax() -> str:
+    """Copy MathJax from its wheel (extra `docs`) into _static, so that the pages need no network."""
+    spec = find_spec("mathjax")
+    if spec is None or not spec.submodule_search_locations:
+        return MATHJAX_CDN
+    source = Path(spec.submodule_search_locations[0]) / "static" / "mathjax" / "es5"
+    if not (source / "tex-chtml.js").is_file():
+        return MATHJAX_CDN
+    target = HERE / "_static" / "mathjax"
+    fonts = Path("output") / "chtml" / "fonts" / "woff-v2"
+    (target / fonts).mkdir(parents=True, exist_ok=True)
+    shutil.copy2(source / "tex-chtml.js", target / "tex-chtml.js")
+    for font in (source / fonts).glob("*.woff"):
+        shutil.copy2(font, target / fonts / font.name)
+    return "mathjax/tex-chtml.js"
+
+
+mathjax_path = _copy_mathjax()
