@@ -25,15 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.jit import jit
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
 FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
-
-SMALLEST_FLOW_SIDE = 12  # the flow estimator needs one side of at least this many pixels
 
 
 class Neighbours(NamedTuple):
@@ -108,59 +105,18 @@ def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
     (1 - s) before(p - s f(p)) + s after(p - (1 - s) g(p)), bilinear, border pixels repeated.
 
     returns   (3, H, W) float32, display units [0, 1]
-    Edges     one neighbour only: its copy
-    Raises    InputError if both image sides are below 12 px (no flow can be estimated)
+    Edges     one neighbour only: its copy; an image side below 16 px allows no flow: the plain blend
     """
-    from endotsr.opencv import dis_flow
+    from endotsr.opencv import dis_flow, warp_bilinear
 
     near = neighbours(sequence, index)
-    height, width = sequence.images.shape[2:]
-    if max(height, width) < SMALLEST_FLOW_SIDE:
-        raise InputError(f"optical flow needs an image side of {SMALLEST_FLOW_SIDE} px or more, got {width}x{height}")
     before, after = unit_image(sequence, near.before), unit_image(sequence, near.after)
     if near.before == near.after:
         return before
     a, b = sequence.images[near.before], sequence.images[near.after]
-    moved_before = warp(before, dis_flow(a, b), -near.fraction)
-    moved_after = warp(after, dis_flow(b, a), near.fraction - 1.0)
+    moved_before = warp_bilinear(before, dis_flow(a, b) * np.float32(-near.fraction))
+    moved_after = warp_bilinear(after, dis_flow(b, a) * np.float32(near.fraction - 1.0))
     return _blend(moved_before, moved_after, near.fraction)
-
-
-def warp(image: FloatArray, flow: FloatArray, factor: float) -> FloatArray:
-    """image(p + factor flow(p)) at every pixel p, bilinear; outside, the nearest border pixel is repeated.
-
-    image     (3, H, W)
-    flow      (2, H, W) displacement in pixels, [0] along columns (right), [1] along rows (down), finite
-    returns   (3, H, W), dtype of `image`
-
-    Reverse   none (a baseline is never differentiated)
-    """
-    if flow.shape != (2, *image.shape[1:]):
-        raise ValueError(f"flow has shape {flow.shape}, expected {(2, *image.shape[1:])}")
-    displacement = np.ascontiguousarray(flow, image.dtype) * image.dtype.type(factor)
-    out = np.empty_like(image)
-    _warp_kernel(np.ascontiguousarray(image), displacement, out)
-    return out
-
-
-def _warp(image, displacement, out):
-    real = image.dtype.type
-    channels, height, width = image.shape
-    for y in range(height):
-        for x in range(width):
-            u = min(max(real(x) + displacement[0, y, x], real(0)), real(width - 1))
-            v = min(max(real(y) + displacement[1, y, x], real(0)), real(height - 1))
-            x0, y0 = int(u), int(v)
-            x1, y1 = min(x0 + 1, width - 1), min(y0 + 1, height - 1)
-            right, down = u - real(x0), v - real(y0)
-            left, up = real(1) - right, real(1) - down
-            for c in range(channels):
-                top = left * image[c, y0, x0] + right * image[c, y0, x1]
-                bottom = left * image[c, y1, x0] + right * image[c, y1, x1]
-                out[c, y, x] = up * top + down * bottom
-
-
-_warp_kernel = jit(_warp)
 
 
 def _blend(before: FloatArray, after: FloatArray, fraction: float) -> FloatArray:

@@ -1,0 +1,163 @@
+"""Pictures of a run as 8-bit RGB arrays: render / truth / error with a 4x inset, depth in colours, encoders.
+
+Colours come from perceptually uniform maps (error: magma, depth: viridis). Excluded pixels are neutral grey;
+a value that is not a finite number is painted magenta, so that it cannot pass for a dark pixel.
+matplotlib and Pillow are imported when a picture is made, not before.
+"""
+
+import base64
+import io
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+ByteImage = NDArray[np.uint8]  # (H, W, 3), RGB
+
+ERROR_MAP = "magma"
+DEPTH_MAP = "viridis"
+EXCLUDED = (96, 96, 102)
+NOT_FINITE = (255, 0, 255)
+INSET_FACTOR = 4
+ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few steps, so that similar runs share one scale
+
+
+class Triptych(NamedTuple):
+    """Three pictures of one frame and the window that is shown enlarged."""
+
+    render: ByteImage  # (H, W, 3)
+    truth: ByteImage  # (H, W, 3)
+    error: ByteImage  # (H, W, 3), colours from 0 to `scale`
+    row: int  # top edge of the window, pixels
+    column: int  # left edge of the window
+    height: int  # a quarter of H, at least 1
+    width: int  # a quarter of W, at least 1
+    scale: float  # error that gets the brightest colour, display units [0, 1]
+
+    def window(self, image: ByteImage) -> ByteImage:
+        """The part of `image` inside the window, not enlarged."""
+        return image[self.row : self.row + self.height, self.column : self.column + self.width]
+
+
+def bytes_image(image: FloatArray) -> ByteImage:
+    """Planar (3, H, W) in display units -> (H, W, 3) uint8: clipped to [0, 1], rounded to the nearest level."""
+    rounded = np.rint(np.clip(np.nan_to_num(image, nan=0.0), 0, 1) * 255).astype(np.uint8)
+    out = np.ascontiguousarray(rounded.transpose(1, 2, 0))
+    out[~np.isfinite(image).all(axis=0)] = NOT_FINITE
+    return out
+
+
+def tissue_error(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
+    """Absolute difference of the clipped render, mean over the channels, (H, W); 0 outside the mask.
+
+    render, truth   (3, H, W) display units [0, 1];  mask (H, W), True = tissue.  NaN in the render stays NaN.
+    """
+    return np.where(mask, np.abs(np.clip(render, 0, 1) - truth).mean(axis=0), 0.0)
+
+
+def error_scale(errors: list[FloatArray]) -> float:
+    """The step of ERROR_SCALES at or above the 99th percentile of all non-zero errors (1 frame or many)."""
+    found = [e[np.isfinite(e) & (e > 0)] for e in errors]
+    values = np.concatenate([np.zeros(1), *found])
+    level = float(np.percentile(values[1:], 99)) if values.size > 1 else 0.0
+    return next((step for step in ERROR_SCALES if step >= level), ERROR_SCALES[-1])
+
+
+def worst_window(error: FloatArray, height: int, width: int) -> tuple[int, int]:
+    """Top-left corner of the height x width window with the largest sum of `error` (ties: topmost, then leftmost)."""
+    finite = np.nan_to_num(error.astype(np.float64), nan=1.0, posinf=1.0)
+    table = np.pad(finite.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    sums = table[height:, width:] - table[:-height, width:] - table[height:, :-width] + table[:-height, :-width]
+    row, column = np.unravel_index(int(np.argmax(sums)), sums.shape)
+    return int(row), int(column)
+
+
+def triptych(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], scale: float | None = None) -> Triptych:
+    """Render, truth and error map of one frame, with the window where the tissue error is largest.
+
+    render, truth   (3, H, W) display units [0, 1];  mask (H, W), True = tissue
+    scale           error of the brightest colour; None = chosen from this frame by `error_scale`
+    """
+    error = tissue_error(render, truth, mask)
+    scale = error_scale([error]) if scale is None else scale
+    height, width = (max(1, side // INSET_FACTOR) for side in error.shape)
+    row, column = worst_window(error, height, width)
+    colours = colour_mapped(error, 0.0, scale, ERROR_MAP)
+    colours[~mask] = EXCLUDED
+    return Triptych(bytes_image(render), bytes_image(truth), colours, row, column, height, width, scale)
+
+
+def triptych_picture(panels: Triptych, gap: int = 6) -> ByteImage:
+    """One picture to save: the three images, the window framed in each, and below them the window enlarged 4x."""
+    columns = []
+    for image in (panels.render, panels.truth, panels.error):
+        enlarged = panels.window(image).repeat(INSET_FACTOR, axis=0).repeat(INSET_FACTOR, axis=1)
+        inset = np.full_like(image, 255)
+        inset[: enlarged.shape[0], : enlarged.shape[1]] = enlarged[: image.shape[0], : image.shape[1]]
+        bar = np.full((gap, image.shape[1], 3), 255, np.uint8)
+        columns += [np.concatenate([framed(image, panels), bar, inset])]
+    side = np.full((columns[0].shape[0], gap, 3), 255, np.uint8)
+    return np.concatenate([columns[0], side, columns[1], side, columns[2]], axis=1)
+
+
+def framed(image: ByteImage, panels: Triptych) -> ByteImage:
+    """A copy of `image` with the window's border drawn in white on black, visible on any ground and when shrunk."""
+    out = image.copy()
+    thick = max(1, image.shape[1] // 320)
+    for grow, colour in ((2 * thick, 0), (thick, 255)):
+        y0, x0 = max(panels.row - grow, 0), max(panels.column - grow, 0)
+        y1, x1 = panels.row + panels.height + grow, panels.column + panels.width + grow
+        out[y0:y1, x0:x1] = colour
+    y, x = panels.row, panels.column
+    out[y : y + panels.height, x : x + panels.width] = panels.window(image)
+    return out
+
+
+def depth_range(depth: FloatArray, mask: NDArray[np.bool_] | None = None) -> tuple[float, float]:
+    """1st and 99th percentile of the positive finite depths inside the mask; (0, 1) if there are none."""
+    known = np.isfinite(depth) & (depth > 0)
+    values = depth[known if mask is None else known & mask]
+    if values.size == 0:
+        return 0.0, 1.0
+    low, high = (float(v) for v in np.percentile(values, (1, 99)))
+    return low, high if high > low else low + 1.0
+
+
+def depth_picture(depth: FloatArray, low: float, high: float, mask: NDArray[np.bool_] | None = None) -> ByteImage:
+    """Depth (H, W) in colours from `low` (near, dark) to `high` (far, bright); no depth (<= 0) and excluded: grey."""
+    colours = colour_mapped(depth, low, high, DEPTH_MAP)
+    absent = depth <= 0
+    colours[absent if mask is None else absent | ~mask] = EXCLUDED
+    return colours
+
+
+def colour_mapped(values: FloatArray, low: float, high: float, name: str) -> ByteImage:
+    """(H, W) -> (H, W, 3): colour map `name` from low to high, values outside take the end colours."""
+    finite = np.isfinite(values)
+    level = np.clip((np.where(finite, values, low) - low) / (high - low), 0, 1)
+    colours = colour_table(name)[np.rint(level * 255).astype(np.intp)]
+    colours[~finite] = NOT_FINITE
+    return colours
+
+
+def colour_table(name: str) -> ByteImage:
+    """The 256 colours of a matplotlib map, (256, 3) uint8."""
+    from matplotlib import colormaps
+
+    return np.rint(colormaps[name](np.arange(256))[:, :3] * 255).astype(np.uint8)
+
+
+def encode(image: ByteImage, kind: str = "png") -> bytes:
+    """File bytes of an (H, W, 3) image. kind: `png` (lossless) or `webp` (quality 90, about a tenth of the size)."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    options = {"png": {}, "webp": {"quality": 90, "method": 3}}[kind]
+    Image.fromarray(image).save(buffer, format=kind, **options)
+    return buffer.getvalue()
+
+
+def data_uri(content: bytes, kind: str) -> str:
+    """The bytes of an image file as an address that needs no other file."""
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -1,0 +1,63 @@
+"""What a report is made from: plain arrays, dictionaries and text. No file, no picture, no HTML here."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating]
+
+# key in metrics.json, heading, decimals, +1 if larger is better and -1 if smaller is
+COLUMNS = (
+    ("psnr_full", "PSNR full, dB", 2, 1),
+    ("psnr_tissue", "PSNR tissue, dB", 2, 1),
+    ("psnr_full_8bit", "PSNR full, 8‑bit, dB", 2, 1),
+    ("psnr_tissue_8bit", "PSNR tissue, 8‑bit, dB", 2, 1),
+    ("ssim_full", "SSIM full", 4, 1),
+    ("ssim_tissue", "SSIM tissue", 4, 1),
+    ("lpips", "LPIPS [0,1]", 4, -1),
+    ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
+)
+
+
+@dataclass(frozen=True)
+class FramePictures:
+    """One held-out frame to show."""
+
+    index: int  # frame number
+    name: str  # file name or other label
+    time: float  # normalised, in [0, 1)
+    render: FloatArray  # (3, H, W) display units [0, 1]
+    truth: FloatArray  # (3, H, W) display units [0, 1]
+    mask: NDArray[np.bool_]  # (H, W) True = tissue
+    depth: FloatArray | None = None  # (H, W) rendered depth, scene units; <= 0 = none
+    metrics: dict[str, Any] = field(default_factory=dict)  # the frame's entry of metrics.json
+
+
+@dataclass(frozen=True)
+class FreeTable:
+    """A table given as data, such as what each component contributed."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]  # first cell of a row is its name
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """All that the page shows. Every part but the title may be empty and is then left out."""
+
+    title: str
+    evaluation: dict[str, Any] = field(default_factory=dict)  # metrics.json, see evaluate.py
+    log: list[dict[str, Any]] = field(default_factory=list)  # log.jsonl
+    frames: tuple[FramePictures, ...] = ()
+    reference_rows: tuple[dict[str, Any], ...] = ()  # published figures: {"label": ..., metric key: value}
+    components: tuple[FreeTable, ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict)  # label -> value: sequence, seed, machine, time, memory ...
+    configuration: str = ""  # TOML
+    versions: dict[str, str] = field(default_factory=dict)
+    input_hashes: dict[str, str] = field(default_factory=dict)  # file -> SHA-256
+    notes: tuple[str, ...] = ()  # sentences: what the reader assumed and found
+    depth_unit: str = "scene units"
