@@ -9,12 +9,13 @@ import re
 import tomllib
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 
 from endotsr.errors import InputError
 
+Section = TypeVar("Section", bound=msgspec.Struct)
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
@@ -259,26 +260,34 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
     preset = data.get("preset", "paper")
     if not isinstance(preset, str) or preset not in PRESETS:
         raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
-    _refuse_unknown_keys(data, Config, where, "")
-    merged = _merge(msgspec.to_builtins(PRESETS[preset]), data)
-    _refuse_non_finite(merged, where, "")
-    try:
-        config = msgspec.convert(merged, Config, strict=True)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {_explain(str(error), merged)}") from None
+    refuse_unknown_keys(data, Config, where)
+    config = checked(_merge(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
     _refuse_contradictions(config, where)
     return config
 
 
+def checked(data: dict[str, Any], kind: type[Section], where: str, prefix: str = "") -> Section:
+    """A section from plain data, types and ranges checked. Raises InputError naming the key and what is allowed."""
+    _refuse_non_finite(data, where, prefix)
+    try:
+        return msgspec.convert(data, kind, strict=True)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {_explain(str(error), data, kind, prefix)}") from None
+
+
 def load_config(path: Path) -> Config:
     """Read a TOML file. Raises InputError naming the file, the key and what is allowed."""
+    return config_from_dict(read_toml(path), str(path))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, unchecked. Raises InputError naming the file."""
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not valid TOML: {error}") from None
-    return config_from_dict(data, str(path))
 
 
 def _merge(base: dict, override: dict) -> dict:
@@ -288,14 +297,15 @@ def _merge(base: dict, override: dict) -> dict:
     }
 
 
-def _refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str) -> None:
+def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") -> None:
+    """Raises InputError for a key that `struct` does not have."""
     fields = {f.name: f.type for f in msgspec.structs.fields(struct)}
     for key, value in data.items():
         if key not in fields:
             raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
         inner = fields[key]
         if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, msgspec.Struct):
-            _refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
+            refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
 
 
 def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
@@ -307,16 +317,16 @@ def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
                 raise InputError(f"{where}: {prefix}{key} = {value!r} is not allowed; allowed: finite numbers")
 
 
-def _explain(message: str, data: dict) -> str:
+def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
     """The key, its value and what is allowed, from the message `... - at `$.section.key`` of the type check."""
     found = re.search(r"`\$\.([\w.]+)", message)
     if not found:
         return message
-    kind, value = Config, data
+    value: Any = data
     for name in found[1].split("."):
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
-    return f"{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
+    return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
 
 
 def allowed_values(kind: Any) -> str:

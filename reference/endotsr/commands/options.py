@@ -1,0 +1,176 @@
+"""From words on the command line to typed options and settings; a mistake is one line that names what is allowed.
+
+Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option.
+"""
+
+import contextlib
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from endotsr.config import (
+    PRESETS,
+    Config,
+    allowed_values,
+    config_from_dict,
+    read_toml,
+    refuse_unknown_keys,
+    with_iterations,
+)
+from endotsr.errors import InputError
+from endotsr.simulator.settings import SimulatorSettings
+
+T = TypeVar("T")
+
+# Options that are a setting under a shorter name.
+SHORT_NAMES = {
+    "scale": "sequence.scale",
+    "frames": "sequence.frames",
+    "masks": "sequence.masks",
+    "seed": "training.seed",
+    "threads": "training.threads",
+}
+
+# What the dotted options of a command line start from.
+ROOTS: dict[str, Any] = {f.name: f.type for f in msgspec.structs.fields(Config)} | {"simulator": SimulatorSettings}
+
+
+@dataclass
+class Sources:
+    """Where the settings of a run start from."""
+
+    preset: Literal["paper", "sharp", "demo"] | None = None
+    config: Path | None = None
+    iterations: int | None = None
+    schedule: Literal["stretched", "absolute"] = "stretched"
+
+
+def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
+    """The options of one command. `--help` prints them and leaves with SystemExit(0); a mistake is an InputError."""
+    return _tyro(
+        options, _plain_booleans(words), prog=f"endotsr {command}", **({"default": default} if default else {})
+    )
+
+
+def base_settings(words: list[str], kept: Config | None = None) -> tuple[Config, str]:
+    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
+
+    kept   the settings of a run to resume: the start when the command line names neither of the three
+    """
+    sources, _ = _tyro(Sources, words, return_unknown_args=True, add_help=False)
+    if kept is not None and sources == Sources():
+        return kept, ""
+    data = read_toml(sources.config) if sources.config else {}
+    if sources.preset:
+        data = data | {"preset": sources.preset}
+    config = config_from_dict(data, str(sources.config or "configuration"))
+    if sources.iterations is None:
+        return config, ""
+    if sources.iterations < 1:
+        raise InputError(f"--iterations {sources.iterations} is not allowed; allowed: an integer >= 1")
+    before = config.training.iterations
+    if sources.schedule == "absolute":
+        training = msgspec.structs.replace(config.training, iterations=sources.iterations)
+        note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
+        return msgspec.structs.replace(config, training=training), note
+    note = (
+        f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its share "
+        "(--schedule absolute leaves them in place)"
+    )
+    return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
+
+
+def with_short_names(config: Config, given: dict[str, Any]) -> Config:
+    """The settings with the short options that were given (not None), checked."""
+    data = msgspec.to_builtins(config)
+    for name, value in given.items():
+        if value is not None:
+            section, key = SHORT_NAMES[name].split(".")
+            data[section][key] = value
+    return config_from_dict(data, "command line")
+
+
+def differences(config: Config, other: Config) -> list[str]:
+    """`section.key = value (preset: its value)` for every setting that differs from `other`."""
+    ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
+    return [
+        f"{section}.{key} = {value!r} ({other.preset}: {theirs[section][key]!r})"
+        for section, values in ours.items()
+        if isinstance(values, dict)
+        for key, value in values.items()
+        if value != theirs[section][key]
+    ]
+
+
+def preset_of(config: Config) -> Config:
+    """The preset these settings started from."""
+    return PRESETS[config.preset]
+
+
+def _tyro(options: Any, words: list[str], **settings: Any) -> Any:
+    import tyro
+
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(options, args=words, **settings)
+    except SystemExit as leaving:
+        if not leaving.code:
+            raise
+        raise InputError(_one_line(said.getvalue())) from None
+
+
+def _plain_booleans(words: list[str]) -> list[str]:
+    """`--model.appearance false` as `--model.no-appearance`, so that a switch reads as it does in a TOML file."""
+    out: list[str] = []
+    for word in [part for w in words for part in (w.split("=", 1) if re.match(r"--[\w.-]+\.[\w-]+=", w) else [w])]:
+        if out and word.lower() in ("true", "false") and _setting_type(out[-1]) is bool:
+            section, key = out[-1].rsplit(".", 1)
+            out[-1] = f"{section}.{'' if word.lower() == 'true' else 'no-'}{key}"
+        else:
+            out.append(word)
+    return out
+
+
+def _setting_type(word: str) -> Any:
+    """The type of the setting that an option word such as `--model.beta` names, or None."""
+    kind = ROOTS
+    for name in word.removeprefix("--").replace("-", "_").split("."):
+        if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+            kind = {f.name: f.type for f in msgspec.structs.fields(kind)}
+        kind = kind.get(name) if isinstance(kind, dict) else None
+    return kind
+
+
+def _one_line(box: str) -> str:
+    """What tyro says in a box, as one line; for a setting, what is allowed."""
+    lines = [line.strip("│ ").strip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
+    lines = [line for line in lines if line and not line.startswith("──")]
+    end = next(
+        (i for i, line in enumerate(lines) if line.startswith(("For full help", "Argument helptext", "Got errors"))),
+        None,
+    )
+    text = " ".join(lines[:end])
+    named = re.search(r"--\w+(\.[\w-]+)+", text)
+    if not named:
+        return text
+    key, kind = named[0][2:].replace("-", "_"), _setting_type(named[0])
+    if kind is None:
+        section, rest = key.split(".", 1)
+        if section == "simulator":
+            refuse_unknown_keys(_nested(rest), SimulatorSettings, "command line", "simulator.")
+        else:
+            refuse_unknown_keys({section: _nested(rest)}, Config, "command line")
+        return text
+    value = re.search(r"(?:instantiated from \[|choice |: )('[^']*')", text)
+    given = f" = {value[1]}" if value else ""
+    return f"command line: {key}{given} is not allowed; allowed: {allowed_values(kind)}"
+
+
+def _nested(dotted: str) -> dict[str, Any]:
+    first, _, rest = dotted.partition(".")
+    return {first: _nested(rest) if rest else None}

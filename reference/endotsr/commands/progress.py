@@ -1,0 +1,58 @@
+"""What a person sees while a run trains: a bar on a terminal, a line now and then elsewhere."""
+
+import sys
+import time
+from typing import Any
+
+QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
+MEMORY = 0.98  # of the running means of loss and PSNR: about the last 50 views
+
+
+class Progress:
+    """Loss and PSNR (running means over views), Gaussian count and time left."""
+
+    def __init__(self, total: int, start: int = 0) -> None:
+        self._total, self._start, self._began = total, start, time.monotonic()
+        self._said = self._began
+        self._means: dict[str, float] = {}
+        self._bar: Any = None
+        if sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25)
+
+    def update(self, entry: dict[str, Any]) -> None:
+        """Take in the log entry of one iteration."""
+        for name in ("loss", "psnr"):
+            value = float(entry.get(name, float("nan")))
+            if value == value:
+                self._means[name] = MEMORY * self._means.get(name, value) + (1 - MEMORY) * value
+        if self._bar is not None:
+            self._bar.update(1)
+            if self._bar.n % 10 == 0 or self._bar.n == self._total:
+                self._bar.set_postfix_str(self._state(entry), refresh=False)
+        elif time.monotonic() - self._said > QUIET_SECONDS:
+            self._said = time.monotonic()
+            done = entry["iteration"] - self._start
+            left = (self._said - self._began) / max(done, 1) * (self._total - entry["iteration"])
+            print(
+                f"iteration {entry['iteration']} of {self._total}: {self._state(entry)}, {duration(left)} left",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    def close(self) -> None:
+        """Leave the bar as it is and go to the next line."""
+        if self._bar is not None:
+            self._bar.close()
+
+    def _state(self, entry: dict[str, Any]) -> str:
+        shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
+        return f"{shown}, {entry.get('gaussians', 0)} Gaussians"
+
+
+def duration(seconds: float) -> str:
+    """1:02:03 or 2:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -1,0 +1,18 @@
+"""The number of threads of a command."""
+
+import os
+
+
+def use_threads(asked: int) -> int:
+    """Let compiled kernels use `asked` threads (0 = all cores), which changes no result; returns the number."""
+    import numba
+
+    most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    used = min(asked or len_cores(), most)
+    numba.set_num_threads(used)
+    return used
+
+
+def len_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,247 @@
+"""The run folder: everything that says what was run, on what, how it went and what came out.
+
+    config.toml      resolved settings; `load_config` reads back an equal Config
+    run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
+    sequence.json    cameras, times, names, split: what rendering needs when the pictures are elsewhere
+    log.jsonl        one line an iteration
+    checkpoint.npz   the latest checkpoint
+    metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
+
+A run folder appears complete under its name or not at all, files are replaced whole, and a log that is resumed
+is cut at the checkpoint. Knows file names and JSON; knows nothing of models or pictures.
+"""
+
+import contextlib
+import datetime
+import importlib.metadata
+import json
+import math
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from endotsr import __version__
+from endotsr.config import Config, config_to_toml, load_config
+from endotsr.errors import InputError
+
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless", "scikit-image", "msgspec")
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A run folder that exists; see the module docstring for its files."""
+
+    path: Path
+
+    @property
+    def checkpoint(self) -> Path:
+        """The latest checkpoint."""
+        return self.path / "checkpoint.npz"
+
+    @property
+    def log(self) -> Path:
+        """One JSON object an iteration."""
+        return self.path / "log.jsonl"
+
+    def config(self) -> Config:
+        """The resolved settings of the run."""
+        return load_config(self.path / "config.toml")
+
+    def record(self) -> dict[str, Any]:
+        """run.json as it is now."""
+        return _read_json(self.path / "run.json")
+
+    def sequence_record(self) -> dict[str, Any]:
+        """sequence.json."""
+        return _read_json(self.path / "sequence.json")
+
+    def remove_leftovers(self) -> None:
+        """Temporary files of a process that was killed."""
+        for pattern in (".*.part", ".partial-*"):
+            for file in self.path.glob(pattern):
+                shutil.rmtree(file) if file.is_dir() else file.unlink(missing_ok=True)
+
+    def update(self, **entries: Any) -> None:
+        """Replace or add entries of run.json."""
+        write_json(self.path / "run.json", self.record() | entries)
+
+
+def refuse_existing(path: Path) -> None:
+    """Raises InputError if something exists where a new folder is wanted."""
+    if (Path(path) / "run.json").exists():
+        raise InputError(
+            f"{path}: holds a run already; choose another --out, or continue it with "
+            f"`endotsr train --out {path} --resume`"
+        )
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already; choose another --out")
+
+
+def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:
+    """A new run folder, filled beside its final name and then renamed: it never exists half-written.
+
+    Raises:  InputError if `path` exists; OSError as the file system reports it (nothing stays behind).
+    """
+    path = Path(path)
+    refuse_existing(path)
+    path.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with replacing_folder(path) as folder:
+        (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
+        write_json(folder / "run.json", record)
+        write_json(folder / "sequence.json", sequence_record)
+        (folder / "log.jsonl").touch()
+    return RunFolder(path)
+
+
+def open_run(path: Path) -> RunFolder:
+    """An existing run folder. Raises InputError if there is none."""
+    path = Path(path)
+    if not path.is_dir():
+        raise InputError(f"{path}: run folder not found")
+    for name in ("config.toml", "run.json", "sequence.json"):
+        if not (path / name).is_file():
+            raise InputError(f"{path}: not a run folder: {name} is missing")
+    return RunFolder(path)
+
+
+class RunLog:
+    """log.jsonl opened for appending after iteration `kept`; later and broken lines are cut off first."""
+
+    def __init__(self, path: Path, kept: int) -> None:
+        self.seconds = 0.0  # sum over the kept lines
+        self._end = self._cut(path, kept)
+        self._file: IO[bytes] = path.open("ab")
+
+    def _cut(self, path: Path, kept: int) -> int:
+        end = 0
+        if path.exists():
+            with path.open("r+b") as file:
+                for line in file:
+                    entry = _entry(line)
+                    if entry is None or entry["iteration"] > kept:
+                        break
+                    end += len(line)
+                    self.seconds += entry.get("seconds") or 0.0
+                file.truncate(end)
+        return end
+
+    def append(self, entry: dict[str, Any]) -> None:
+        """One line, flushed. On an error of the file system the log keeps its last whole line."""
+        line = (json.dumps(_finite(entry), separators=(", ", ": ")) + "\n").encode()
+        try:
+            self._file.write(line)
+            self._file.flush()
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file.fileno(), self._end)
+            raise
+        self._end += len(line)
+
+    def close(self) -> None:
+        """Close the file; what it could not take is dropped."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+
+def _entry(line: bytes) -> dict[str, Any] | None:
+    with contextlib.suppress(ValueError):
+        entry = json.loads(line)
+        if line.endswith(b"\n") and isinstance(entry, dict) and "iteration" in entry:
+            return entry
+    return None
+
+
+def write_json(path: Path, data: Any) -> None:
+    """JSON with numbers that are not finite as null, replaced whole."""
+    text = json.dumps(_finite(data), indent=2, ensure_ascii=False) + "\n"
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step."""
+    temporary = path.with_name(f".partial-{path.name}")  # keeps the ending, which writers look at
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+@contextlib.contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes otherwise."""
+    temporary = path.with_name(f".partial-{os.getpid()}-{path.name}")
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir()
+    try:
+        yield temporary
+        if path.exists():
+            shutil.rmtree(path)
+        os.rename(temporary, path)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if isinstance(data, Path):
+        return str(data)
+    if hasattr(data, "tolist"):  # NumPy scalars and arrays
+        return _finite(data.tolist())
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package, Python and the libraries that numbers depend on."""
+    found = {"endotsr": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            found[name] = importlib.metadata.version(name)
+    return found
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores this process may use, memory and system, as far as the system tells."""
+    processor = platform.processor() or platform.machine()
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                processor = line.split(":", 1)[1].strip()
+                break
+    memory = None
+    with contextlib.suppress(AttributeError, ValueError, OSError):
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {"processor": processor, "cores": cores, "memory_bytes": memory, "system": platform.platform()}
+
+
+def peak_memory_bytes() -> int | None:
+    """Largest resident memory of this process so far; None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
+
+
+def now() -> str:
+    """The time in UTC, to the second."""
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
