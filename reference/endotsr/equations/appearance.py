@@ -1,0 +1,132 @@
+"""Equation (2): the bounded colour residual of component A.
+
+In: coefficients A (3, 2F, N), dimensionless, and the normalised atoms phi_bar(t) (2F,). Out: the residual (3, N) in
+units of the degree-0 harmonic coefficient, to be added to it: beta tanh(A phi_bar) / Y00. Adding it there moves the
+displayed colour by beta tanh(A phi_bar) before the clamp at 0.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.equations.atom_sums import BLOCK, combine, spread
+from endotsr.jit import jit, jit_inline
+from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
+
+FloatArray = NDArray[np.floating]
+
+Y00 = 0.28209479177387814  # 1 / (2 sqrt(pi)), the constant spherical harmonic
+
+LN2_HIGH = 355.0 / 512.0  # ln 2 in nine bits: k * LN2_HIGH is exact for every exponent k of either precision
+LN2_LOW = -2.1219444005469058e-4  # ln 2 - LN2_HIGH
+SATURATED = 1e4  # exp(-1e4) is 0 in either precision
+
+
+class AppearanceSaved(NamedTuple):
+    """References to the inputs and the derivative of the squashing."""
+
+    colour_coefficients: FloatArray  # (3, 2F, N)
+    phi_bar: FloatArray  # (2F,)
+    slope: FloatArray  # (3, N)  beta tanh'(A phi_bar) / Y00
+
+
+class AppearanceGrads(NamedTuple):
+    """Derivative by the coefficients and by the atoms."""
+
+    colour_coefficients: FloatArray  # (3, 2F, N)
+    phi_bar: FloatArray  # (2F,)
+
+
+def _exp_nonpositive(z):
+    """exp(-z) for z >= 0 by straight-line arithmetic, to a few ulp also where z is large.
+
+    z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps all its digits (2^(-z log2 e) would lose
+    as many as z has).
+    """
+    real = type(z)
+    z = real(SATURATED) if z > real(SATURATED) else z
+    k = math.floor(z * real(LOG2_E))
+    r = (z - k * real(LN2_HIGH)) - k * real(LN2_LOW)
+    return exp2_nonpositive(-k) * exp2_nonpositive(-(r * real(LOG2_E)))
+
+
+_exp_nonpositive_inline = jit_inline(_exp_nonpositive)
+
+
+def _tanh_and_slope(x):
+    """tanh x and its derivative, both to a few ulp for every x.
+
+    With e = exp(-2|x|): tanh |x| = (1 - e) / (1 + e) and tanh' = 4 e / (1 + e)^2. The textbook 1 - tanh^2
+    loses every digit of a saturated residual (0 from x = 10 in float32), which could then never return.
+    (1 - e) cancels for small |x|, where the seventh convergent of the continued fraction
+    x / (1 + x^2 / (3 + x^2 / (5 + ...))) takes over.
+    """
+    real = type(x)
+    size = abs(x)
+    e = _exp_nonpositive_inline(size + size)
+    one_more = real(1.0) + e
+    large = (real(1.0) - e) / one_more
+    q = min(x * x, real(1.0))  # the convergent is used below 1/2 only; elsewhere it must not overflow
+    numerator = real(135135.0) + q * (real(17325.0) + q * (real(378.0) + q))
+    denominator = real(135135.0) + q * (real(62370.0) + q * (real(3150.0) + q * real(28.0)))
+    small = size * (numerator / denominator)
+    value = small if size < real(0.5) else large
+    return math.copysign(value, x), real(4.0) * (e / one_more) / one_more
+
+
+_tanh_and_slope_inline = jit_inline(_tanh_and_slope)
+
+
+def _squash(argument, scale, residual, slope):
+    n = argument.size
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        start = block * BLOCK
+        stop = min(n, start + BLOCK)
+        x = argument[start:stop]
+        value = residual[start:stop]
+        derivative = slope[start:stop]
+        for k in range(x.size):
+            v, d = _tanh_and_slope_inline(x[k])
+            value[k] = scale * v
+            derivative[k] = scale * d
+
+
+_squash_kernel = jit(_squash, parallel=True)
+
+
+def appearance_forward(
+    colour_coefficients: FloatArray, phi_bar: FloatArray, beta: float
+) -> tuple[FloatArray, AppearanceSaved]:
+    """Equation (2): residual = beta tanh(A phi_bar(t)) / Y00.
+
+    colour_coefficients  (3, 2F, N)  A, dimensionless; [colour channel, atom, Gaussian]
+    phi_bar              (2F,)       normalised atoms of equation (1b) at this time
+    beta                 ()          bound of the residual, display units [0, 1], > 0
+    returns              (3, N) residual in units of the degree-0 harmonic coefficient, |residual| <= beta / Y00,
+                         dtype of A; and the saved tuple
+    Reverse: appearance_reverse, below.
+    Edges:   A = 0 gives exactly 0, so the base colour is bitwise unchanged; a saturated residual is finite and
+             its derivative keeps its digits up to |A phi_bar| = 350 (float64) and 43 (float32).
+    Raises:  ValueError if the shapes do not fit or beta is not finite and positive.
+    Oracle:  tests/oracle/residuals_oracle.py
+    """
+    if not (math.isfinite(beta) and beta > 0):
+        raise ValueError(f"beta {beta}; allowed: finite, > 0")
+    argument = combine(colour_coefficients, phi_bar)
+    residual, slope = np.empty_like(argument), np.empty_like(argument)
+    _squash_kernel(argument.reshape(-1), argument.dtype.type(beta / Y00), residual.reshape(-1), slope.reshape(-1))
+    return residual, AppearanceSaved(colour_coefficients, phi_bar, slope)
+
+
+def appearance_reverse(d_residual: FloatArray, saved: AppearanceSaved) -> AppearanceGrads:
+    """Reverse of equation (2).
+
+    d_residual  (3, N)  derivative of the loss by the residual (that of the degree-0 coefficient it is added to)
+    returns     derivative by A (3, 2F, N) and by phi_bar (2F,), the latter added in float64
+    Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
+    """
+    d_argument = np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)
+    return AppearanceGrads(*spread(d_argument, saved.colour_coefficients, saved.phi_bar))

@@ -1,0 +1,95 @@
+"""Equation (7): the weight of the Laplacian loss, calibrated so that its gradient has a set share of the photometric.
+
+In: for every calibration view the RMS, over all pixels and channels, of the gradient of the whole photometric term
+and of L_lap by the unclamped render. Out: lambda_lap = r / median over the views of (g_lap / g_rgb). Knows nothing of
+the trainer, which renders the views.
+
+For a mean-L1 loss these RMS values depend on how many residuals are nonzero, not on their size: the ratio says how
+concentrated the two gradients are.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import CalibrationError
+
+
+class ViewGradients(NamedTuple):
+    """Gradient sizes of one calibration view."""
+
+    name: str  # frame name, for the table
+    photometric: float  # g_rgb, RMS of d photometric / d render
+    laplacian: float  # g_lap, RMS of d L_lap / d render
+
+
+class Calibration(NamedTuple):
+    """The calibrated weight and where it comes from."""
+
+    lambda_lap: float
+    ratios: NDArray[np.float64]  # (valid views,)  g_lap / g_rgb, in the order of the views
+    table: str  # one line a view: name, g_rgb, g_lap, ratio or why it was dropped
+
+
+def rms(gradient: NDArray[np.floating]) -> float:
+    """Root mean square over all entries, added in float64; 0 for an empty array."""
+    flat = np.asarray(gradient, np.float64).reshape(-1)
+    return math.sqrt(float(np.mean(flat * flat))) if flat.size else 0.0
+
+
+def calibration_views(n_train: int, count: int) -> NDArray[np.int64]:
+    """Positions, within the training frames, of the views to calibrate on: round(linspace(0, n_train - 1, count)).
+
+    n_train  number of training frames, >= 0; fewer than `count` gives each of them once
+    returns  ascending, without repeats
+    """
+    if n_train <= 0 or count <= 0:
+        return np.zeros(0, np.int64)
+    return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(np.int64))
+
+
+def _verdict(view: ViewGradients) -> str:
+    """Why a view cannot be used; empty when it can."""
+    if not (math.isfinite(view.photometric) and math.isfinite(view.laplacian)):
+        return "gradient not finite"
+    if view.photometric <= 0:
+        return "no photometric gradient"
+    if view.laplacian < 0:
+        return "negative RMS"
+    if not math.isfinite(view.laplacian / view.photometric):
+        return "ratio overflows"
+    return ""
+
+
+def calibrate(views: Iterable[ViewGradients | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
+    """Equation (7): lambda_lap = r / median_v(g_lap,v / g_rgb,v).
+
+    views           per view its name, g_rgb and g_lap (loss per display unit)
+    gradient_ratio  r > 0, the share the detail gradient shall have of the photometric one
+    returns         lambda_lap (linear in r), the ratios of the valid views, a printable table
+    Edges:          a view with g_rgb = 0 or a gradient that is not finite is dropped; an even number of views
+                    takes the mean of the middle two.
+    Raises:         CalibrationError with the table if no view is valid or the median is 0; ValueError for r <= 0.
+    Oracle:         tests/oracle/calibration_oracle.py
+    """
+    if not (math.isfinite(gradient_ratio) and gradient_ratio > 0):
+        raise ValueError(f"gradient ratio {gradient_ratio}; allowed: finite, > 0")
+    ratios = []
+    lines = [f"{'view':<24} {'g_rgb':>12} {'g_lap':>12}  g_lap/g_rgb"]
+    for view in (ViewGradients(*v) for v in views):
+        dropped = _verdict(view)
+        ratio = "" if dropped else f"{view.laplacian / view.photometric:.6g}"
+        lines.append(f"{view.name:<24} {view.photometric:>12.5g} {view.laplacian:>12.5g}  {ratio or dropped}")
+        if not dropped:
+            ratios.append(view.laplacian / view.photometric)
+    table = "\n".join(lines)
+    if not ratios:
+        raise CalibrationError(f"calibration: none of the {len(lines) - 1} views is valid\n{table}")
+    median = float(np.median(ratios))
+    weight = gradient_ratio / median if median > 0 else math.inf
+    if not math.isfinite(weight):
+        raise CalibrationError(f"calibration: the median of g_lap/g_rgb is {median:.3g}\n{table}")
+    return Calibration(weight, np.array(ratios, np.float64), table)

@@ -1,0 +1,52 @@
+"""Equation (3): the translation residual of component S, a Fourier series of every Gaussian's centre.
+
+In: coefficients C (3, 2F, N) in scene units and the RAW atoms phi(t) (2F,). Out: translations (3, N) in scene
+units, added to the deformed centre. The atoms are not normalised: the penalty of equation (4) is invariant to the
+phase of a sine/cosine pair, and centring or scaling the two atoms of a pair differently would break that.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.equations.atom_sums import combine, spread
+
+FloatArray = NDArray[np.floating]
+
+
+class MotionSaved(NamedTuple):
+    """References to the inputs of the forward pass."""
+
+    motion_coefficients: FloatArray  # (3, 2F, N)
+    phi: FloatArray  # (2F,)
+
+
+class MotionGrads(NamedTuple):
+    """Derivative by the coefficients and by the atoms."""
+
+    motion_coefficients: FloatArray  # (3, 2F, N)
+    phi: FloatArray  # (2F,)
+
+
+def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[FloatArray, MotionSaved]:
+    """Equation (3): translation = C phi(t).
+
+    motion_coefficients  (3, 2F, N)  C, scene units; [axis, atom, Gaussian]
+    phi                  (2F,)       raw atoms of equation (1) at this time
+    returns              (3, N) translation, scene units, dtype of C; and the saved tuple
+    Reverse: motion_reverse, below.
+    Edges:   C = 0 gives exactly 0; N = 0 works.
+    Raises:  ValueError if the shapes do not fit.
+    Oracle:  tests/oracle/residuals_oracle.py
+    """
+    return combine(motion_coefficients, phi), MotionSaved(motion_coefficients, phi)
+
+
+def motion_reverse(d_translation: FloatArray, saved: MotionSaved) -> MotionGrads:
+    """Reverse of equation (3).
+
+    d_translation  (3, N)  derivative of the loss by the translation, loss / scene unit
+    returns        derivative by C (3, 2F, N) and by phi (2F,), the latter added in float64
+    """
+    return MotionGrads(*spread(d_translation, saved.motion_coefficients, saved.phi))
