@@ -1,1 +1,6 @@
-"""Sequences with known truth (geometry, motion, light, masks, depth), each effect a separate switch."""
+"""Sequences with known truth: a deforming tissue sheet under an endoscope, each effect a separate switch."""
+
+from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
+from endotsr.simulator.simulate import SimulatedSequence, Truth, simulate
+
+__all__ = ["EFFECTS", "SimulatedSequence", "SimulatorSettings", "Truth", "simulate", "with_effects"]
