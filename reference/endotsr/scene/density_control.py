@@ -1,0 +1,215 @@
+"""Density control, equation (B11): where the picture pulls hard on Gaussians, make more; where they are faint, remove.
+
+In: Gaussians, their Adam moments and gathered screen gradients. Out: new ones, every array gathered by one index,
+so that lengths always agree. This module knows no renderer and no iteration number.
+
+Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
+gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
+`dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
+removed. Scales are canonical, not deformed. Children inherit every other array; their moments start at zero.
+Clones are not split in the same call.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from endotsr.config import DensityConfig
+from endotsr.errors import InputError
+from endotsr.fitting.adam import AdamState
+from endotsr.jit import jit
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.splatting.camera import Camera, camera_centre
+
+FloatArray = NDArray[np.floating]
+IndexArray = NDArray[np.intp]
+
+CHILDREN = 2  # of a split Gaussian
+SHRINK = 0.8 * CHILDREN  # the children's semi-axes are 1/1.6 of the parent's
+CAMERA_MARGIN = 1.1  # of the extent measured from cameras
+LARGEST_LOG_SCALE = 40.0  # beyond it a semi-axis is cut off before it is exponentiated
+
+
+class DensityStatistics(NamedTuple):
+    """Screen gradients gathered since the last densification; changed in place."""
+
+    gradient_sum: NDArray[np.float64]  # (N,) sum of gradient norms, loss per NDC unit
+    visits: NDArray[np.int64]  # (N,) number of views in which the Gaussian was visible
+
+
+class Densified(NamedTuple):
+    """Result of `densify`; counts refer to the Gaussians before it."""
+
+    gaussians: Gaussians
+    adam: AdamState
+    statistics: DensityStatistics  # all zero
+    cloned: int
+    split: int
+    pruned: int
+
+
+def empty_statistics(count: int) -> DensityStatistics:
+    """Zeros for N Gaussians."""
+    return DensityStatistics(np.zeros(count, np.float64), np.zeros(count, np.int64))
+
+
+def gather_statistics(
+    statistics: DensityStatistics, d_mean: FloatArray, visible: NDArray[np.bool_], width: int, height: int
+) -> None:
+    """Add one view: norm of (g_u W/2, g_v H/2) for every visible Gaussian, in place.
+
+    d_mean   (2, N) gradient by the projected centre, loss per pixel
+    visible  (N,) bool; the others gain neither gradient nor visit
+    """
+    if d_mean.shape != (2, visible.size) or visible.shape != statistics.visits.shape:
+        raise ValueError(f"statistics of {statistics.visits.size}, got {d_mean.shape} gradients, {visible.shape} flags")
+    g_x, g_y = d_mean[0] * np.float64(0.5 * width), d_mean[1] * np.float64(0.5 * height)
+    statistics.gradient_sum[:] += np.where(visible, np.sqrt(g_x * g_x + g_y * g_y), 0.0)
+    statistics.visits[:] += visible
+
+
+def scene_extent(config: DensityConfig, cameras: Sequence[Camera]) -> float:
+    """The extent that separates clones from splits, scene units.
+
+    A number is used as it is. `cameras`: 1.1 x the largest distance of a camera from the mean of all cameras.
+    Raises: InputError if `cameras` is asked for and all coincide; extent 0 would split everything and clone nothing.
+    """
+    if config.extent != "cameras":
+        return float(config.extent)
+    centres = np.stack([camera_centre(c) for c in cameras]).astype(np.float64)
+    radius = float(np.linalg.norm(centres - centres.mean(axis=0), axis=1).max())
+    if not radius > 1e-9 * max(1.0, float(np.abs(centres).max())):
+        raise InputError('density.extent: "cameras" needs a moving camera, all positions coincide; give a number > 0')
+    return CAMERA_MARGIN * radius
+
+
+def densify(
+    gaussians: Gaussians,
+    adam: AdamState,
+    statistics: DensityStatistics,
+    config: DensityConfig,
+    rng: np.random.Generator,
+    extent: float,
+) -> Densified:
+    """Clone, split and prune in one gather; the inputs are left as they are.
+
+    extent   scene units, see `scene_extent`
+    returns  survivors in their old order, then clones, then first children, then second children, the last three
+             in the order of their parents; Adam moments in the same order; statistics of zeros
+
+    Edges: never visited -> gradient 0; N = 0 and pruning down to 0 are fine; when `maximum` leaves no room for
+    all, the steepest candidates go first (ties by index). Step counters of Adam are not changed.
+    Draws: one `rng.standard_normal((2, 3, S))` for S split parents, none if S = 0.
+    """
+    alive, clone, split = _choose(gaussians, statistics, config, extent)
+    keep = alive.copy()
+    keep[split] = False
+    survivors = np.flatnonzero(keep)
+    index = np.concatenate([survivors, clone, *[split] * CHILDREN])
+    result = gaussians._replace(**{name: _take(a, index, index.size) for name, a in arrays(gaussians).items()})
+    if split.size:
+        _place_children(result, gaussians, split, rng)
+    moments = [
+        {name: _take(array, index, survivors.size) for name, array in group.items()}
+        for group in (adam.first, adam.second)
+    ]
+    pruned = gaussians.count - int(alive.sum())
+    return Densified(
+        result,
+        AdamState(moments[0], moments[1], dict(adam.step)),
+        empty_statistics(index.size),
+        clone.size,
+        split.size,
+        pruned,
+    )
+
+
+def _choose(
+    gaussians: Gaussians, statistics: DensityStatistics, config: DensityConfig, extent: float
+) -> tuple[NDArray[np.bool_], IndexArray, IndexArray]:
+    """Who stays (N,) bool, and the indices of those to clone and to split, ascending."""
+    if statistics.visits.size != gaussians.count:
+        raise ValueError(f"statistics of {statistics.visits.size} for {gaussians.count} Gaussians")
+    alive = ~_fainter_than(gaussians.opacity_logit, config.prune_opacity)
+    steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
+    candidates = np.flatnonzero(alive & (steepness >= config.gradient_threshold))
+    room = max(0, config.maximum - int(alive.sum()))  # a clone and a split both add one
+    if candidates.size > room:
+        steepest = np.argsort(-steepness[candidates], kind="stable")[:room]
+        candidates = np.sort(candidates[steepest])
+    largest = np.exp(np.minimum(gaussians.log_scale.max(axis=0), LARGEST_LOG_SCALE).astype(np.float64))
+    small = largest[candidates] <= config.dense_fraction * extent
+    return alive, candidates[small], candidates[~small]
+
+
+def _fainter_than(logit: FloatArray, opacity: float) -> NDArray[np.bool_]:
+    """Whether sigmoid(logit) < opacity, decided on the logit so that nothing overflows."""
+    if opacity <= 0.0:
+        return np.zeros(logit.shape, bool)
+    bound = np.log(opacity) - np.log1p(-opacity) if opacity < 1.0 else np.inf
+    return logit.astype(np.float64) < bound
+
+
+def _place_children(result: Gaussians, parents: Gaussians, split: IndexArray, rng: np.random.Generator) -> None:
+    """Write position and scale of the children, the last 2 S columns: mu + R(q) (exp(s) n), s - ln 1.6."""
+    noise = rng.standard_normal((CHILDREN, 3, split.size))
+    log_scale = parents.log_scale[:, split].astype(np.float64)
+    rotation = _rotations(parents.quaternion[:, split].astype(np.float64))
+    axes = np.exp(np.clip(log_scale, -LARGEST_LOG_SCALE, LARGEST_LOG_SCALE))
+    first = result.count - CHILDREN * split.size
+    for child in range(CHILDREN):
+        columns = slice(first + child * split.size, first + (child + 1) * split.size)
+        local = axes * noise[child]
+        offset = np.stack([(rotation[row] * local).sum(axis=0) for row in range(3)])
+        result.position[:, columns] = parents.position[:, split] + offset
+        result.log_scale[:, columns] = log_scale - np.log(SHRINK)
+
+
+def _rotations(quaternion: FloatArray) -> FloatArray:
+    """Rotation matrices (3, 3, S) of raw quaternions (4, S); a zero quaternion is the identity."""
+    largest = np.abs(quaternion).max(axis=0)
+    q = np.where(largest > 0.0, quaternion / np.where(largest > 0.0, largest, 1.0), [[1.0], [0.0], [0.0], [0.0]])
+    w, x, y, z = q / np.sqrt((q * q).sum(axis=0))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _take(array: FloatArray, index: IndexArray, old: int) -> FloatArray:
+    """array[..., index] with zeros in the columns from `old` on."""
+    out = np.empty((*array.shape[:-1], index.size), array.dtype)
+    if out.size:
+        rows = array.size // array.shape[-1]
+        _take_kernel(np.ascontiguousarray(array).reshape(rows, -1), index, old, out.reshape(rows, -1))
+    return out
+
+
+def _take_rows(source, index, old, out):
+    for row in prange(source.shape[0]):
+        from_row, to_row = source[row], out[row]
+        for i in range(old):
+            to_row[i] = from_row[index[i]]
+        for i in range(old, index.size):
+            to_row[i] = from_row.dtype.type(0)
+
+
+_take_kernel = jit(_take_rows, parallel=True)
+
+
+def check_lengths(gaussians: Gaussians, adam: AdamState) -> None:
+    """Raise ValueError if an array or a moment has not N columns."""
+    for name, array in arrays(gaussians).items():
+        for what, found in (
+            (name, array),
+            (f"first {name}", adam.first.get(name)),
+            (f"second {name}", adam.second.get(name)),
+        ):
+            if found is not None and found.shape != (*array.shape[:-1], gaussians.count):
+                raise ValueError(f"{what}: {found.shape} for {gaussians.count} Gaussians")

@@ -1,0 +1,145 @@
+"""Initialisation, equation (B12): Gaussians on back-projected training pixels.
+
+From the first training frame, `first_frame_points` pixels that are tissue and have depth. From every other training
+frame k (every second frame of clips beyond 150 frames), up to int(other_frame_points / n) such pixels that were
+not seen in the first frame or whose depth moved by more than `motion_threshold`. Held-out frames are never read.
+Pixels of different frames are compared at equal image position, as the published rule does.
+
+In: a `Sequence`. Out: `Gaussians`. This module knows no optimiser.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from endotsr.config import InitialisationConfig, ModelConfig
+from endotsr.errors import InputError
+from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import backproject
+
+FloatArray = NDArray[np.floating]
+
+Y00 = 0.28209479177387814  # degree-0 harmonic, 1 / sqrt(4 pi)
+START_OPACITY = 0.1
+SQUARED_DISTANCE_FLOOR = 1e-7  # scene units squared; duplicates and single points get this
+NEIGHBOURS = 3
+LONG_CLIP = 150  # frames; beyond it every second frame is visited
+
+
+def initialise(
+    sequence: Sequence,
+    config: InitialisationConfig,
+    model: ModelConfig,
+    rng: np.random.Generator,
+    dtype: DTypeLike = np.float32,
+) -> Gaussians:
+    """Gaussians at the start of training, spectral residuals not yet allocated.
+
+    returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
+             isotropic scale = root mean squared distance to the three nearest points; FDM weights 0
+
+    Edges:  fewer pixels than asked for -> all of them; fewer than four points -> the neighbours there are; one
+            point or duplicates -> the floor of the squared distance.
+    Raises: InputError if no training pixel is tissue with depth.
+    Draws:  one `rng.choice` without replacement per visited frame that has more pixels than are wanted.
+    """
+    position, colour = training_points(sequence, config, rng)
+    return gaussians_at(position, colour, model, dtype)
+
+
+def training_points(
+    sequence: Sequence, config: InitialisationConfig, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """World positions (3, N), scene units, and display colours (3, N) in [0, 1] of the drawn pixels, float64."""
+    train = [int(k) for k in sequence.train_index]
+    if not train:
+        raise InputError("sequence: no training frame to initialise from")
+    first, count = train[0], sequence.count
+    stride = 2 if count > LONG_CLIP else 1
+    seen = _usable(sequence, first)
+    drawn = [(first, _draw(seen, config.first_frame_points, rng))]
+    for k in train[1:]:
+        if (k - first - 1) % stride == 0:
+            with np.errstate(invalid="ignore"):  # inf - inf: such pixels are not usable anyway
+                moved = np.abs(sequence.depth[k] - sequence.depth[first]) > config.motion_threshold
+            wanted = _usable(sequence, k) & (~seen | moved)
+            drawn.append((k, _draw(wanted, config.other_frame_points // count, rng)))
+    if not any(pixels.size for _, pixels in drawn):
+        raise InputError("sequence: no pixel of the training frames is tissue with depth > 0; check masks and depth")
+    points = [_lift(sequence, k, pixels) for k, pixels in drawn]
+    return np.concatenate([p for p, _ in points], axis=1), np.concatenate([c for _, c in points], axis=1)
+
+
+def _usable(sequence: Sequence, k: int) -> NDArray[np.bool_]:
+    depth = sequence.depth[k]
+    return sequence.masks[k] & (depth > 0) & np.isfinite(depth)
+
+
+def _draw(wanted: NDArray[np.bool_], number: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Up to `number` flat indices of True pixels, ascending."""
+    pixels = np.flatnonzero(wanted)
+    return pixels if pixels.size <= number else np.sort(rng.choice(pixels, number, replace=False))
+
+
+def _lift(sequence: Sequence, k: int, pixels: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+    row, column = np.divmod(pixels, sequence.width)
+    depth = sequence.depth[k, row, column].astype(np.float64)
+    colour = sequence.images[k][:, row, column] / 255.0
+    return backproject(sequence.cameras[k], column.astype(np.float64), row.astype(np.float64), depth), colour
+
+
+def gaussians_at(position: FloatArray, colour: FloatArray, model: ModelConfig, dtype: DTypeLike) -> Gaussians:
+    """Fresh Gaussians at given world positions (3, N) with display colours (3, N) in [0, 1]."""
+    count = position.shape[1]
+    real: Any = np.dtype(dtype).type
+    quaternion = np.zeros((4, count), real)
+    quaternion[0] = 1.0
+    harmonics = np.zeros(((model.harmonics_degree + 1) ** 2, 3, count), real)
+    harmonics[0] = (colour - 0.5) / Y00
+    half_log = 0.5 * np.log(np.maximum(squared_neighbour_distance(position), SQUARED_DISTANCE_FLOOR))
+    gaussians = Gaussians(
+        position=np.ascontiguousarray(position, real),
+        quaternion=quaternion,
+        log_scale=np.tile(half_log.astype(real), (3, 1)),
+        opacity_logit=np.full(count, np.log(START_OPACITY / (1.0 - START_OPACITY)), real),
+        harmonics=harmonics,
+    )
+    if not model.deformation:
+        return gaussians
+    shape = (DEFORMATION_CHANNELS, model.bases, count)
+    centre = np.broadcast_to(np.linspace(0.0, 1.0, model.bases)[:, None], shape)
+    return gaussians._replace(
+        fdm_weight=np.zeros(shape, real),
+        fdm_centre=np.ascontiguousarray(centre, real),
+        fdm_width=np.full(shape, model.initial_width, real),
+    )
+
+
+def squared_neighbour_distance(position: FloatArray) -> FloatArray:
+    """Mean squared distance (N,) of every point (3, N) to its three nearest others; 0 where there is no other."""
+    from scipy.spatial import KDTree
+
+    points = np.ascontiguousarray(position.T, np.float64)
+    others = min(NEIGHBOURS, len(points) - 1)
+    if others < 1:
+        return np.zeros(len(points))
+    # The nearest of k + 1 is the point itself or a duplicate of it: distance 0 either way.
+    distance = KDTree(points).query(points, k=others + 1)[0][:, 1:]
+    return (distance**2).mean(axis=1)
+
+
+def activate_residuals(gaussians: Gaussians, frequencies: int, appearance: bool, spectral_motion: bool) -> Gaussians:
+    """The same Gaussians with zero residual coefficients (3, 2 F, N) for the components that are on.
+
+    Zero coefficients render the same picture bit by bit. Arrays that exist already are kept.
+    """
+    shape = (3, 2 * frequencies, gaussians.count)
+    dtype = gaussians.position.dtype
+    colour, motion = gaussians.colour_coefficients, gaussians.motion_coefficients
+    if appearance and colour is None:
+        colour = np.zeros(shape, dtype)
+    if spectral_motion and motion is None:
+        motion = np.zeros(shape, dtype)
+    return gaussians._replace(colour_coefficients=colour, motion_coefficients=motion)
