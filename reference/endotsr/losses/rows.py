@@ -1,0 +1,51 @@
+"""What the image losses share: one sum over a row, the count of tissue pixels, and the check of shapes.
+
+A loss is a sum over (channel, row) of float64 row totals. Every row is summed in the same order whatever the
+number of threads, and the row totals are added by one thread, so a loss is bitwise reproducible.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.jit import jit_inline
+
+FloatArray = NDArray[np.floating]
+BoolArray = NDArray[np.bool_]
+
+
+def _row_total(row):
+    """Sum of a row in float64. Four running sums hide the latency of the addition; their order is fixed."""
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    whole = row.size - row.size % 4
+    for i in range(0, whole, 4):
+        first += row[i]
+        second += row[i + 1]
+        third += row[i + 2]
+        fourth += row[i + 3]
+    for i in range(whole, row.size):
+        first += row[i]
+    return (first + second) + (third + fourth)
+
+
+row_total = jit_inline(_row_total)
+
+
+def check_image(name: str, image: FloatArray, mask: BoolArray) -> FloatArray:
+    """`image` (C, H, W) as a contiguous array. Raises ValueError unless its H, W are those of the boolean mask."""
+    check_mask(mask)
+    if image.ndim != 3 or image.shape[1:] != mask.shape:
+        raise ValueError(f"{name} has shape {image.shape}; expected (C, {mask.shape[0]}, {mask.shape[1]})")
+    return np.ascontiguousarray(image)
+
+
+def check_plane(name: str, plane: NDArray, shape: tuple[int, ...]) -> NDArray:
+    """`plane` (H, W) as a contiguous array. Raises ValueError for another shape."""
+    if plane.shape != shape:
+        raise ValueError(f"{name} has shape {plane.shape}; expected {shape}")
+    return np.ascontiguousarray(plane)
+
+
+def check_mask(mask: BoolArray) -> None:
+    """Raises ValueError unless `mask` is a boolean (H, W) array: True is tissue, never 255 or a soft value."""
+    if mask.dtype != np.bool_ or mask.ndim != 2:
+        raise ValueError(f"mask must be boolean (H, W), got {mask.dtype} {mask.shape}")

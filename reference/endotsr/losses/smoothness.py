@@ -1,0 +1,198 @@
+"""Smoothness terms (B9): smooth depth on tissue away from edges, small total variation under the instruments.
+
+    L = S(D) + f TV((1 - M) D) + f TV((1 - M) I)
+
+S    sum over horizontal and vertical pairs of (D_a - D_b)^2 v_a v_b / (sum v + 1e-6), v = tissue and no edge
+TV   sum over horizontal and vertical pairs of |x_a - x_b| / (C H W)
+
+A pair across the mask border is kept: tissue counts as 0 in (1 - M) x, so the border is a step to zero with a
+gradient. Edges come as a boolean array from outside (the edge detector is not differentiated); depth keeps its units.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from endotsr.jit import jit, jit_inline
+from endotsr.losses.rows import BoolArray, FloatArray, check_image, check_plane, row_total
+
+FEW_PIXELS = 1e-6  # keeps S finite without valid pixels
+
+
+class SmoothnessSaved(NamedTuple):
+    """The inputs of the loss; pair differences are taken again in the reverse pass."""
+
+    rendered_depth: FloatArray  # (H, W)
+    rendered: FloatArray  # (C, H, W)
+    mask: BoolArray  # (H, W)
+    smooth: BoolArray  # (H, W)  v: tissue and no edge
+    total_variation_factor: float
+
+
+class SmoothnessGrads(NamedTuple):
+    """Derivatives of the loss by its two differentiable inputs."""
+
+    rendered: FloatArray  # (C, H, W)
+    rendered_depth: FloatArray  # (H, W)
+
+
+def smoothness_forward(
+    rendered_depth: FloatArray,
+    rendered: FloatArray,
+    mask: BoolArray,
+    edges: BoolArray,
+    total_variation_factor: float,
+) -> tuple[float, SmoothnessSaved]:
+    """Smoothness loss (B9), in units of squared depth. See the module text.
+
+    rendered_depth          (H, W)     scene units, as rendered
+    rendered                (C, H, W)  display units, not clamped
+    mask                    (H, W)     bool, True = tissue
+    edges                   (H, W)     bool, True = an edge of the depth image: no smoothing across it
+    total_variation_factor  f, 30 in SurgicalGS; 0 leaves the two TV terms out
+    returns                 (loss, saved); summed in float64
+
+    Reverse: `smoothness_reverse`; subgradient 0 where a TV pair is equal.
+    Edges:   all tissue: TV is 0; no tissue: S is 0; one pixel: no pairs, 0.
+    Raises:  ValueError for shapes that do not match.
+    Oracle:  tests/oracle/losses.py; skimage's total variation is isotropic and not comparable.
+    Source:  SurgicalGS's depth smoothness and masked total variation.
+    """
+    rendered = check_image("rendered", rendered, mask)
+    depth = check_plane("rendered_depth", rendered_depth, mask.shape)
+    smooth = mask & ~check_plane("edges", edges, mask.shape)
+    mask = np.ascontiguousarray(mask)
+    saved = SmoothnessSaved(depth, rendered, mask, smooth, float(total_variation_factor))
+    loss = _squared_steps_kernel(depth, smooth) * _smooth_weight(smooth)
+    if saved.total_variation_factor != 0:
+        loss += saved.total_variation_factor * (_total_variation(depth[None], mask) + _total_variation(rendered, mask))
+    return loss, saved
+
+
+def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads:
+    """Derivatives by the rendered depth (both terms) and the rendered image (TV only)."""
+    depth, rendered, factor = saved.rendered_depth, saved.rendered, saved.total_variation_factor
+    d_depth, d_rendered = np.zeros_like(depth), np.zeros_like(rendered)
+    if factor != 0:
+        d_variation = float(d_loss) * factor
+        _variation_reverse_kernel(depth[None], saved.mask, depth.dtype.type(d_variation / depth.size), d_depth[None])
+        _variation_reverse_kernel(rendered, saved.mask, rendered.dtype.type(d_variation / rendered.size), d_rendered)
+    twice = depth.dtype.type(2 * float(d_loss) * _smooth_weight(saved.smooth))
+    _squared_steps_reverse_kernel(depth, saved.smooth, twice, d_depth)
+    return SmoothnessGrads(rendered=d_rendered, rendered_depth=d_depth)
+
+
+def _smooth_weight(smooth: BoolArray) -> float:
+    return 1.0 / (np.count_nonzero(smooth) + FEW_PIXELS)
+
+
+def _total_variation(image: FloatArray, mask: BoolArray) -> float:
+    """TV((1 - M) image), dimension of the image."""
+    totals = np.empty(image.shape[0] * image.shape[1])
+    _variation_kernel(image, mask, totals)
+    return float(totals.sum()) / image.size
+
+
+def _variation(image, mask, totals):
+    """Sum of |step| to the right and downwards, per (channel, row)."""
+    channels, height, width = image.shape
+    zero = image.dtype.type(0)
+    for index in numba.prange(channels * height):
+        channel, y = index // height, index % height
+        line, other, steps = np.empty(width, image.dtype), np.empty(width, image.dtype), np.empty(width, image.dtype)
+        _outside_tissue(image[channel, y], mask[y], line)
+        steps[width - 1] = zero
+        for i in range(width - 1):
+            steps[i] = abs(line[i + 1] - line[i])
+        if y + 1 < height:
+            below, tissue_below = image[channel, y + 1], mask[y + 1]
+            _outside_tissue(below, tissue_below, other)
+            for i in range(width):
+                steps[i] += abs(other[i] - line[i])
+        totals[index] = row_total(steps)
+
+
+def _variation_reverse(image, mask, weight, d_image):
+    """Adds weight x (sign of the steps that end here - sign of the steps that start here) outside tissue."""
+    channels, height, width = image.shape
+    zero = image.dtype.type(0)
+    for index in numba.prange(channels * height):
+        channel, y = index // height, index % height
+        line, other, slope = np.empty(width, image.dtype), np.empty(width, image.dtype), np.zeros(width, image.dtype)
+        _outside_tissue(image[channel, y], mask[y], line)
+        for i in range(width - 1):
+            slope[i] = _sign(line[i] - line[i + 1])
+        for i in range(width - 1):
+            slope[i + 1] += _sign(line[i + 1] - line[i])
+        for neighbour in (y - 1, y + 1):
+            if 0 <= neighbour < height:
+                _outside_tissue(image[channel, neighbour], mask[neighbour], other)
+                for i in range(width):
+                    slope[i] += _sign(line[i] - other[i])
+        out, tissue = d_image[channel, y], mask[y]
+        for i in range(width):
+            change = weight * slope[i]
+            out[i] += zero if tissue[i] else change
+
+
+def _outside_tissue(row, tissue, out):
+    for i in range(out.size):
+        value = row[i]  # loaded before the choice, so that the loop is one select per lane
+        out[i] = row.dtype.type(0) if tissue[i] else value
+
+
+def _sign(value):
+    """-1, 0 or 1 in the type of `value`."""
+    one, zero = type(value)(1), type(value)(0)
+    return one if value > zero else (-one if value < zero else zero)
+
+
+def _squared_steps(depth, smooth):
+    """Sum over pairs of smooth neighbours of their squared difference."""
+    height, width = depth.shape
+    zero = depth.dtype.type(0)
+    steps = np.zeros(width, depth.dtype)
+    total = 0.0
+    for y in range(height):
+        row, use = depth[y], smooth[y]
+        for i in range(width - 1):
+            step = row[i + 1] - row[i]
+            squared = step * step
+            steps[i] = squared if use[i] & use[i + 1] else zero
+        steps[width - 1] = zero
+        if y + 1 < height:
+            below, use_below = depth[y + 1], smooth[y + 1]
+            for i in range(width):
+                step = below[i] - row[i]
+                squared = step * step
+                steps[i] += squared if use[i] & use_below[i] else zero
+        total += row_total(steps)
+    return total
+
+
+def _squared_steps_reverse(depth, smooth, twice, d_depth):
+    """Adds twice x (sum over smooth neighbours of own depth - neighbour's depth)."""
+    height, width = depth.shape
+    zero = depth.dtype.type(0)
+    for y in range(height):
+        row, use, out = depth[y], smooth[y], d_depth[y]
+        for i in range(width - 1):
+            change = twice * (row[i] - row[i + 1])
+            out[i] += change if use[i] & use[i + 1] else zero
+        for i in range(width - 1):
+            change = twice * (row[i + 1] - row[i])
+            out[i + 1] += change if use[i] & use[i + 1] else zero
+        for neighbour in (y - 1, y + 1):
+            if 0 <= neighbour < height:
+                other, use_other = depth[neighbour], smooth[neighbour]
+                for i in range(width):
+                    change = twice * (row[i] - other[i])
+                    out[i] += change if use[i] & use_other[i] else zero
+
+
+_outside_tissue, _sign = jit_inline(_outside_tissue), jit_inline(_sign)
+_squared_steps_kernel = jit(_squared_steps)
+_squared_steps_reverse_kernel = jit(_squared_steps_reverse)
+_variation_kernel = jit(_variation, parallel=True)
+_variation_reverse_kernel = jit(_variation_reverse, parallel=True)

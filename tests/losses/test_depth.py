@@ -1,0 +1,123 @@
+"""Normalised depth loss (B8)."""
+
+import numpy as np
+import pytest
+
+from endotsr.losses.depth import FEWEST_VALID, depth_target, normalised_depth_forward, normalised_depth_reverse
+from losses.made_up_images import tool_mask
+from oracle import losses as oracle
+
+
+def depths(seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(40, 70, (12, 17)), rng.uniform(40, 70, (12, 17))
+
+
+def loss_and_gradient(rendered, prior, mask, d_loss=1.0):
+    loss, saved = normalised_depth_forward(rendered, depth_target(prior, mask))
+    return loss, normalised_depth_reverse(d_loss, saved)
+
+
+@pytest.mark.parametrize("under_mask", [False, True])
+def test_equals_the_oracle(under_mask):
+    rendered, prior = depths()
+    mask = tool_mask()
+    rendered[(5, 12) if under_mask else (0, 3)] = 80.0  # the largest depth, on the tool or on tissue
+    loss, gradient = loss_and_gradient(rendered, prior, mask)
+    expected, expected_gradient = oracle.normalised_depth(rendered, prior, mask)
+    assert loss == pytest.approx(expected, rel=1e-13)
+    np.testing.assert_allclose(gradient, expected_gradient, rtol=1e-12, atol=0)
+    assert (gradient[5, 12] != 0) == under_mask
+
+
+def test_scale_of_either_depth_does_not_matter():
+    """The loss is homogeneous of degree 0 in the render: <gradient, render> = 0."""
+    rendered, prior = depths()
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    scaled, _ = loss_and_gradient(3.7 * rendered, 0.2 * prior, tool_mask())
+    assert scaled == pytest.approx(loss, rel=1e-13)
+    assert abs((gradient * rendered).sum()) <= 1e-14 * np.abs(gradient * rendered).sum()
+
+
+def test_hard_D3_gradient_of_the_maximum_is_split_between_ties():
+    rendered, prior = depths()
+    rendered[2, 2] = rendered[0, 9] = 90.0
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    expected, expected_gradient = oracle.normalised_depth(rendered, prior, tool_mask())
+    assert loss == pytest.approx(expected, rel=1e-13)
+    np.testing.assert_allclose(gradient, expected_gradient, rtol=1e-12, atol=0)
+
+
+def test_hard_D3_an_empty_render_has_no_loss():
+    _, prior = depths()
+    for rendered in (np.zeros((12, 17)), np.full((12, 17), -1.0), np.full((12, 17), np.nan)):
+        loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+        assert loss == 0.0
+        assert not gradient.any()
+
+
+@pytest.mark.parametrize("none", [0.0, -5.0, np.nan, np.inf, -np.inf])
+def test_hard_D4_no_prior_means_no_residual(none):
+    rendered, prior = depths()
+    prior[:4] = none
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    with_zero, gradient_with_zero = loss_and_gradient(
+        rendered, np.where(np.arange(12)[:, None] < 4, 0, prior), tool_mask()
+    )
+    assert loss == with_zero > 0
+    assert np.array_equal(gradient, gradient_with_zero)
+    assert np.count_nonzero(gradient[:4]) <= 1  # at most the pixel that holds the maximum
+
+
+def test_hard_D4_fewer_than_ten_valid_pixels():
+    rendered, prior = depths()
+    mask = np.zeros((12, 17), bool)
+    mask.flat[: FEWEST_VALID - 1] = True
+    loss, gradient = loss_and_gradient(rendered, prior, mask)
+    assert loss == 0.0
+    assert not gradient.any()
+    mask.flat[FEWEST_VALID - 1] = True
+    loss, gradient = loss_and_gradient(rendered, prior, mask)
+    assert loss > 0
+    assert gradient.any()
+
+
+@pytest.mark.parametrize("prior", [np.zeros((12, 17)), np.full((12, 17), np.nan)])
+def test_hard_D4_no_prior_at_all(prior):
+    loss, gradient = loss_and_gradient(depths()[0], prior, tool_mask())
+    assert loss == 0.0
+    assert not gradient.any()
+
+
+def test_hard_D5_constant_depths_agree():
+    loss, gradient = loss_and_gradient(np.full((12, 17), 55.0), np.full((12, 17), 20.0), tool_mask())
+    assert loss == 0.0
+    assert not gradient.any()
+
+
+def test_hard_D6_depths_above_255_are_not_wrapped():
+    rendered, prior = depths()
+    loss, _ = loss_and_gradient(rendered, prior, tool_mask())
+    assert loss_and_gradient(rendered + 300, prior + 300, tool_mask())[0] != loss
+    assert loss_and_gradient(8 * rendered, 8 * prior, tool_mask())[0] == loss
+
+
+def test_hard_L6_bad_values_under_the_mask_are_not_the_maximum():
+    rendered, prior = depths()
+    rendered[0, 3] = 90.0
+    mask = tool_mask()
+    loss, gradient = loss_and_gradient(rendered, prior, mask)
+    for bad in (np.nan, np.inf):
+        other, other_gradient = loss_and_gradient(np.where(mask, rendered, bad), prior, mask)
+        assert other == loss
+        assert np.array_equal(other_gradient[mask], gradient[mask])
+        assert not other_gradient[~mask].any()
+
+
+def test_float32():
+    rendered, prior = (a.astype(np.float32) for a in depths())
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    wide, wide_gradient = loss_and_gradient(rendered.astype(float), prior.astype(float), tool_mask())
+    assert gradient.dtype == np.float32
+    assert abs(loss - wide) <= 4 * 2.0**-24
+    np.testing.assert_allclose(gradient, wide_gradient, rtol=1e-5, atol=0)

@@ -1,0 +1,156 @@
+"""Masked SSIM (B7)."""
+
+import numba
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from endotsr.losses.similarity import C1, C2, masked_ssim_forward, masked_ssim_reverse, ssim_target
+from losses.made_up_images import images, tool_mask
+from oracle import losses as oracle
+
+U32, U64 = 2.0**-24, 2.0**-53
+
+
+def ssim(rendered, observed, mask=None):
+    mask = np.ones(rendered.shape[1:], bool) if mask is None else mask
+    value, saved = masked_ssim_forward(rendered, ssim_target(observed, mask))
+    return value, masked_ssim_reverse(1.0, saved)
+
+
+def scipy_ssim(x, y, mask):
+    """The usual E[x^2] - E[x]^2 form through scipy's filter with zero padding."""
+    x, y = np.where(mask, x, 0), np.where(mask, y, 0)
+    mean = lambda image: ndimage.gaussian_filter(image, (0, 1.5, 1.5), mode="constant", radius=(0, 5, 5))
+    mx, my = mean(x), mean(y)
+    above = (2 * mx * my + C1) * (2 * (mean(x * y) - mx * my) + C2)
+    below = (mx**2 + my**2 + C1) * (mean(x * x) - mx**2 + mean(y * y) - my**2 + C2)
+    return (above / below)[:, mask].mean()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.5])
+def test_equals_the_oracle_and_scipy(noise):
+    rendered, observed = images(noise=noise)
+    mask = tool_mask()
+    value, _ = ssim(rendered, observed, mask)
+    assert value == pytest.approx(oracle.masked_ssim(rendered, observed, mask), abs=1e-14)
+    assert value == pytest.approx(scipy_ssim(rendered, observed, mask), abs=1e-11)
+
+
+def test_gradient_equals_complex_steps():
+    rendered, observed = images((2, 8, 13))
+    mask = tool_mask((8, 13))
+    expected = oracle.masked_ssim_gradient(rendered, observed, mask)
+    np.testing.assert_allclose(ssim(rendered, observed, mask)[1], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_large_image_equals_skimage_inside():
+    """Away from the border skimage's Gaussian SSIM is the same map (its window reaches 5 pixels as well)."""
+    from skimage.metrics import structural_similarity
+
+    rendered, observed = images((1, 40, 40))
+    _, full = structural_similarity(
+        rendered[0], observed[0], data_range=1, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, full=True
+    )
+    inside = np.zeros((40, 40), bool)
+    inside[5:-5, 5:-5] = True
+    value = oracle.ssim_map(rendered, observed)[:, inside].mean()
+    assert value == pytest.approx(full[inside].mean(), abs=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_hard_X1_identical_images_are_one_without_gradient(dtype):
+    image = images()[1].astype(dtype)
+    value, gradient = ssim(image, image.copy(), tool_mask())
+    assert value == 1.0
+    assert not gradient.any()
+
+
+def test_hard_X1_float32_keeps_the_variance_of_bright_even_regions():
+    """E[x^2] - E[x]^2 in float32 is off by 1e-6 where the variance is 1e-6; here 1 - SSIM keeps its digits."""
+    rng = np.random.default_rng(3)
+    observed = (0.95 + 1e-3 * rng.standard_normal((1, 24, 24))).astype(np.float32)
+    rendered = (observed + 1e-3 * rng.standard_normal(observed.shape)).astype(np.float32)
+    mask = np.zeros((24, 24), bool)
+    mask[8:16, 8:16] = True  # windows inside the image
+    everywhere = np.ones((24, 24), bool)
+    exact = oracle.ssim_map(rendered.astype(float), observed.astype(float))[:, mask].mean()
+    found = _mean_inside(rendered, observed, mask, everywhere)
+    assert abs((1 - found) - (1 - exact)) <= 40 * U32 * (1 - exact)
+
+
+def _mean_inside(rendered, observed, inside, everywhere):
+    """Mean of the map over `inside` when the images are not masked: read off the slopes of the mean by linearity."""
+    from endotsr.losses import similarity
+
+    target = similarity.ssim_target(observed, everywhere)
+    shape = (1, 34, 34)
+    difference, total = np.empty(shape, observed.dtype), np.empty(shape, observed.dtype)
+    similarity._difference_and_sum_kernel(rendered, target.image, everywhere, difference, total)
+    totals = np.empty(24)
+    slopes = np.empty((3, *shape), observed.dtype)
+    weights = similarity.window(observed.dtype)
+    similarity._similarity_kernel(difference, total, inside, weights, slopes, totals)
+    return 1 - totals.sum() / inside.sum()
+
+
+def test_hard_X1_constant_images():
+    bright, dark = np.full((1, 30, 30), 0.9, np.float32), np.full((1, 30, 30), 0.7, np.float32)
+    wide = ssim(bright.astype(float), dark.astype(float))[0]
+    assert abs(ssim(bright, dark)[0] - wide) <= 8 * U32
+
+
+def test_hard_X1_symmetric_and_bounded():
+    rendered, observed = images(noise=2.0)
+    for dtype, unit in ((np.float32, U32), (np.float64, U64)):
+        one, _ = ssim(rendered.astype(dtype), observed.astype(dtype), tool_mask())
+        other, _ = ssim(observed.astype(dtype), rendered.astype(dtype), tool_mask())
+        assert one == other
+        assert abs(ssim(-observed.astype(dtype), observed.astype(dtype))[0]) <= 1 + 4 * unit
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (3, 5), (10, 4), (11, 11)])
+def test_hard_X2_smaller_than_the_window(shape):
+    rendered, observed = images((3, *shape))
+    mask = np.ones(shape, bool)
+    value, gradient = ssim(rendered, observed, mask)
+    assert value == pytest.approx(oracle.masked_ssim(rendered, observed, mask), abs=1e-14)
+    expected = oracle.masked_ssim_gradient(rendered, observed, mask)
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_hard_X3_no_tissue_is_one_without_gradient():
+    rendered, observed = images()
+    value, gradient = ssim(rendered, observed, np.zeros(rendered.shape[1:], bool))
+    assert value == 1.0
+    assert not gradient.any()
+
+
+def test_hard_L6_nothing_under_the_mask_matters():
+    rendered, observed = images()
+    mask = tool_mask()
+    value, gradient = ssim(rendered, observed, mask)
+    for bad in (np.nan, np.inf, 1e300):
+        other, other_gradient = ssim(np.where(mask, rendered, bad), np.where(mask, observed, bad), mask)
+        assert other == value
+        assert np.array_equal(other_gradient, gradient)
+
+
+def test_float32_gradient_against_float64():
+    rendered, observed = (a.astype(np.float32) for a in images((3, 40, 50), noise=0.03))
+    mask = tool_mask((40, 50))
+    value, gradient = ssim(rendered, observed, mask)
+    wide, wide_gradient = ssim(rendered.astype(float), observed.astype(float), mask)
+    assert gradient.dtype == np.float32
+    assert abs(value - wide) <= 20 * U32 * (1 - wide)
+    assert np.linalg.norm(gradient - wide_gradient) <= 1e-5 * np.linalg.norm(wide_gradient)
+
+
+def test_same_bits_for_one_and_two_threads():
+    rendered, observed = (a.astype(np.float32) for a in images((3, 40, 33)))
+    found = []
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        found.append(ssim(rendered, observed, tool_mask((40, 33))))
+    assert found[0][0] == found[1][0]
+    assert np.array_equal(found[0][1], found[1][1])
