@@ -126,6 +126,13 @@ def test_verdict_names_the_strongest_baseline(page):
     assert "0.75 dB below" in page and "blend of two" in page and "above 1 of 2 baselines" in page
 
 
+def test_no_verdict_against_a_baseline_without_a_value():
+    """Infinite PSNR (a still scene) is no value: saying "above the strongest" would be false."""
+    data = made_up_data()
+    data.evaluation["baselines"]["temporal_mean"]["mean"]["psnr_tissue"] = None
+    assert "the model is" not in report_html(data)
+
+
 def test_frames_come_worst_first(page):
     assert re.findall(r"<summary>Frame (\d+)", page) == ["9", "17", "25", "1"]
     assert page.count("<details open>") == 3

@@ -13,6 +13,8 @@ from endotsr.evaluation.figures import ByteImage
 
 ABSENT = '<span class="absent" title="no value">&ndash;</span>'
 
+LOSSLESS_BYTES = 200_000  # raw size up to which an embedded picture is a PNG
+
 
 def text(value: Any) -> str:
     """`value` as text that is safe between tags and inside double-quoted attributes."""
@@ -67,8 +69,9 @@ def details(summary: str, content: str, opened: bool = False) -> str:
     return f"<details{' open' if opened else ''}><summary>{summary}</summary>{content}</details>"
 
 
-def image(picture: ByteImage, alternative: str, kind: str = "webp", css: str = "") -> str:
-    """An embedded picture with its size, so that the page does not jump while it loads."""
+def image(picture: ByteImage, alternative: str, css: str = "") -> str:
+    """An embedded picture with its size, so that the page does not jump while it loads; small ones are lossless."""
+    kind = "webp" if picture.size > LOSSLESS_BYTES else "png"
     address = figures.data_uri(figures.encode(picture, kind), kind)
     style = f' class="{css}"' if css else ""
     height, width = picture.shape[:2]

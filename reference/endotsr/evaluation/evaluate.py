@@ -1,0 +1,155 @@
+"""Metrics of renders against frames, the baseline rows beside them, and the dictionary that becomes metrics.json.
+
+Nothing here knows what made a render: a function from frame number to picture is all it takes, so the model, a
+baseline and the pictures of another program are measured by the same lines.
+
+A metric without a value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty mask, a
+render that is not finite) is None, never NaN, so that the result is valid JSON. Means leave such values out, and
+how many were left out is counted.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.evaluation.baselines import BASELINES, unit_image
+from endotsr.evaluation.metrics import image_metrics
+from endotsr.sequences.sequence import Sequence
+
+FloatArray = NDArray[np.floating]
+RenderFrame = Callable[[int], FloatArray]
+Metrics = dict[str, float | None]
+
+FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
+NO_WEIGHTS = "no weights file was given"
+LPIPS_KEYS = ("lpips", "lpips_symmetric")  # inputs in [0, 1], the protocol value; inputs scaled to [-1, 1]
+EVERY_TRAINING_FRAME = 6  # of the training frames that stand beside the held-out ones
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Metrics of some frames. Values are finite floats or None."""
+
+    per_frame: tuple[dict[str, Any], ...]  # {"frame", "name", "time", metric: value ...}
+    mean: Metrics  # over the frames that have a value; None if none has
+    not_finite: int  # values that were computed and are not finite
+
+    def as_dict(self) -> dict[str, Any]:
+        """Keys `mean`, `per_frame`, `not_finite`, ready for JSON."""
+        return {"mean": self.mean, "per_frame": list(self.per_frame), "not_finite": self.not_finite}
+
+
+def evaluate_frames(
+    sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: Any = None
+) -> Evaluation:
+    """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
+
+    render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
+    lpips_weights   as `endotsr.evaluation.lpips` loads them; None: the LPIPS values are None
+
+    Raises   ValueError naming the frame if a render has another shape than the frame
+    """
+    rows, bad = [], 0
+    for index in (int(i) for i in indices):
+        render, truth, mask = np.asarray(render_frame(index)), unit_image(sequence, index), sequence.masks[index]
+        if render.shape != truth.shape:
+            raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
+        found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
+        values = {key: _finite(value) for key, value in found.items()}
+        bad += sum(values[key] is None and found[key] is not None for key in found)
+        about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
+        rows.append(about | values)
+    return Evaluation(tuple(rows), means(rows), bad)
+
+
+def means(rows: list[dict[str, Any]]) -> Metrics:
+    """Mean of every metric over the rows that have a value; None if none has. The mean of a PSNR is a mean of dB."""
+    keys = [key for key in rows[0] if key not in ("frame", "name", "time")] if rows else []
+    known = {key: [row[key] for row in rows if row[key] is not None] for key in keys}
+    return {key: math.fsum(values) / len(values) if values else None for key, values in known.items()}
+
+
+def baseline_table(
+    sequence: Sequence, lpips_weights: Any = None, indices: Iterable[int] | None = None
+) -> dict[str, dict[str, Any]]:
+    """The four answers that need no model, measured like a model.
+
+    indices   frames to predict; default: all held-out frames
+    returns   baseline key -> {"label", "mean", "per_frame", "not_finite"}, in the order of BASELINES
+    """
+    wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
+    return {
+        name: {"label": label} | evaluate_frames(sequence, wanted, make(sequence), lpips_weights).as_dict()
+        for name, (label, make) in BASELINES.items()
+    }
+
+
+def training_sample(sequence: Sequence, every: int = EVERY_TRAINING_FRAME) -> list[int]:
+    """Every `every`-th training frame, from the first."""
+    return [int(i) for i in sequence.train_index[::every]]
+
+
+def evaluate_model(
+    sequence: Sequence,
+    render_frame: RenderFrame,
+    lpips_weights: Any = None,
+    lpips_reason: str = NO_WEIGHTS,
+    training: Iterable[int] | None = None,
+) -> dict[str, Any]:
+    """Everything that metrics.json says about renders of a sequence.
+
+    training   frames whose PSNR stands beside the held-out one; default `training_sample`. LPIPS is not computed
+               on them.
+    returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
+               "not_finite"}; `temporal_gap` is training minus held-out mean, metric by metric;
+               `lpips_reason` is None when LPIPS was computed
+    """
+    chosen = training_sample(sequence) if training is None else [int(i) for i in training]
+    held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights)
+    inside = evaluate_frames(sequence, chosen, render_frame)
+    baselines = baseline_table(sequence, lpips_weights)
+    return {
+        "format": FORMAT,
+        "frames": {
+            "total": len(sequence.images),
+            "training": len(sequence.train_index),
+            "held_out": [int(i) for i in sequence.test_index],
+            "training_sample": chosen,
+            "tissue_share": float(np.mean(sequence.masks)),
+        },
+        "held_out": held_out.as_dict(),
+        "training": inside.as_dict(),
+        "temporal_gap": _difference(inside.mean, held_out.mean),
+        "baselines": baselines,
+        "lpips_reason": lpips_reason if lpips_weights is None else None,
+        "not_finite": held_out.not_finite + inside.not_finite + sum(b["not_finite"] for b in baselines.values()),
+    }
+
+
+def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: Any) -> Metrics:
+    """Both LPIPS values of the pictures with excluded pixels 0, the render clipped; None without weights."""
+    if weights is None:
+        return dict.fromkeys(LPIPS_KEYS)
+    from endotsr.evaluation.lpips import lpips
+
+    shown = np.where(mask, np.clip(render, 0, 1), 0).astype(np.float32)
+    wanted = np.where(mask, truth, 0).astype(np.float32)
+    if not np.isfinite(shown).all():
+        return dict.fromkeys(LPIPS_KEYS, math.nan)
+    return {key: float(lpips(shown, wanted, weights, how)) for key, how in zip(LPIPS_KEYS, ("unit", "symmetric"))}
+
+
+def _difference(inside: Metrics, outside: Metrics) -> Metrics:
+    return {key: _minus(value, outside.get(key)) for key, value in inside.items()}
+
+
+def _minus(a: float | None, b: float | None) -> float | None:
+    return None if a is None or b is None else a - b
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
