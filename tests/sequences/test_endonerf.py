@@ -1,5 +1,6 @@
 """Reading EndoNeRF folders: what is right is read exactly, what is wrong is named."""
 
+import dataclasses
 import time
 
 import cv2
@@ -294,6 +295,30 @@ def test_bad_input_names_file_frame_and_reason(tmp_path, case):
     with pytest.raises(InputError, match=message) as caught:
         read_endonerf(tmp_path, SequenceConfig(**settings))
     assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
+
+
+def test_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
+    stamp = lambda i, kind: f"2021-03-04 12_{59 + i // 2 - 1}_{(i * 30) % 60:02d} {kind}.png"
+    written = write_synthetic_folder(tmp_path, name=stamp)
+    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)
+    (tmp_path / "masks" / stamp(4, "mask")).rename(tmp_path / "masks" / stamp(5, "mask"))
+    with pytest.raises(InputError, match=r"masks: has no file for frame 60-0 "):
+        read_endonerf(tmp_path, EVERYTHING)
+
+
+@pytest.mark.parametrize("percentiles", [(99.0, 3.0), (-1.0, 99.0), (1.0, 100.5), (float("nan"), 99.0)])
+def test_bad_percentiles_are_named(tmp_path, percentiles):
+    write_synthetic_folder(tmp_path)
+    with pytest.raises(InputError, match="depth_percentiles"):
+        read_endonerf(tmp_path, SequenceConfig(depth_percentiles=percentiles))
+
+
+def test_kept_frames_are_not_shared_with_a_changed_copy(tmp_path):
+    write_synthetic_folder(tmp_path)
+    sequence = dataclasses.replace(read_endonerf(tmp_path, EVERYTHING), keep_frames=True)
+    assert sequence.frame(1) is sequence.frame(1) and sequence.frame(1) is not sequence.frame(1, np.float64)
+    darker = dataclasses.replace(sequence, images=sequence.images // 2)
+    assert darker.frame(1).image.max() < sequence.frame(1).image.max()
 
 
 def test_missing_sequence_folder(tmp_path):

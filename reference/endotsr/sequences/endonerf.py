@@ -75,6 +75,9 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
 
     Raises:  InputError (see the module docstring).
     """
+    low, high = config.depth_percentiles
+    if not 0 <= low < high <= 100:
+        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed are two rising values in [0, 100]")
     files = select_files(folder, config)
     rows = read_pose_rows(files.poses, files.total)
     notes: list[str] = []

@@ -9,7 +9,7 @@ from endotsr.errors import InputError
 
 
 def list_pictures(folder: Path) -> list[Path]:
-    """PNG files of a folder in time order: by frame number where every name carries one, else by name.
+    """PNG files of a folder in time order: by the numbers in their names where every name has them, else by name.
 
     Raises:  InputError if the folder is missing or holds no PNG, or if two files carry the same number.
     """
@@ -28,8 +28,8 @@ def list_pictures(folder: Path) -> list[Path]:
     return [file for _, file in sorted(zip(numbers, files), key=lambda pair: pair[0])]
 
 
-def frame_numbers(files: list[Path]) -> list[int] | None:
-    """The frame number in every file name: the last group of digits that differs between the files.
+def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:
+    """The number in every file name: all groups of digits that differ between the files (several in a time stamp).
 
     None if the names carry no such number. A single file has its last group of digits.
     """
@@ -38,7 +38,9 @@ def frame_numbers(files: list[Path]) -> list[int] | None:
         return None
     columns = [[int(digits) for digits in column] for column in zip(*groups)]
     varying = [column for column in columns if len(set(column)) > 1]
-    return varying[-1] if varying else (columns[-1] if len(files) == 1 else None)
+    if len(files) == 1:
+        varying = columns[-1:]
+    return list(zip(*varying)) if varying else None
 
 
 def check_pairing(reference: list[Path], other: list[Path]) -> None:
@@ -48,14 +50,18 @@ def check_pairing(reference: list[Path], other: list[Path]) -> None:
     """
     here, there = frame_numbers(reference), frame_numbers(other)
     a, b = reference[0].parent, other[0].parent
-    if here is not None and there is not None and here != there:
+    if here and there and len(here[0]) == len(there[0]) and here != there:
         lonely = sorted(set(here) - set(there))
         if lonely:
             name = reference[here.index(lonely[0])].name
-            raise InputError(f"{b}: has no file for frame {lonely[0]} ({a.name}/{name}); {_counts(reference, other)}")
+            raise InputError(
+                f"{b}: has no file for frame {_text(lonely[0])} ({a.name}/{name}); {_counts(reference, other)}"
+            )
         surplus = sorted(set(there) - set(here))
         name = other[there.index(surplus[0])].name
-        raise InputError(f"{a}: has no file for frame {surplus[0]} ({b.name}/{name}); {_counts(reference, other)}")
+        raise InputError(
+            f"{a}: has no file for frame {_text(surplus[0])} ({b.name}/{name}); {_counts(reference, other)}"
+        )
     if len(reference) != len(other):
         raise InputError(f"{b}: the number of files does not match; {_counts(reference, other)}")
 
@@ -77,8 +83,12 @@ def _counts(a: list[Path], b: list[Path]) -> str:
     return f"{a[0].parent.name} holds {len(a)} files, {b[0].parent.name} {len(b)}"
 
 
-def _first_repeated(files: list[Path], numbers: list[int]) -> str:
-    seen: dict[int, Path] = {}
+def _text(number: tuple[int, ...]) -> str:
+    return "-".join(map(str, number))
+
+
+def _first_repeated(files: list[Path], numbers: list[tuple[int, ...]]) -> str:
+    seen: dict[tuple[int, ...], Path] = {}
     for file, number in zip(files, numbers):
         if number in seen:
             return f"{seen[number].name} and {file.name}"

@@ -43,7 +43,7 @@ class Sequence:
     test_index: NDArray[np.intp]  # ascending, disjoint from train_index
     notes: list[str] = field(default_factory=list)
     keep_frames: bool = False  # hold converted frames in memory (15 bytes a pixel in float32)
-    _kept: dict[tuple[int, str], Frame] = field(default_factory=dict, repr=False)
+    _kept: dict[tuple[int, str], Frame] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, _, height, width = self.images.shape
