@@ -165,9 +165,9 @@ def _row_moments(column_mean, column_variance, weights, mean, variance):
 def _similarity(difference, total, mask, weights, slopes, totals):
     """1 - SSIM summed along each row, and the three slope maps of the reverse pass.
 
-    With G the weight of a pixel in the mean, d loss / dx_q = sum_p w(p - q) G_p [a + 2 b (e_q - mu_e) + 2 c (s_q - mu_s)],
-    a = dSSIM/dmu_e + dSSIM/dmu_s, b = dSSIM/dsigma_e^2, c = dSSIM/dsigma_s^2, all at p. What multiplies 1, 2 e_q and
-    2 s_q is stored.
+    d sum_p SSIM_p / dx_q = sum_p w(p - q) [a + 2 b (e_q - mu_e) + 2 c (s_q - mu_s)] with, all at tissue pixel p,
+    a = dSSIM/dmu_e + dSSIM/dmu_s, b = dSSIM/dsigma_e^2, c = dSSIM/dsigma_s^2. Stored is what multiplies
+    1, 2 e_q and 2 s_q.
     """
     height, width = mask.shape
     real = difference.dtype.type
