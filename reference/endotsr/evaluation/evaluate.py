@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.evaluation.baselines import BASELINES, unit_image
-from endotsr.evaluation.metrics import image_metrics
+from endotsr.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
+from endotsr.evaluation.metrics import image_metrics, mean_metrics
 from endotsr.sequences.sequence import Sequence
 
 FloatArray = NDArray[np.floating]
@@ -25,8 +26,7 @@ RenderFrame = Callable[[int], FloatArray]
 Metrics = dict[str, float | None]
 
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
-NO_WEIGHTS = "no weights file was given"
-LPIPS_KEYS = ("lpips", "lpips_symmetric")  # inputs in [0, 1], the protocol value; inputs scaled to [-1, 1]
+LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
 EVERY_TRAINING_FRAME = 6  # of the training frames that stand beside the held-out ones
 
 
@@ -36,50 +36,52 @@ class Evaluation:
 
     per_frame: tuple[dict[str, Any], ...]  # {"frame", "name", "time", metric: value ...}
     mean: Metrics  # over the frames that have a value; None if none has
+    excluded: dict[str, int]  # metric -> frames without a value, where there are any
     not_finite: int  # values that were computed and are not finite
 
     def as_dict(self) -> dict[str, Any]:
-        """Keys `mean`, `per_frame`, `not_finite`, ready for JSON."""
-        return {"mean": self.mean, "per_frame": list(self.per_frame), "not_finite": self.not_finite}
+        """Keys `mean`, `per_frame`, `excluded`, `not_finite`, ready for JSON."""
+        return {
+            "mean": self.mean,
+            "per_frame": list(self.per_frame),
+            "excluded": self.excluded,
+            "not_finite": self.not_finite,
+        }
 
 
 def evaluate_frames(
-    sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: Any = None
+    sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: LpipsWeights | None = None
 ) -> Evaluation:
     """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
 
     render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
-    lpips_weights   as `endotsr.evaluation.lpips` loads them; None: the LPIPS values are None
+    lpips_weights   None: the LPIPS values are None
 
     Raises   ValueError naming the frame if a render has another shape than the frame
     """
-    rows, bad = [], 0
+    rows, values, bad = [], [], 0
     for index in (int(i) for i in indices):
         render, truth, mask = np.asarray(render_frame(index)), unit_image(sequence, index), sequence.masks[index]
         if render.shape != truth.shape:
             raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
         found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
-        values = {key: _finite(value) for key, value in found.items()}
-        bad += sum(values[key] is None and found[key] is not None for key in found)
+        values.append({key: _finite(value) for key, value in found.items()})
+        bad += sum(values[-1][key] is None and found[key] is not None for key in found)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        rows.append(about | values)
-    return Evaluation(tuple(rows), means(rows), bad)
-
-
-def means(rows: list[dict[str, Any]]) -> Metrics:
-    """Mean of every metric over the rows that have a value; None if none has. The mean of a PSNR is a mean of dB."""
-    keys = [key for key in rows[0] if key not in ("frame", "name", "time")] if rows else []
-    known = {key: [row[key] for row in rows if row[key] is not None] for key in keys}
-    return {key: math.fsum(values) / len(values) if values else None for key, values in known.items()}
+        rows.append(about | values[-1])
+    summary = mean_metrics(values)
+    keys = list(values[0]) if values else []
+    excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
+    return Evaluation(tuple(rows), {key: summary[key] for key in keys}, excluded, bad)
 
 
 def baseline_table(
-    sequence: Sequence, lpips_weights: Any = None, indices: Iterable[int] | None = None
+    sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
 ) -> dict[str, dict[str, Any]]:
     """The four answers that need no model, measured like a model.
 
     indices   frames to predict; default: all held-out frames
-    returns   baseline key -> {"label", "mean", "per_frame", "not_finite"}, in the order of BASELINES
+    returns   baseline key -> {"label", "mean", "per_frame", "excluded", "not_finite"}, in the order of BASELINES
     """
     wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
     return {
@@ -96,8 +98,7 @@ def training_sample(sequence: Sequence, every: int = EVERY_TRAINING_FRAME) -> li
 def evaluate_model(
     sequence: Sequence,
     render_frame: RenderFrame,
-    lpips_weights: Any = None,
-    lpips_reason: str = NO_WEIGHTS,
+    lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
 ) -> dict[str, Any]:
     """Everything that metrics.json says about renders of a sequence.
@@ -125,22 +126,17 @@ def evaluate_model(
         "training": inside.as_dict(),
         "temporal_gap": _difference(inside.mean, held_out.mean),
         "baselines": baselines,
-        "lpips_reason": lpips_reason if lpips_weights is None else None,
+        "lpips_reason": lpips_obstacle(lpips_weights, *sequence.images.shape[2:]),
         "not_finite": held_out.not_finite + inside.not_finite + sum(b["not_finite"] for b in baselines.values()),
     }
 
 
-def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: Any) -> Metrics:
+def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Metrics:
     """Both LPIPS values of the pictures with excluded pixels 0, the render clipped; None without weights."""
     if weights is None:
         return dict.fromkeys(LPIPS_KEYS)
-    from endotsr.evaluation.lpips import lpips
-
-    shown = np.where(mask, np.clip(render, 0, 1), 0).astype(np.float32)
-    wanted = np.where(mask, truth, 0).astype(np.float32)
-    if not np.isfinite(shown).all():
-        return dict.fromkeys(LPIPS_KEYS, math.nan)
-    return {key: float(lpips(shown, wanted, weights, how)) for key, how in zip(LPIPS_KEYS, ("unit", "symmetric"))}
+    shown, wanted = np.where(mask, np.clip(render, 0, 1), 0), np.where(mask, truth, 0)
+    return {key: lpips(shown, wanted, weights, how) for key, how in LPIPS_KEYS.items()}
 
 
 def _difference(inside: Metrics, outside: Metrics) -> Metrics:

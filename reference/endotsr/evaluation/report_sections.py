@@ -54,8 +54,9 @@ def _card(value: str, unit: str, label: str) -> str:
 def _verdict(data: ReportData) -> str:
     """The one sentence a reader wants: above or below what needs no model, in tissue PSNR."""
     ours = _mean(data, "held_out").get("psnr_tissue")
-    rows = [(label, mean.get("psnr_tissue")) for label, mean in _baseline_rows(data)]
-    if ours is None or not rows or any(value is None for _, value in rows):
+    means = _baseline_rows(data)
+    rows = [(label, float(mean["psnr_tissue"])) for label, mean in means if mean.get("psnr_tissue") is not None]
+    if ours is None or not rows or len(rows) < len(means):
         return ""  # a baseline without a value may be a perfect one
     label, best = max(rows, key=lambda row: row[1])
     kind, word = ("good", "above") if ours >= best else ("bad", "below")
