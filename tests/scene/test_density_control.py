@@ -158,6 +158,13 @@ def test_maximum_lets_the_steepest_in_first(rng):
     assert run(gaussians, adam, statistics, msgspec.structs.replace(CONFIG, maximum=3)).gaussians.count == 5
 
 
+def test_maximum_breaks_ties_by_index(rng):
+    gaussians, adam = make(rng, 40)
+    statistics = steep(40, *range(40))
+    result = run(gaussians, adam, statistics, msgspec.structs.replace(CONFIG, maximum=45))
+    np.testing.assert_array_equal(result.gaussians.position[:, 40:], gaussians.position[:, :5])
+
+
 def test_statistics_are_in_NDC_units_and_count_visible_views():
     statistics = empty_statistics(3)
     d_mean = np.array([[3.0, 1.0, 0.0], [4.0, 1.0, 0.0]], np.float32)

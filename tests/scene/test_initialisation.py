@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from data_folder import data_folder
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.errors import InputError
 from endotsr.scene.initialisation import (
@@ -97,7 +98,7 @@ def test_other_frames_give_moved_or_newly_visible_pixels_only():
     sequence = make(count=5, test=(1,))
     sequence.masks[0, 0, 0] = False  # newly visible in the others
     sequence.depth[0, 0, 1] = 0.0  # no depth in the first
-    sequence.depth[2, 3, 3] = 91.0  # moved by 41
+    sequence.depth[2, 3, 3] = np.nextafter(np.float32(90.0), np.float32(91.0))  # moved by just more than 40
     sequence.depth[2, 3, 4] = 90.0  # moved by exactly the threshold: not moved
     sequence.masks[3, 0, 0] = False
     position, _ = points(sequence, first_frame_points=1, other_frame_points=5000)
@@ -189,6 +190,20 @@ def test_activation_allocates_zeros_for_what_is_on():
     assert one.colour_coefficients is None and one.motion_coefficients is not None
     both.motion_coefficients[:] = 1.0
     assert activate_residuals(both, 8, True, True).motion_coefficients is both.motion_coefficients
+
+
+@pytest.mark.data
+def test_pulling_sequence_starts_with_the_published_counts():
+    """35 000 + up to 79 from each of the 54 other training frames of 63."""
+    from endotsr.config import SequenceConfig
+    from endotsr.sequences.endonerf import read_endonerf
+
+    sequence = read_endonerf(data_folder("endonerf_pulling"), SequenceConfig())
+    gaussians = initialise(sequence, InitialisationConfig(), MODEL, np.random.default_rng(0))
+    assert 35_000 < gaussians.count <= 35_000 + 79 * 54
+    assert all(a is None or np.isfinite(a).all() for a in gaussians)
+    u, v, z = project(sequence.cameras[0], gaussians.position.astype(np.float64))
+    assert ((0 < u) & (u < sequence.width) & (0 < v) & (v < sequence.height) & (z > sequence.near)).all()
 
 
 def test_settings_of_the_paper():
