@@ -48,7 +48,7 @@ def _exp_nonpositive(z):
     """
     real = type(z)
     z = real(SATURATED) if z > real(SATURATED) else z
-    k = math.floor(z * real(LOG2_E))
+    k = real(math.floor(z * real(LOG2_E)))
     r = (z - k * real(LN2_HIGH)) - k * real(LN2_LOW)
     return exp2_nonpositive(-k) * exp2_nonpositive(-(r * real(LOG2_E)))
 
