@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from endotsr.config import PAPER, PRESETS, SHARP, Config
+from endotsr.config import DEMO, PAPER, PRESETS, SHARP, Config, with_iterations
 from endotsr.splatting import settings as raster
 
 ROOT = Path(__file__).parent.parent
@@ -154,3 +154,7 @@ def test_run_presets_equal_the_table():
     for key, *values in rows:
         for name, text in zip(header[1:], values, strict=True):
             assert documented_value(text) == settings_by_key(PRESETS[name])[key]
+
+
+def test_the_demo_preset_is_the_published_schedule_stretched():
+    assert msgspec.structs.replace(DEMO, preset="paper") == with_iterations(PAPER, 600)
