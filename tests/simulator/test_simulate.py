@@ -133,6 +133,27 @@ def test_exposure_is_one_gain_for_all_pixels_in_linear_light():
         assert np.median(ratio) == pytest.approx(gain, abs=0.01)
 
 
+def test_noise_has_its_deviation_and_belongs_to_seed_and_frame(still):
+    def noise(seed):
+        quiet = msgspec.structs.replace(STILL, seed=seed)
+        noisy = simulate(with_effects(quiet, "noise")).sequence.images
+        clean = still.sequence.images if seed == SMALL.seed else simulate(quiet).sequence.images
+        return np.where((clean > 20) & (clean < 235), noisy.astype(float) - clean, 0.0)
+
+    first, second = noise(SMALL.seed), noise(SMALL.seed + 1)
+    assert first[first != 0].size and np.std(first[:, :, 5:]) == pytest.approx(0.01 * 255, rel=0.1)
+    for other in (first[1], second[0]):
+        assert abs(np.corrcoef(first[0].ravel(), other.ravel())[0, 1]) < 0.1
+
+
+def test_depth_errors_leave_the_truth_exact(still):
+    one = simulate(with_effects(SMALL, "depth_errors"))
+    strip = round(0.07 * 48)
+    assert (one.sequence.depth[:, :, :strip] == 0).all() and (one.sequence.depth[:, :, strip:] > 0).all()
+    np.testing.assert_array_equal(one.truth.depth, still.truth.depth)
+    assert np.std((one.sequence.depth - one.truth.depth)[:, :, strip:]) == pytest.approx(0.5, rel=0.05)
+
+
 def test_motions_start_from_rest():
     for effect in ("breathing", "pulsation", "pull"):
         assert all(motion.course(0.0) == 0.0 for motion in make_surface(with_effects(SMALL, effect)).motions)
