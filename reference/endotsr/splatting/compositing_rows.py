@@ -122,7 +122,7 @@ _spread_kernel = jit(_spread)
 def _blend_row(buffer, base, dx0, a2, row2, slope_dy, record, log2_cutoff, stop, alpha_max):
     """Blend one Gaussian into LANES pixels of one row."""
     real = buffer.dtype.type
-    zero, one = real(0), real(1)
+    zero = real(0)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
     for lane in range(LANES):
         j = base + _U64(lane)
@@ -147,7 +147,7 @@ _blend_row_kernel = jit(_blend_row, contract=True)
 
 def _blend(records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
     real = records.dtype.type
-    half, one, zero = real(0.5), real(1), real(0)
+    half, one = real(0.5), real(1)
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
     height, width = depth.shape

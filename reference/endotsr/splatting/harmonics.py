@@ -183,7 +183,7 @@ def _colour_reverse_blocks(
 
 
 def _direction_to_position_block(degree, d, weight, d_position, d_centre):
-    """From direction to position: project out the radial part, divide by the distance; the centre gets minus the sum."""
+    """From direction to position: drop the radial part, divide by the distance; the centre gets minus the sum."""
     real = d.dtype.type
     zero = real(0)
     d_centre[0] = d_centre[1] = d_centre[2] = zero
@@ -197,7 +197,11 @@ def _direction_to_position_block(degree, d, weight, d_position, d_centre):
     for i in range(gx.size):
         x, y, z, inverse = d[0, i], d[1, i], d[2, i], d[3, i]
         along = gx[i] * x + gy[i] * y + gz[i] * z
-        gx[i], gy[i], gz[i] = (gx[i] - along * x) * inverse, (gy[i] - along * y) * inverse, (gz[i] - along * z) * inverse
+        gx[i], gy[i], gz[i] = (
+            (gx[i] - along * x) * inverse,
+            (gy[i] - along * y) * inverse,
+            (gz[i] - along * z) * inverse,
+        )
         d_centre[0] -= gx[i]
         d_centre[1] -= gy[i]
         d_centre[2] -= gz[i]

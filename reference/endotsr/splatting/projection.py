@@ -6,7 +6,6 @@ non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_
 loses every digit for a needle seen at an angle.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -141,7 +140,7 @@ def _project_reverse_block(
     fx, fy = constants[0], constants[1]
     limit_x, limit_y, clamp_factor, axis_limit = constants[6], constants[7], constants[8], constants[9]
     real = position.dtype.type
-    one, two, half, zero = real(1), real(2), real(0.5), real(0)
+    one, two, zero = real(1), real(2), real(0)
     jw = np.empty((2, 3), position.dtype)
     d_jw = np.empty((2, 3), position.dtype)
     for i in range(position.shape[1]):
@@ -195,9 +194,10 @@ def _project_reverse_block(
         power_y = two if free_y else clamp_factor
         d_x = -fx * inverse_z2 * d_j02 if free_x else zero
         d_y = -fy * inverse_z2 * d_j12 if free_y else zero
-        d_z = inverse_z2 * (
-            fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11)
-        ) + d_depth[i]
+        d_z = (
+            inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))
+            + d_depth[i]
+        )
         d_u, d_v = d_mean2d[0, i] * fx * inverse_z, d_mean2d[1, i] * fy * inverse_z
         d_x += d_u
         d_y += d_v

@@ -1,0 +1,136 @@
+"""The moving scene: raw Gaussians at time t, every component of the model applied, and the way back.
+
+    mu(t) = mu + psi_mu(t) + C phi(t)       q(t) = q + psi_q(t)       s(t) = s + psi_s(t)
+    h_0(t) = h_0 + beta tanh(A phi_bar(t)) / Y00
+
+A component whose arrays are None is not evaluated and gets no gradient array. Comes in: `Gaussians` and a
+time; goes out: the `Scene` that the rasteriser takes, or gradients by field name.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from endotsr.config import Config, ModelConfig
+from endotsr.equations.appearance import AppearanceSaved, appearance_forward, appearance_reverse
+from endotsr.equations.deformation import DeformationSaved, deformation_forward
+from endotsr.equations.fourier import AtomStatistics, atom_statistics, dictionary_forward, frequencies, normalised_atoms
+from endotsr.equations.matern import matern_weights
+from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderGrads, RenderOut, Scene, render_forward
+from endotsr.splatting.settings import PRESETS, RasterSettings
+
+FloatArray = NDArray[np.floating]
+
+
+class Spectral(NamedTuple):
+    """What the Fourier components share: fixed by the configuration and the training times."""
+
+    omega: NDArray[np.float64]  # (F,) cycles per sequence
+    statistics: AtomStatistics  # mean and RMS of the atoms over the training times
+    rho: NDArray[np.float64]  # (F,) Matern weights of the penalty, mean 1
+
+
+class SceneSaved(NamedTuple):
+    """Saved tuples of the components that were evaluated."""
+
+    deformation: DeformationSaved | None
+    appearance: AppearanceSaved | None
+    motion: MotionSaved | None
+
+
+class SceneGrads(NamedTuple):
+    """Gradients by the raw parameters; `offsets` is what the FDM's reverse pass takes."""
+
+    by_field: dict[str, FloatArray]  # every field but the three of the FDM
+    offsets: FloatArray | None  # (10, N)
+
+
+def spectral_from(model: ModelConfig, train_times: NDArray[np.floating], dtype: DTypeLike = np.float64) -> Spectral:
+    """Frequencies, atom statistics over the TRAINING times only, and Matern weights; computed in float64.
+
+    train_times  (n,) normalised times of the training frames
+    """
+    del dtype  # the atoms are formed in float64 and rounded once, where they meet the coefficients
+    omega = frequencies(model.frequencies, model.frequency_min, model.frequency_max, np.float64)
+    statistics = atom_statistics(np.asarray(train_times, np.float64), omega)
+    return Spectral(omega, statistics, matern_weights(omega, model.correlation_length))
+
+
+def raster_settings(config: Config) -> RasterSettings:
+    """The rasteriser preset of a configuration with its near plane."""
+    return PRESETS[config.raster.preset]._replace(near=config.raster.near)
+
+
+def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float) -> tuple[Scene, SceneSaved]:
+    """The Gaussians at time t (normalised; any value, in [0, 1] meant).
+
+    Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
+    """
+    position, quaternion, log_scale = gaussians.position, gaussians.quaternion, gaussians.log_scale
+    dtype = position.dtype
+    deformation = motion = appearance = residual = None
+    if gaussians.fdm_weight is not None:
+        assert gaussians.fdm_centre is not None and gaussians.fdm_width is not None
+        offsets, deformation = deformation_forward(
+            gaussians.fdm_weight, gaussians.fdm_centre, gaussians.fdm_width, t, model.basis
+        )
+        position = position + offsets[POSITION_CHANNELS]
+        quaternion = quaternion + offsets[QUATERNION_CHANNELS]
+        log_scale = log_scale + offsets[LOG_SCALE_CHANNELS]
+    if gaussians.motion_coefficients is not None:
+        phi, _ = dictionary_forward(t, spectral.omega)
+        translation, motion = motion_forward(gaussians.motion_coefficients, phi.astype(dtype))
+        position = position + translation
+    if gaussians.colour_coefficients is not None:
+        phi_bar = normalised_atoms(t, spectral.omega, spectral.statistics)
+        residual, appearance = appearance_forward(gaussians.colour_coefficients, phi_bar.astype(dtype), model.beta)
+    scene = Scene(position, quaternion, log_scale, gaussians.opacity_logit, gaussians.harmonics, residual)
+    return scene, SceneSaved(deformation, appearance, motion)
+
+
+def scene_reverse(grads: RenderGrads, saved: SceneSaved) -> SceneGrads:
+    """From gradients by the deformed scene to gradients by the raw parameters (all additions are pre-activation)."""
+    by_field = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
+    by_field["harmonics"] = grads.harmonics
+    if saved.appearance is not None:
+        assert grads.residual is not None
+        by_field["colour_coefficients"] = appearance_reverse(grads.residual, saved.appearance).colour_coefficients
+    if saved.motion is not None:
+        by_field["motion_coefficients"] = motion_reverse(grads.position, saved.motion).motion_coefficients
+    offsets = None
+    if saved.deformation is not None:
+        offsets = np.concatenate([grads.position, grads.quaternion, grads.log_scale])
+    return SceneGrads(by_field, offsets)
+
+
+def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:
+    """The same Gaussians with the named spectral components taken out."""
+    if not appearance:
+        gaussians = gaussians._replace(colour_coefficients=None)
+    return gaussians if spectral_motion else gaussians._replace(motion_coefficients=None)
+
+
+def render_at(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    config: Config,
+    camera: Camera,
+    t: float,
+    *,
+    background: FloatArray | None = None,
+    appearance: bool = True,
+    spectral_motion: bool = True,
+) -> RenderOut:
+    """Render the trained scene at any time in [0, 1] from any camera.
+
+    appearance, spectral_motion   False leaves that component out, to see what it contributes
+    returns                       colour (3, H, W), depth (H, W), opacity (H, W)
+    """
+    chosen = without(gaussians, appearance=appearance, spectral_motion=spectral_motion)
+    scene, _ = scene_at(chosen, spectral, config.model, t)
+    degree = config.model.harmonics_degree  # bands that are not active yet hold zeros
+    return render_forward(scene, camera, raster_settings(config), degree=degree, background=background)[0]

@@ -1,0 +1,134 @@
+"""The objective of one training view, equation (6), and its gradient by the rendered images.
+
+L = (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_msp L_msp + lambda_lap(iteration) L_lap
+
+The spectral penalty acts on coefficients, not on images, and is added by the trainer.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config, LossConfig
+from endotsr.equations.calibration import Calibration, ViewGradients, calibrate, calibration_views, rms
+from endotsr.equations.laplacian import (
+    LEVELS,
+    SupportMasks,
+    laplacian_loss_forward,
+    laplacian_loss_reverse,
+    support_masks,
+)
+from endotsr.fitting.model import Spectral, render_at
+from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.similarity import SsimTarget, masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
+from endotsr.opencv import canny_edges
+from endotsr.scene.gaussians import Gaussians
+from endotsr.sequences.sequence import Frame, Sequence
+from endotsr.splatting.render import RenderOut
+
+FloatArray = NDArray[np.floating]
+
+
+class Targets(NamedTuple):
+    """What the losses need of one frame; made once and kept. A term that is off has None."""
+
+    image: FloatArray  # (3, H, W) observed, 0 outside the tissue
+    mask: NDArray[np.bool_]  # (H, W) True = tissue
+    ssim: SsimTarget | None
+    depth: DepthTarget | None
+    supports: SupportMasks | None
+
+
+class LossWeights(NamedTuple):
+    """Weights in force at one iteration; 0 = the term is not evaluated."""
+
+    ssim: float
+    depth: float
+    smoothness: float
+    laplacian: float
+
+
+class ImageLoss(NamedTuple):
+    """Value, terms and gradient by the images."""
+
+    loss: float
+    terms: dict[str, float]  # l1, ssim, depth, smoothness, laplacian: unweighted; only those evaluated
+    d_colour: FloatArray  # (3, H, W)
+    d_depth: FloatArray  # (H, W)
+
+
+def frame_targets(frame: Frame, config: Config) -> Targets:
+    """Masked target image, depth target and pyramid supports of one frame."""
+    target = ssim_target(frame.image, frame.mask)  # also the one copy of the image, zero outside the tissue
+    laplacian = config.model.laplacian
+    return Targets(
+        target.image,
+        target.mask,
+        target if config.loss.ssim_weight > 0 else None,
+        depth_target(frame.depth, frame.mask) if config.loss.depth_weight > 0 else None,
+        support_masks(frame.mask, LEVELS, config.loss.upsampling) if laplacian else None,
+    )
+
+
+def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -> ImageLoss:
+    """(1 - w) masked L1 + w (1 - masked SSIM) and its gradient by the unclamped render."""
+    l1, l1_saved = masked_l1_forward(colour, targets.image, targets.mask)
+    loss, terms = (1.0 - ssim_weight) * l1, {"l1": l1}
+    d_colour = masked_l1_reverse(1.0 - ssim_weight, l1_saved)
+    if ssim_weight > 0 and targets.ssim is not None:
+        ssim, ssim_saved = masked_ssim_forward(colour, targets.ssim)
+        loss += ssim_weight * (1.0 - ssim)
+        terms["ssim"] = ssim
+        d_colour += masked_ssim_reverse(-ssim_weight, ssim_saved)
+    return ImageLoss(loss, terms, d_colour, np.zeros((0, 0), colour.dtype))
+
+
+def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig) -> ImageLoss:
+    """All image terms of equation (6) for one view.
+
+    Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
+    """
+    loss, terms, d_colour, _ = photometric_loss(rendered.colour, targets, weights.ssim)
+    d_depth = np.zeros_like(rendered.depth)
+    if weights.depth > 0 and targets.depth is not None:
+        value, saved = normalised_depth_forward(rendered.depth, targets.depth)
+        loss += weights.depth * value
+        terms["depth"] = value
+        d_depth = normalised_depth_reverse(weights.depth, saved)
+    if weights.smoothness > 0:
+        edges = canny_edges(rendered.depth)
+        factor = config.total_variation_factor
+        value, saved = smoothness_forward(rendered.depth, rendered.colour, targets.mask, edges, factor)
+        loss += weights.smoothness * value
+        terms["smoothness"] = value
+        smooth = smoothness_reverse(weights.smoothness, saved)
+        d_colour += smooth.rendered
+        d_depth += smooth.rendered_depth
+    if weights.laplacian > 0 and targets.supports is not None:
+        value, saved = laplacian_loss_forward(rendered.colour, targets.image, targets.supports, config.upsampling)
+        loss += weights.laplacian * value
+        terms["laplacian"] = value
+        d_colour += laplacian_loss_reverse(weights.laplacian, saved)
+    return ImageLoss(loss, terms, d_colour, d_depth)
+
+
+def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, config: Config) -> Calibration:
+    """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
+
+    Raises: CalibrationError with a per-view table when no view gives a ratio.
+    """
+    chosen = sequence.train_index[calibration_views(len(sequence.train_index), config.loss.calibration_views)]
+    views = []
+    for index in chosen:
+        frame = sequence.frame(int(index), gaussians.position.dtype)
+        rendered = render_at(gaussians, spectral, config, frame.camera, frame.time)
+        targets = frame_targets(frame, config)
+        supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)
+        photometric = photometric_loss(rendered.colour, targets, config.loss.ssim_weight)
+        _, saved = laplacian_loss_forward(rendered.colour, targets.image, supports, config.loss.upsampling)
+        laplacian = laplacian_loss_reverse(1.0, saved)
+        views.append(ViewGradients(sequence.names[int(index)], rms(photometric.d_colour), rms(laplacian)))
+    return calibrate(views, config.loss.gradient_ratio)

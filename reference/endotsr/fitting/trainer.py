@@ -1,0 +1,315 @@
+"""The training: one view an iteration, on the published schedule (specification, equation 6 and B10-B12).
+
+`TrainingState` is all that a run carries from one iteration to the next, and all that a checkpoint holds;
+everything else (targets, atoms, rates) is a function of the state, the sequence and the configuration. So a
+resumed run equals an uninterrupted one bit by bit, and no result depends on the number of threads.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config
+from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
+from endotsr.fitting.adam import AdamState, Rate, adam_state, adam_update, add_array
+from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
+from endotsr.fitting.deformation_step import NAMES as FDM_FIELDS
+from endotsr.fitting.deformation_step import deformation_adam_step
+from endotsr.fitting.model import (
+    SceneGrads,
+    SceneSaved,
+    Spectral,
+    raster_settings,
+    scene_at,
+    scene_reverse,
+    spectral_from,
+)
+from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
+from endotsr.fitting.schedules import (
+    active_degree,
+    densify_now,
+    detail_share,
+    learning_rates,
+    residuals_born,
+    smoothness_active,
+    statistics_active,
+)
+from endotsr.scene.density_control import (
+    DensityStatistics,
+    densify,
+    empty_statistics,
+    gather_statistics,
+    scene_extent,
+)
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.initialisation import activate_residuals, initialise
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.render import RenderOut, render_forward, render_reverse
+
+FloatArray = NDArray[np.floating]
+OnIteration = Callable[[dict[str, Any]], None]
+
+PSNR_EVERY = 10  # iterations between training PSNRs in the log: the figure costs a pass over the image
+
+
+class Timer(Protocol):
+    """What a benchmark hands in to see where the time goes."""
+
+    def mark(self, stage: str) -> None:
+        """The stage of this name has just ended."""
+
+
+class _NoTimer:
+    def mark(self, stage: str) -> None:
+        """Nothing to measure."""
+
+
+NO_TIMER = _NoTimer()
+
+
+@dataclass
+class TrainingState:
+    """Everything that a run carries from one iteration to the next."""
+
+    gaussians: Gaussians
+    adam: AdamState
+    iteration: int  # completed iterations
+    rng: np.random.Generator
+    statistics: DensityStatistics
+    lambda_lap: float | None  # full detail weight; None until an `auto` weight is calibrated
+
+
+@dataclass
+class Workshop:
+    """What an iteration needs beside the state: functions of the sequence and the configuration."""
+
+    sequence: Sequence
+    config: Config
+    spectral: Spectral
+    extent: float
+    targets: dict[int, Targets]  # by frame, filled at first use
+
+    def targets_of(self, index: int) -> Targets:
+        """The loss targets of a frame, made once."""
+        if index not in self.targets:
+            self.targets[index] = frame_targets(self.sequence.frame(index, self.config.training.precision), self.config)
+        return self.targets[index]
+
+
+def workshop(sequence: Sequence, config: Config) -> Workshop:
+    """Spectral constants and scene extent of a sequence."""
+    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+    extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
+    return Workshop(sequence, config, spectral, extent, {})
+
+
+def new_training(sequence: Sequence, config: Config) -> TrainingState:
+    """Initialise from the training frames, seeded. Raises InputError when the frames hold no usable pixel."""
+    rng = np.random.default_rng(config.training.seed)
+    gaussians = initialise(sequence, config.initialisation, config.model, rng, np.dtype(config.training.precision))
+    weight = config.loss.lambda_lap
+    return TrainingState(
+        gaussians,
+        adam_state(arrays(gaussians)),
+        0,
+        rng,
+        empty_statistics(gaussians.count),
+        None if weight == "auto" else float(weight),
+    )
+
+
+def save_state(path: Path, state: TrainingState, config: Config) -> None:
+    """Write a checkpoint, atomically. Raises OSError (the previous one is then intact)."""
+    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap}
+    generator = dict(state.rng.bit_generator.state)
+    save_checkpoint(path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header)
+
+
+def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
+    """The state as it was saved."""
+    rng = np.random.default_rng()
+    rng.bit_generator.state = checkpoint.rng_state
+    weight = checkpoint.header.get("lambda_lap")
+    if weight is None and config.loss.lambda_lap != "auto":
+        weight = float(config.loss.lambda_lap)
+    return TrainingState(
+        checkpoint.gaussians, checkpoint.adam, checkpoint.iteration, rng, checkpoint.statistics, weight
+    )
+
+
+def train(
+    state: TrainingState,
+    sequence: Sequence,
+    config: Config,
+    on_iteration: OnIteration,
+    on_checkpoint: Callable[[TrainingState], None],
+    *,
+    on_message: Callable[[str], None] = print,
+) -> TrainingState:
+    """Run to `config.training.iterations`; the state is changed in place and returned.
+
+    With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
+    That pre-training is not checkpointed: interrupted, it starts again and gives the same weight.
+    Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite.
+    """
+    if state.lambda_lap is None and config.model.laplacian:
+        on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
+        state.lambda_lap = calibrated_weight(sequence, config)
+        on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
+    shop = workshop(sequence, config)
+    while state.iteration < config.training.iterations:
+        on_iteration(training_step(state, shop))
+        if state.iteration % config.training.checkpoint_every == 0:
+            on_checkpoint(state)
+    return state
+
+
+def calibrated_weight(sequence: Sequence, config: Config) -> float:
+    """lambda_lap of equation (7): base model (no A, S, L) to iteration K_s on this sequence, then calibrate."""
+    model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
+    loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
+    base = msgspec.structs.replace(config, model=model, loss=loss)
+    shop, state = workshop(sequence, base), new_training(sequence, base)
+    while state.iteration < config.training.residual_activation:
+        training_step(state, shop)
+    return calibrate_on(state.gaussians, shop.spectral, sequence, base).lambda_lap
+
+
+def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
+    """One iteration; returns its log entry."""
+    config, iteration = shop.config, state.iteration + 1
+    if residuals_born(iteration, config):
+        _give_birth(state, config)
+    index, t = _draw_view(state.rng, shop)
+    targets = shop.targets_of(index)
+    camera = shop.sequence.cameras[index]
+    timer.mark("view")
+    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t)
+    timer.mark("scene")
+    settings = raster_settings(config)
+    rendered, render_saved = render_forward(scene, camera, settings, degree=active_degree(iteration, config))
+    timer.mark("render")
+    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss)
+    timer.mark("losses")
+    grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved)
+    timer.mark("render reverse")
+    if statistics_active(iteration, config):
+        gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
+    back = scene_reverse(grads, scene_saved)
+    penalty = _add_spectral_penalty(state.gaussians, shop, back)
+    timer.mark("scene reverse")
+    entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
+    dense = densify_now(iteration, config)
+    if not (dense and config.optimiser.legacy_skip):
+        _optimise(state, scene_saved, back, learning_rates(iteration, config), config)
+    timer.mark("optimiser")
+    if dense:
+        _control_density(state, shop)
+        timer.mark("density control")
+    state.iteration = iteration
+    return entry
+
+
+def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
+    """A training frame, uniform with replacement, and its time (jittered when asked for)."""
+    index = int(shop.sequence.train_index[rng.integers(len(shop.sequence.train_index))])
+    t = float(shop.sequence.times[index])
+    jitter = shop.config.training.time_jitter
+    return index, t + jitter * rng.uniform(-0.5, 0.5) / shop.sequence.count if jitter > 0 else t
+
+
+def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
+    share = detail_share(iteration, config)
+    smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
+    full = state.lambda_lap or 0.0
+    return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, share * full)
+
+
+def _give_birth(state: TrainingState, config: Config) -> None:
+    """The spectral residuals begin: zero coefficients, fresh moments, step 0."""
+    model = config.model
+    state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
+    for name in ("colour_coefficients", "motion_coefficients"):
+        array = getattr(state.gaussians, name)
+        if array is not None:
+            add_array(state.adam, name, array)
+
+
+def _add_spectral_penalty(gaussians: Gaussians, shop: Workshop, back: SceneGrads) -> float | None:
+    """Add the gradient of lambda_msp L_msp to that of C; the penalty itself, None without component S."""
+    coefficients = gaussians.motion_coefficients
+    if coefficients is None:
+        return None
+    weight = shop.config.loss.lambda_msp
+    penalty, saved = matern_penalty_forward(coefficients, shop.spectral.rho)
+    if weight > 0:
+        back.by_field["motion_coefficients"] += matern_penalty_reverse(weight, saved)
+    return penalty
+
+
+def _optimise(
+    state: TrainingState, saved: SceneSaved, back: SceneGrads, rates: dict[str, Rate], config: Config
+) -> None:
+    """Adam on every array; the FDM's reverse pass is fused with its step."""
+    o = config.optimiser
+    adam_update(state.adam, arrays(state.gaussians), back.by_field, rates, o.beta1, o.beta2, o.epsilon)
+    if saved.deformation is not None:
+        assert back.offsets is not None
+        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
+        deformation_adam_step(back.offsets, saved.deformation, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
+
+
+def _control_density(state: TrainingState, shop: Workshop) -> None:
+    """Clone, split and prune; statistics start anew."""
+    result = densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
+    state.gaussians, state.adam, state.statistics = result.gaussians, result.adam, result.statistics
+
+
+def _log_entry(
+    iteration: int,
+    index: int,
+    loss: ImageLoss,
+    penalty: float | None,
+    rendered: RenderOut,
+    targets: Targets,
+    state: TrainingState,
+    config: Config,
+) -> dict[str, Any]:
+    """What the log keeps of an iteration. Raises FloatingPointError on a loss that is not finite."""
+    total = loss.loss + config.loss.lambda_msp * (penalty or 0.0)
+    if not math.isfinite(total):
+        raise FloatingPointError(f"iteration {iteration}, frame {index}: loss is {total}; terms {loss.terms}")
+    entry: dict[str, Any] = {"iteration": iteration, "frame": index, "loss": total, **loss.terms}
+    if penalty is not None:
+        entry["msp"] = penalty
+    if iteration % PSNR_EVERY == 0 or iteration == 1:
+        entry["psnr"] = tissue_psnr(rendered.colour, targets)
+    entry["gaussians"] = state.gaussians.count
+    return entry
+
+
+def tissue_psnr(colour: FloatArray, targets: Targets) -> float | None:
+    """PSNR over the tissue pixels of the clipped render, dB; None without tissue or for a perfect render."""
+    difference = np.clip(colour, 0, 1) - targets.image
+    square = np.einsum("chw,chw,hw->", difference, difference, targets.mask, dtype=np.float64)
+    count = 3 * int(np.count_nonzero(targets.mask))
+    return -10.0 * math.log10(square / count) if square > 0 and count > 0 else None
+
+
+def bench_state(gaussians: Gaussians, config: Config, iteration: int) -> TrainingState:
+    """A state at a given iteration for benchmarks and tests, with fresh moments."""
+    weight = config.loss.lambda_lap
+    return TrainingState(
+        gaussians,
+        adam_state(arrays(gaussians)),
+        iteration,
+        np.random.default_rng(config.training.seed),
+        empty_statistics(gaussians.count),
+        0.83 if weight == "auto" else float(weight),
+    )
