@@ -18,9 +18,13 @@ BASE_LABELS = [f"B{k}" for k in range(1, 13)]
 METRIC_LABELS = ["M1", "M2", "M3"]
 LABELS = [*PAPER_LABELS, *BASE_LABELS, *METRIC_LABELS]
 
-# "eq. (B5)", "equation (1b)", "Eq. (1)-(2)", "equations (1), (1b) and (2)"
-NUMBER = r"\((?:\d+[a-z]?|[BM]\d+[a-z]?)\)"
-CITATION = re.compile(rf"\b[Ee]q(?:uation)?s?\.?\s*({NUMBER}(?:(?:\s*(?:,|-|to|and|or)\s*)+{NUMBER})*)")
+# "eq. (B5)", "equation 6 and B10-B12", "specification B5", "Eq. (1)-(2)", "equations (1), (1b) and (2)"; and "(B6)" alone
+NAME = r"(?:[BM]\d+[a-z]?|\d+[a-z]?)\b"
+NUMBER = rf"(?:\({NAME}\)|{NAME})"
+CITATION = re.compile(
+    rf"\b(?:[Ee]q(?:uation)?s?\.?|[Ss]pecification,?)\s*({NUMBER}(?:(?:\s*(?:,|-|to|and|or)\s*)+{NUMBER})*)"
+)
+ALONE = re.compile(r"\(([BM]\d+[a-z]?)\)")
 
 
 def specification_text() -> str:
@@ -32,7 +36,8 @@ def labels_in(text: str) -> list[str]:
 
 
 def cited_numbers(source: str) -> set[str]:
-    return {number.strip("()") for span in CITATION.findall(source) for number in re.findall(NUMBER, span)}
+    spans = {name for span in CITATION.findall(source) for name in re.findall(NAME, span)}
+    return spans | set(ALONE.findall(source))
 
 
 def table_after(page: str, heading: str) -> list[list[str]]:
@@ -77,15 +82,9 @@ def test_every_label_has_exactly_one_display():
 
 
 def test_citations_are_recognised():
-    assert cited_numbers("see eq. (1)-(2), equation (B5) and Equations (1b), (3) and (M1)") == {
-        "1",
-        "2",
-        "B5",
-        "1b",
-        "3",
-        "M1",
-    }
-    assert cited_numbers("a shape (3) and a frequency (8)") == set()
+    text = "eq. (1)-(2), equation (B5), Equations (1b), (3) and (M1); specification B2-B4; equation 6 and B10-B12; loss (B9)"
+    assert cited_numbers(text) == {"1", "2", "B5", "1b", "3", "M1", "B2", "B4", "6", "B10", "B12", "B9"}
+    assert cited_numbers("a shape (3), a frequency (8), the specification of 2 arrays, N = 5") == set()
 
 
 def test_every_equation_cited_by_the_code_exists():
