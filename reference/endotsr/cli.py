@@ -10,7 +10,7 @@ import os
 import sys
 
 from endotsr import __version__
-from endotsr.errors import InputError
+from endotsr.errors import CalibrationError, InputError
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
@@ -34,6 +34,10 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     try:
         return _command(argv[0])(argv[1:])
+    except CalibrationError as error:
+        line, _, table = str(error).partition("\n")
+        print(table)
+        return _fail(line)
     except InputError as error:
         return _fail(str(error))
     except SystemExit as leaving:  # `--help` of a command
@@ -46,6 +50,9 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     except OSError as error:
         return _fail(os_error_line(error))
+    except FloatingPointError as error:
+        _fail(f"the training left the numbers: {error}; a smaller learning rate may help")
+        return 1
     except MemoryError:
         return _fail("not enough memory; a smaller --scale or fewer --frames needs less")
 

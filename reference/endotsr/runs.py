@@ -72,14 +72,20 @@ class RunFolder:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raises InputError if something exists where a new folder is wanted."""
-    if (Path(path) / "run.json").exists():
+    """Raises InputError if a new folder cannot be made here: something exists, or its parent takes no folder."""
+    path = Path(path)
+    if (path / "run.json").exists():
         raise InputError(
             f"{path}: holds a run already; choose another --out, or continue it with "
             f"`endotsr train --out {path} --resume`"
         )
     if os.path.lexists(path):
         raise InputError(f"{path}: exists already; choose another --out")
+    above = next(parent for parent in path.absolute().parents if parent.exists())
+    if not above.is_dir():
+        raise InputError(f"{path}: cannot be created: {above} is not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be created: no permission to write in {above}")
 
 
 def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:

@@ -13,7 +13,6 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from endotsr.config import (
-    PRESETS,
     Config,
     allowed_values,
     config_from_dict,
@@ -94,21 +93,16 @@ def with_short_names(config: Config, given: dict[str, Any]) -> Config:
     return config_from_dict(data, "command line")
 
 
-def differences(config: Config, other: Config) -> list[str]:
-    """`section.key = value (preset: its value)` for every setting that differs from `other`."""
+def differences(config: Config, other: Config, name: str) -> list[str]:
+    """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
     ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
     return [
-        f"{section}.{key} = {value!r} ({other.preset}: {theirs[section][key]!r})"
+        f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
         for section, values in ours.items()
         if isinstance(values, dict)
         for key, value in values.items()
         if value != theirs[section][key]
     ]
-
-
-def preset_of(config: Config) -> Config:
-    """The preset these settings started from."""
-    return PRESETS[config.preset]
 
 
 def _tyro(options: Any, words: list[str], **settings: Any) -> Any:

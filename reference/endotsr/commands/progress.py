@@ -1,11 +1,12 @@
 """What a person sees while a run trains: a bar on a terminal, a line now and then elsewhere."""
 
+import math
 import sys
 import time
 from typing import Any
 
 QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
-MEMORY = 0.98  # of the running means of loss and PSNR: about the last 50 views
+MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
 
 
 class Progress:
@@ -23,10 +24,11 @@ class Progress:
 
     def update(self, entry: dict[str, Any]) -> None:
         """Take in the log entry of one iteration."""
-        for name in ("loss", "psnr"):
-            value = float(entry.get(name, float("nan")))
-            if value == value:
-                self._means[name] = MEMORY * self._means.get(name, value) + (1 - MEMORY) * value
+        for name, memory in MEMORY.items():
+            value = entry.get(name)
+            if value is not None and math.isfinite(value):
+                mean = self._means.get(name)
+                self._means[name] = value if mean is None else memory * mean + (1 - memory) * value
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
@@ -40,6 +42,13 @@ class Progress:
                 file=sys.stderr,
                 flush=True,
             )
+
+    def say(self, message: str) -> None:
+        """A line that does not disturb the bar."""
+        if self._bar is not None:
+            self._bar.write(message)
+        else:
+            print(message, flush=True)
 
     def close(self) -> None:
         """Leave the bar as it is and go to the next line."""

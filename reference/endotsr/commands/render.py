@@ -101,10 +101,12 @@ def renderer(folder: RunFolder, without: tuple[str, ...] = ()):
     from endotsr.fitting.model import render_at
 
     model = load_model(folder)
-    shown = {name: name not in without for name in ("appearance", "spectral_motion")}
+    appearance, motion = "appearance" not in without, "spectral_motion" not in without
 
     def render(time: float, camera):
-        return render_at(model.gaussians, model.spectral, model.config, camera, time, **shown)
+        return render_at(
+            model.gaussians, model.spectral, model.config, camera, time, appearance=appearance, spectral_motion=motion
+        )
 
     return render
 

@@ -84,6 +84,16 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
             )
 
 
+def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
+    """The sequence that a run was trained on, from where it was or from `source`; it must be the same."""
+    record = folder.record()["input"]
+    simulator = msgspec.convert(record.get("simulator", {}), SimulatorSettings)
+    source = source or str(record["source"])
+    sequence = load_sequence(source, folder.config(), simulator)
+    check_same_input(folder, sequence, source)
+    return sequence
+
+
 def sequence_record(sequence: Sequence) -> dict[str, Any]:
     """Cameras, times, names and split, for sequence.json."""
     cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras

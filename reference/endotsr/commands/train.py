@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 import tyro
 
-from endotsr.commands.options import base_settings, differences, parse, preset_of, with_short_names
-from endotsr.config import PAPER, Config
+from endotsr.commands.options import base_settings, differences, parse, with_short_names
+from endotsr.config import PAPER, PRESETS, Config
 from endotsr.errors import InputError
 from endotsr.runs import (
     RunFolder,
@@ -119,6 +119,7 @@ def train_new(
         "finished": None,
         "seconds": 0.0,
         "iterations_done": 0,
+        "lambda_lap": None,
         "peak_memory_bytes": None,
         "seed": config.training.seed,
         "threads": threads,
@@ -150,7 +151,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     simulator = msgspec.convert(record.get("simulator", {}), SimulatorSettings)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
     asked = _settings(options)
-    for line in differences(asked, kept):
+    for line in differences(asked, kept, "run"):
         key, rest = line.split(" = ", 1)
         if key not in RESUMABLE:
             value = rest.split(" (")[0]
@@ -196,10 +197,10 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         nonlocal saved
         save_training(folder, reached, config)
         saved = reached.iteration
-        folder.update(iterations_done=saved, **_costs(offset, began))
+        folder.update(iterations_done=saved, lambda_lap=reached.lambda_lap, **_costs(offset, began))
 
     try:
-        last = train(state, sequence, config, on_iteration, on_checkpoint)
+        last = train(state, sequence, config, on_iteration, on_checkpoint, on_message=progress.say)
         if saved != last.iteration:
             on_checkpoint(last)
         folder.update(status="finished", finished=now(), iterations_done=last.iteration, **_costs(offset, began))
@@ -207,7 +208,7 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         _mark(folder, "interrupted")
         kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet, it starts again"
         raise KeyboardInterrupt(f"{kept}; continue with `endotsr train --out {folder.path} --resume`") from None
-    except OSError:
+    except (OSError, FloatingPointError):
         _mark(folder, "failed")
         raise
     finally:
@@ -228,7 +229,7 @@ def _costs(offset: float, began: float) -> dict[str, Any]:
 
 
 def _say_settings(config: Config, schedule_note: str) -> None:
-    changed = differences(config, preset_of(config))
+    changed = differences(config, PRESETS[config.preset], config.preset)
     print(f"settings: preset {config.preset}{', except' if changed else ''}")
     for line in changed:
         print(f"  {line}")

@@ -1,0 +1,58 @@
+"""`endotsr calibrate`: equation (7) on the checkpoint of a run."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from endotsr.commands.options import differences, parse, with_short_names
+from endotsr.config import PAPER, Config
+from endotsr.runs import open_run, write_json
+
+
+@dataclass
+class CalibrateOptions:
+    """The detail weight that equation (7) finds on the checkpoint of a run, with a table of its views.
+
+    The run is not changed. Every setting of the run can be replaced, such as --loss.ssim-weight 0.2.
+    """
+
+    run: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="RUN")] = None
+    """run folder"""
+    sequence: Annotated[str | None, tyro.conf.arg(metavar="SEQUENCE")] = None
+    """where the sequence of the run is now (default: where it was)"""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """also write weight, ratios and table as JSON"""
+    threads: Annotated[int | None, tyro.conf.arg(metavar="INT")] = None
+    """threads, 0 = all cores"""
+    settings: Annotated[Config, tyro.conf.arg(name="")] = PAPER
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    from endotsr.commands.sources import load_run_sequence
+    from endotsr.commands.state import load_model
+    from endotsr.commands.threads import use_threads
+    from endotsr.errors import InputError
+    from endotsr.fitting.trainer import calibrate_on
+
+    first = parse(CalibrateOptions, words, "calibrate")
+    if first.run is None:
+        raise InputError("calibrate: RUN is missing: a run folder")
+    folder = open_run(first.run)
+    kept = folder.config()
+    options = parse(CalibrateOptions, words, "calibrate", CalibrateOptions(settings=kept))
+    config = with_short_names(options.settings, {"threads": options.threads})
+    model = load_model(folder)
+    use_threads(config.training.threads)
+    sequence = load_run_sequence(folder, options.sequence)
+    found = calibrate_on(model.gaussians, model.spectral, sequence, config)
+    for line in differences(config, kept, "run"):
+        print(f"setting replaced: {line}")
+    print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")
+    print(found.table)
+    print(f"lambda_lap = {found.lambda_lap:.6g} ({len(found.ratios)} views)")
+    if options.json:
+        write_json(options.json, {"iteration": model.iteration, **found._asdict()})
+    return 0

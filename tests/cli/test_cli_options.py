@@ -1,0 +1,155 @@
+"""Where a setting comes from, and what is said when it cannot be used."""
+
+import pytest
+from tiny import assert_refused
+
+from endotsr.commands.options import base_settings, parse, with_short_names
+from endotsr.commands.train import TrainOptions
+from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config
+from endotsr.errors import InputError
+
+
+def settings(*words: str) -> Config:
+    """The settings that `endotsr train` ends up with."""
+    line = ["sequence", "--out", "run", *words]
+    base, _ = base_settings(line)
+    options = parse(TrainOptions, line, "train", TrainOptions(settings=base))
+    return with_short_names(options.settings, {"seed": options.seed, "scale": options.scale})
+
+
+def test_defaults_are_the_paper_preset():
+    assert settings() == PAPER
+
+
+def test_order_preset_file_command_line(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('preset = "sharp"\n[model]\nbeta = 0.4\ninitial_width = 0.02\n[loss]\nssim_weight = 0.3\n')
+    config = settings("--config", str(file), "--model.beta", "0.5")
+    assert config.model.beta == 0.5  # command line over file
+    assert config.model.initial_width == 0.02  # file over preset
+    assert config.loss.ssim_weight == 0.3
+    assert config.loss.lambda_lap == SHARP.loss.lambda_lap  # preset over default
+    assert config.preset == "sharp"
+
+
+def test_preset_of_the_command_line_wins_over_that_of_the_file(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('preset = "sharp"\n[model]\nbeta = 0.4\n')
+    config = settings("--config", str(file), "--preset", "paper")
+    assert config.preset == "paper" and config.model.beta == 0.4
+    assert config.model.initial_width == PAPER.model.initial_width
+
+
+def test_iterations_stretch_the_schedule():
+    config = settings("--iterations", "600")
+    assert (config.training.iterations, config.training.residual_activation) == (600, 300)
+    assert (config.loss.detail_from, config.loss.detail_full, config.density.until) == (100, 250, 400)
+
+
+def test_absolute_schedule_keeps_milestones():
+    config = settings("--iterations", "600", "--schedule", "absolute")
+    assert config.training.iterations == 600
+    assert config.loss == PAPER.loss and config.density == PAPER.density
+
+
+def test_named_milestone_is_not_stretched():
+    config = settings("--iterations", "600", "--training.residual-activation", "250")
+    assert config.training.residual_activation == 250
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--model.appearance", "false"), False),
+        (("--model.appearance=False",), False),
+        (("--model.no-appearance",), False),
+        (("--model.appearance",), True),
+        (("--model.appearance", "true"), True),
+    ],
+)
+def test_a_switch_reads_as_in_toml_or_as_a_flag(words, expected):
+    assert settings(*words).model.appearance is expected
+
+
+def test_short_names_are_settings():
+    config = settings("--seed", "5", "--scale", "0.5")
+    assert (config.training.seed, config.sequence.scale) == (5, 0.5)
+
+
+def test_number_or_word():
+    assert settings("--loss.lambda-lap", "auto").loss.lambda_lap == "auto"
+    assert settings("--loss.lambda_lap", "0.5").loss.lambda_lap == 0.5
+
+
+BAD = [
+    (["--model.basis", "cubic"], ["model.basis", "'cubic'", "quartic, gaussian"]),
+    (["--model.betta", "1"], ["unknown key model.betta", "beta"]),
+    (["--modle.beta", "1"], ["unknown key modle", "model"]),
+    (["--model.beta", "x"], ["model.beta", "'x'", "a number > 0"]),
+    (["--model.beta", "-1"], ["model.beta", "-1", "a number > 0"]),
+    (["--model.beta", "nan"], ["model.beta", "nan", "finite"]),
+    (["--loss.lambda-lap", "much"], ["loss.lambda_lap", "'much'", "a number >= 0 or auto"]),
+    (["--loss.ssim-weight", "1.5"], ["loss.ssim_weight", "1.5", "<= 1"]),
+    (["--training.seed", "1.5"], ["training.seed", "'1.5'", "an integer >= 0"]),
+    (["--seed", "-1"], ["training.seed", "-1", "an integer >= 0"]),
+    (["--masks", "tools"], ["sequence.masks", "'tools'", "masks, gt_masks"]),
+    (["--preset", "fast"], ["--preset", "'fast'", "paper"]),
+    (["--schedule", "short"], ["--schedule", "'short'", "absolute"]),
+    (["--iterations", "0"], ["--iterations", "0", ">= 1"]),
+    (["--iterations", "many"], ["--iterations", "many"]),
+    (["--config", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
+    (["--simulator.noise.on", "perhaps"], ["perhaps"]),
+    (["--simulator.noise.of", "1"], ["unknown key simulator.noise.of", "on, sigma"]),
+    (["--simulator.width", "4"], ["simulator.width", "4", ">= 16"]),
+    (["--frobnicate"], ["--frobnicate"]),
+    (["--model.frequency-max", "0.5"], ["model.frequency_max", "model.frequency_min"]),
+]
+
+
+@pytest.mark.parametrize(("words", "named"), BAD, ids=[" ".join(words) for words, _ in BAD])
+def test_unusable_setting_is_one_line(words, named, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert_refused(capsys, ["train", "simulated", "--out", str(out), *words], *named)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("[model]\nbetta = 1\n", ["unknown key model.betta", "allowed: appearance"]),
+        ("[model]\nbeta = 'x'\n", ["model.beta", "'x'", "a number > 0"]),
+        ("[model]\nbasis = 'cubic'\n", ["model.basis", "'cubic'", "quartic, gaussian"]),
+        ("[training]\nseed = true\n", ["training.seed", "True", "an integer >= 0"]),
+        ("[sequence]\ndepth_percentiles = [99, 1]\n", ["sequence.depth_percentiles", "low < high"]),
+        ("[loss]\nlambda_lap = inf\n", ["loss.lambda_lap", "finite"]),
+        ("model = 3\n", ["model", "a section of settings"]),
+        ("preset = 'fast'\n", ["preset", "'fast'", "paper, sharp"]),
+        ("beta = \n", ["not valid TOML"]),
+    ],
+)
+def test_unusable_file_is_one_line(text, named, tmp_path, capsys):
+    file = tmp_path / "bad.toml"
+    file.write_text(text)
+    words = ["train", "simulated", "--out", str(tmp_path / "run"), "--config", str(file)]
+    assert_refused(capsys, words, str(file), *named)
+    assert not (tmp_path / "run").exists()
+
+
+def test_every_setting_of_every_preset_is_read_back(tmp_path):
+    from endotsr.config import PRESETS, config_to_toml
+
+    for config in PRESETS.values():
+        file = tmp_path / "config.toml"
+        file.write_text(config_to_toml(config))
+        assert load_config(file) == config
+
+
+def test_message_of_a_wrong_section_value():
+    with pytest.raises(InputError, match=r"training\.iterations = None is not allowed; allowed: an integer >= 1"):
+        config_from_dict({"training": {"iterations": None}})
+
+
+def test_missing_words(capsys):
+    assert_refused(capsys, ["train", "simulated"], "--out")
+    assert_refused(capsys, ["train", "--out", "run"], "SEQUENCE")
+    assert_refused(capsys, ["render"], "RUN", "--out")

@@ -1,0 +1,143 @@
+"""The run folder as files: complete or absent, replaced whole, logs cut at the checkpoint."""
+
+import errno
+import json
+import os
+
+import numpy as np
+import pytest
+
+from endotsr import runs
+from endotsr.config import PAPER
+from endotsr.errors import InputError
+
+
+def created(path):
+    return runs.create_run(path, PAPER, {"seed": 0}, {"names": []})
+
+
+def test_new_folder_reads_back(tmp_path):
+    folder = created(tmp_path / "a" / "run")
+    again = runs.open_run(tmp_path / "a" / "run")
+    assert again == folder and again.config() == PAPER
+    assert again.record() == {"seed": 0} and again.sequence_record() == {"names": []}
+    assert folder.log.read_bytes() == b""
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["run"]
+
+
+@pytest.mark.parametrize("kind", ["run", "folder", "file", "dangling link"])
+def test_anything_that_exists_is_refused(kind, tmp_path):
+    path = tmp_path / "run"
+    if kind == "run":
+        created(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "file":
+        path.write_text("mine")
+    else:
+        path.symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="--resume" if kind == "run" else "exists already"):
+        created(path)
+
+
+def test_failure_while_filling_leaves_nothing(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(runs, "write_json", full)
+    with pytest.raises(OSError, match="No space"):
+        created(tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_open_refuses_what_is_not_a_run(tmp_path):
+    with pytest.raises(InputError, match="not found"):
+        runs.open_run(tmp_path / "none")
+    with pytest.raises(InputError, match=r"config\.toml is missing"):
+        runs.open_run(tmp_path)
+
+
+def test_replacing_a_file_keeps_the_old_one_on_failure(tmp_path):
+    file = tmp_path / "metrics.json"
+    runs.write_json(file, {"psnr": 1.0})
+
+    def broken(temporary):
+        temporary.write_text("{")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError):
+        runs.replace_file(file, broken)
+    assert json.loads(file.read_text()) == {"psnr": 1.0}
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_json_has_no_nan(tmp_path):
+    runs.write_json(tmp_path / "a.json", {"a": float("nan"), "b": [np.float32(np.inf), np.arange(2)], "c": tmp_path})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"a": None, "b": [None, [0, 1]], "c": str(tmp_path)}
+
+
+def log_of(path, iterations, tail=b""):
+    lines = b"".join(json.dumps({"iteration": i, "seconds": 0.5}).encode() + b"\n" for i in iterations)
+    path.write_bytes(lines + tail)
+
+
+@pytest.mark.parametrize("tail", [b"", b'{"iteration": 6, "lo', b'{"iteration": 6}', b"\x00\x00\n", b"\n"])
+def test_resumed_log_is_cut_at_the_checkpoint(tail, tmp_path):
+    path = tmp_path / "log.jsonl"
+    log_of(path, range(1, 6), tail)
+    log = runs.RunLog(path, 3)
+    assert log.seconds == 1.5
+    log.append({"iteration": 4, "loss": float("nan")})
+    log.close()
+    entries = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [entry["iteration"] for entry in entries] == [1, 2, 3, 4] and entries[-1]["loss"] is None
+
+
+def test_log_keeps_whole_lines_when_the_disk_is_full(tmp_path):
+    path = tmp_path / "log.jsonl"
+    log = runs.RunLog(path, 0)
+    log.append({"iteration": 1})
+    whole = path.read_bytes()
+
+    class HalfWritten:
+        def __init__(self, file):
+            self.file = file
+
+        def write(self, line):
+            os.write(self.file.fileno(), line[:5])
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def __getattr__(self, name):
+            return getattr(self.file, name)
+
+    log._file = HalfWritten(log._file)  # type: ignore[assignment]
+    with pytest.raises(OSError):
+        log.append({"iteration": 2})
+    assert path.read_bytes() == whole
+
+
+def test_replacing_folder_swaps_or_vanishes(tmp_path):
+    target = tmp_path / "renders"
+    with runs.replacing_folder(target) as folder:
+        (folder / "a").touch()
+    with pytest.raises(ValueError), runs.replacing_folder(target) as folder:
+        raise ValueError
+    assert [p.name for p in target.iterdir()] == ["a"]
+    with runs.replacing_folder(target) as folder:
+        (folder / "b").touch()
+    assert [p.name for p in target.iterdir()] == ["b"] and len(list(tmp_path.iterdir())) == 1
+
+
+def test_leftovers_of_a_killed_process_are_removed(tmp_path):
+    folder = created(tmp_path / "run")
+    (folder.path / ".checkpoint.npz.17.part").touch()
+    (folder.path / ".partial-9-renders").mkdir()
+    folder.remove_leftovers()
+    assert not any(p.name.startswith(".") for p in folder.path.iterdir())
+
+
+def test_machine_and_versions_say_something():
+    assert runs.machine()["cores"] >= 1 and runs.machine()["processor"]
+    assert {"endotsr", "python", "numpy", "numba"} <= set(runs.versions())
+    peak = runs.peak_memory_bytes()
+    assert peak is None or peak > 10_000_000

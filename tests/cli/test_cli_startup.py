@@ -1,0 +1,47 @@
+"""`endotsr --help` answers at once, and a command imports what it needs and no more."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from endotsr import __version__
+from endotsr.cli import COMMANDS, main
+
+HEAVY = ("numpy", "numba", "cv2", "scipy", "matplotlib", "skimage", "tyro")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], []])
+def test_overview_imports_nothing_heavy(words):
+    code = (
+        f"import sys; from endotsr.cli import main; code = main({words!r}); "
+        f"print([m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr); sys.exit(code)"
+    )
+    began = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and done.stderr.strip() == "[]"
+    assert time.monotonic() - began < 5  # 0.03 s on an idle machine; this only catches a heavy import
+
+
+def test_overview_names_every_command(capsys):
+    assert main([]) == 0
+    said = capsys.readouterr().out
+    assert all(f"  {name} " in said for name in COMMANDS)
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"endotsr {__version__}\n"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name, capsys):
+    assert main([name, "--help"]) == 0
+    assert f"endotsr {name}" in capsys.readouterr().out
+
+
+def test_unknown_command(capsys):
+    assert main(["tarin"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "'tarin'" in said and "train" in said

@@ -1,0 +1,79 @@
+"""Runs small enough for tests: a 48x32 simulated sequence, a few hundred Gaussians, 30 iterations."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.cli import main
+from endotsr.sequences.endonerf import write_endonerf
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.simulate import simulate
+
+SEQUENCE = ["--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"]
+SETTINGS = [
+    *("--iterations", "30"),
+    *("--initialisation.first-frame-points", "150"),
+    *("--initialisation.other-frame-points", "40"),
+    *("--density.interval", "5"),
+    *("--training.checkpoint-every", "7"),
+    *("--training.threads", "1"),
+]
+
+
+def train_words(out: Path, *more: str) -> list[str]:
+    """`train simulated --out OUT` with tiny settings."""
+    return ["train", "simulated", "--out", str(out), *SEQUENCE, *SETTINGS, *more]
+
+
+def run_line(capsys, *words: str) -> tuple[int, str]:
+    """Exit code and what was said on standard error."""
+    capsys.readouterr()
+    code = main(list(words))
+    return code, capsys.readouterr().err
+
+
+def assert_refused(capsys, words: list[str], *named: str) -> None:
+    """The command fails with exit code 2 and one line that holds every word of `named`."""
+    code, said = run_line(capsys, *words)
+    assert code == 2, said
+    assert said.startswith("endotsr: error: ") and said.count("\n") == 1, said
+    for word in named:
+        assert word in said, f"{word!r} not in {said!r}"
+
+
+def written_folder(root: Path) -> Path:
+    """A tiny EndoNeRF folder with 9 frames of 48x32."""
+    folder = root / "sequence"
+    write_endonerf(simulate(SimulatorSettings(width=48, height=32, frames=9)).sequence, folder)
+    return folder
+
+
+def start(words: list[str], cwd: Path) -> subprocess.Popen:
+    """The command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "endotsr.cli", *words],
+        cwd=cwd,
+        env=os.environ | {"MPLBACKEND": "Agg"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def log_without_seconds(run: Path) -> list[dict]:
+    """The log, times left out."""
+    entries = [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
+    return [{key: value for key, value in entry.items() if key != "seconds"} for entry in entries]
+
+
+def assert_same_run(a: Path, b: Path) -> None:
+    """Bitwise equal checkpoints, and equal logs but for the seconds."""
+    assert log_without_seconds(a) == log_without_seconds(b)
+    with np.load(a / "checkpoint.npz") as first, np.load(b / "checkpoint.npz") as second:
+        assert first.files == second.files
+        for key in first.files:
+            assert first[key].tobytes() == second[key].tobytes(), key
