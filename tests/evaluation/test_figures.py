@@ -66,6 +66,7 @@ def test_not_a_number_is_painted_and_draws_the_inset(frame):
     panels = figures.triptych(render, truth, mask)
     for picture in (panels.render, panels.error):
         assert tuple(picture[3, 4]) == figures.NOT_FINITE
+    assert panels.row <= 3 < panels.row + panels.height and panels.column <= 4 < panels.column + panels.width
     assert np.isfinite(panels.scale)
     assert figures.bytes_image(np.full((3, 2, 2), np.inf))[0, 0].tolist() == list(figures.NOT_FINITE)
 

@@ -16,18 +16,14 @@ and leave it to the metric to zero what is excluded in the *test* frame. On Endo
 cost 10 dB, a temporal mean that ignores the masks 1.2 dB.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-
-if TYPE_CHECKING:
-    from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.sequence import Sequence
 
 FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
