@@ -18,7 +18,7 @@ BASE_LABELS = [f"B{k}" for k in range(1, 13)]
 METRIC_LABELS = ["M1", "M2", "M3"]
 LABELS = [*PAPER_LABELS, *BASE_LABELS, *METRIC_LABELS]
 
-# "eq. (B5)", "equation 6 and B10-B12", "specification B5", "Eq. (1)-(2)", "equations (1), (1b) and (2)"; and "(B6)" alone
+# "eq. (B5)", "equation 6 and B10-B12", "specification B5", "Eq. (1)-(2)", "equations (1), (1b) and (2)"; "(B6)" alone
 NAME = r"(?:[BM]\d+[a-z]?|\d+[a-z]?)\b"
 NUMBER = rf"(?:\({NAME}\)|{NAME})"
 CITATION = re.compile(
@@ -82,7 +82,7 @@ def test_every_label_has_exactly_one_display():
 
 
 def test_citations_are_recognised():
-    text = "eq. (1)-(2), equation (B5), Equations (1b), (3) and (M1); specification B2-B4; equation 6 and B10-B12; loss (B9)"
+    text = "eq. (1)-(2), equation (B5), Equations (1b), (3) and (M1); specification B2-B4; equation 6, B10-B12; (B9)"
     assert cited_numbers(text) == {"1", "2", "B5", "1b", "3", "M1", "B2", "B4", "6", "B10", "B12", "B9"}
     assert cited_numbers("a shape (3), a frequency (8), the specification of 2 arrays, N = 5") == set()
 
