@@ -5,7 +5,7 @@ Checking a port takes one call: `check_function(forward, reverse, inputs)` answe
 
 from endotsr.checking.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair
 from endotsr.checking.precision import PrecisionReport, check_precision
-from endotsr.checking.registry import Pair, all_pairs, pair_stream
+from endotsr.checking.registry import Pair, all_pairs, one_thread, pair_stream
 from endotsr.checking.report import summary, table, to_json
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "check_function",
     "check_pair",
     "check_precision",
+    "one_thread",
     "pair_stream",
     "summary",
     "table",

@@ -17,7 +17,7 @@ def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path
     """
     from endotsr.checking.checker import check_pair
     from endotsr.checking.precision import check_precision
-    from endotsr.checking.registry import all_pairs, pair_stream
+    from endotsr.checking.registry import all_pairs, one_thread, pair_stream
     from endotsr.checking.report import summary, table, to_json
 
     pairs = all_pairs()
@@ -26,9 +26,10 @@ def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path
             raise InputError(f"gradcheck: {name!r} is not a registered stage; allowed: {', '.join(pairs)}")
     chosen = [pairs[name] for name in (names or pairs)]
     reports, precisions = [], []
-    for pair in chosen:
-        reports.append(check_pair(pair, pair_stream(pair.name, seed)))
-        precisions.append(check_precision(pair, pair_stream(pair.name, seed)))
+    with one_thread():
+        for pair in chosen:
+            reports.append(check_pair(pair, pair_stream(pair.name, seed)))
+            precisions.append(check_precision(pair, pair_stream(pair.name, seed)))
     if json_path is not None:
         try:
             Path(json_path).write_text(to_json(reports, precisions, seed), encoding="utf-8")

@@ -4,8 +4,9 @@ A pair cannot exist unchecked: `tests/test_conventions.py` asserts that every `<
 is named by a pair that `all_pairs` returns.
 """
 
+import contextlib
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -65,3 +66,16 @@ def all_pairs() -> dict[str, Pair]:
 def pair_stream(name: str, seed: int) -> np.random.Generator:
     """The random stream of one pair: depends on its name and the seed only, not on which other pairs run."""
     return np.random.default_rng([seed, *name.encode()])
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Kernels run on one thread inside: pairs are small, and waking a second thread costs more than it brings."""
+    import numba
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
