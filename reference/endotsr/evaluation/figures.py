@@ -65,8 +65,11 @@ def error_scale(errors: list[FloatArray]) -> float:
 
 
 def worst_window(error: FloatArray, height: int, width: int) -> tuple[int, int]:
-    """Top-left corner of the height x width window with the largest sum of `error` (ties: topmost, then leftmost)."""
-    finite = np.nan_to_num(error.astype(np.float64), nan=1.0, posinf=1.0)
+    """Top-left corner of the height x width window with the largest sum of `error` (ties: topmost, then leftmost).
+
+    A value that is not finite outweighs every window of errors <= 1.
+    """
+    finite = np.nan_to_num(error.astype(np.float64), nan=error.size, posinf=error.size)
     table = np.pad(finite.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     sums = table[height:, width:] - table[:-height, width:] - table[height:, :-width] + table[:-height, :-width]
     row, column = np.unravel_index(int(np.argmax(sums)), sums.shape)
