@@ -129,3 +129,9 @@ def test_refuses_masks_that_are_not_boolean():
     render, truth, mask = case()
     with pytest.raises(ValueError, match="boolean"):
         psnr(render, truth, 255 * mask.astype(np.uint8))
+
+
+def test_a_float32_truth_is_the_same_8bit_image():
+    render, truth, mask = case()
+    narrow, wide = image_metrics(render, truth.astype(np.float32), mask), image_metrics(render, truth, mask)
+    assert narrow["psnr_full_8bit"] == wide["psnr_full_8bit"]

@@ -121,3 +121,12 @@ def test_float32():
     assert gradient.dtype == np.float32
     assert abs(loss - wide) <= 4 * 2.0**-24
     np.testing.assert_allclose(gradient, wide_gradient, rtol=1e-5, atol=0)
+
+
+def test_largest_prior_is_taken_over_the_whole_image():
+    rendered, prior = depths()
+    prior[5, 12] = 140.0  # on the tool
+    assert not tool_mask()[5, 12]
+    loss, _ = loss_and_gradient(rendered, prior, tool_mask())
+    assert loss == pytest.approx(oracle.normalised_depth(rendered, prior, tool_mask())[0], rel=1e-13)
+    assert depth_target(prior, tool_mask()).normalised[tool_mask()].max() <= 0.5

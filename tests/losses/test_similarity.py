@@ -154,3 +154,10 @@ def test_same_bits_for_one_and_two_threads():
         found.append(ssim(rendered, observed, tool_mask((40, 33))))
     assert found[0][0] == found[1][0]
     assert np.array_equal(found[0][1], found[1][1])
+
+
+def test_target_is_zero_under_the_mask():
+    _, observed = images()
+    target = ssim_target(observed, tool_mask())
+    assert not target.image[:, ~tool_mask()].any()
+    assert target.count == 3 * tool_mask().sum()
