@@ -67,3 +67,9 @@ def test_frame_chart_leaves_out_null_values():
     (line,) = curves.frame_lines(evaluation, "psnr_tissue")
     assert line[0] == "Model" and line[1].tolist() == [1]
     assert curves.frame_chart({}, "psnr_tissue") is None
+
+
+def test_similarity_is_drawn_as_what_is_minimised():
+    assert curves._term({"ssim": 0.75}, "ssim") == 0.25
+    assert curves._term({"l1": 0.75}, "l1") == 0.75
+    assert curves._term({"l1": None}, "l1") is None

@@ -177,10 +177,19 @@ def _draw_loss(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
 
 def _draw_terms(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
-        positive = [entry for entry in log if isinstance(entry.get(key), int | float) and entry[key] > 0]
+        positive = [{**entry, key: value} for entry in log if (value := _term(entry, key)) is not None and value > 0]
         if positive:  # a weight that is still zero has no place on a logarithmic axis
-            _curve(axes, positive, key, theme["colours"][position], key, raw=False)
+            label = "1 − ssim" if key == "ssim" else key
+            _curve(axes, positive, key, theme["colours"][position], label, raw=False)
     _log_scale(axes, log, TERMS)
+
+
+def _term(entry: dict[str, Any], key: str) -> float | None:
+    """The value that is minimised: the log holds SSIM itself."""
+    value = entry.get(key)
+    if not isinstance(value, int | float):
+        return None
+    return 1.0 - value if key == "ssim" else float(value)
 
 
 def _log_scale(axes: Any, log: LogEntries, keys: tuple[str, ...]) -> None:
