@@ -35,7 +35,7 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"endotsr {__version__}\n"
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", COMMANDS, ids=[f"command {k}" for k, _ in enumerate(COMMANDS)])
 def test_every_command_has_help(name, capsys):
     assert main([name, "--help"]) == 0
     assert f"endotsr {name}" in capsys.readouterr().out
