@@ -25,7 +25,8 @@ def _combine(coefficients, atoms, out):
         stop = min(n, start + BLOCK)
         for c in range(axes):
             total = out[c, start:stop]
-            total[:] = zero
+            for k in range(total.size):
+                total[k] = zero
             for a in range(count):
                 row = coefficients[c, a, start:stop]
                 atom = atoms[a]
@@ -42,7 +43,8 @@ def _spread(d_out, coefficients, atoms, d_coefficients, partial):
         lanes = np.empty(LANES)
         for a in range(count):
             atom = atoms[a]
-            lanes[:] = 0.0
+            for k in range(LANES):
+                lanes[k] = 0.0
             rest = 0.0
             for c in range(axes):
                 upstream = d_out[c, start:stop]

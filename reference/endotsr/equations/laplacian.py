@@ -196,7 +196,8 @@ def _reduce_adjoint(d_coarse, starts, index, weight, field, scale, keep_out, gat
             reduce_row_adjoint(gathered, pairs, w)
             pulled, source, allowed, target = pairs.reshape(-1)[2:], field[c, y], gate[y], out[c, y]
             if not keep_out:
-                target[:] = real(0.0)
+                for x in range(w):
+                    target[x] = real(0.0)
             for x in range(w):
                 d = target[x] + (scale * real(source[x]) + pulled[x])
                 target[x] = d if allowed[x] else real(0.0)

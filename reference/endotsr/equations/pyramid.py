@@ -20,7 +20,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from endotsr.jit import jit, jit_inline
+from endotsr.jit import jit
 
 FloatArray = NDArray[np.floating]
 Upsampling = Literal["co_sited", "half_pixel"]
@@ -54,7 +54,7 @@ def _reflect(i, n):
     return period - i if i >= n else i
 
 
-reflect = jit_inline(_reflect)
+reflect = jit(_reflect)
 
 
 def reflect_indices(n: int) -> list[NDArray[np.int64]]:
@@ -116,7 +116,8 @@ def _expand_row(coarse, y, even, odd, blend, pairs):
 def _gather_rows(source, starts, index, weight, y, target):
     """target = sum over the entries e of row y of weight[e] * source[index[e]]."""
     real = target.dtype.type
-    target[:] = real(0.0)
+    for x in range(target.size):
+        target[x] = real(0.0)
     for e in range(starts[y], starts[y + 1]):
         row = source[index[e]]
         factor = real(weight[e])
@@ -206,11 +207,11 @@ def expand_adjoint_table(n: int, upsampling: Upsampling) -> Table:
     return _table(coarse_length(n), entries)
 
 
-reduce_row = jit_inline(_reduce_row)
-expand_row = jit_inline(_expand_row)
-gather_rows = jit_inline(_gather_rows)
-reduce_row_adjoint = jit_inline(_reduce_row_adjoint)
-expand_row_adjoint = jit_inline(_expand_row_adjoint)
+reduce_row = jit(_reduce_row)
+expand_row = jit(_expand_row)
+gather_rows = jit(_gather_rows)
+reduce_row_adjoint = jit(_reduce_row_adjoint)
+expand_row_adjoint = jit(_expand_row_adjoint)
 
 
 def _reduce(fine, out):
