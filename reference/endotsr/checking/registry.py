@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 Arrays = Mapping[str, NDArray]
 
-PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses")
+PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses", "pairs_chain")
 
 
 class Pair(NamedTuple):
@@ -50,12 +50,7 @@ def all_pairs() -> dict[str, Pair]:
     """Every registered pair by name, in the order of the specification."""
     found: dict[str, Pair] = {}
     for name in PAIR_MODULES:
-        try:
-            module = importlib.import_module(f"endotsr.checking.{name}")
-        except ModuleNotFoundError as error:
-            if error.name != f"endotsr.checking.{name}":
-                raise
-            continue
+        module = importlib.import_module(f"endotsr.checking.{name}")
         for pair in module.PAIRS:
             if pair.name in found:
                 raise ValueError(f"pair {pair.name} is registered twice")
