@@ -1,0 +1,156 @@
+"""Commands that read a finished run: render, evaluate, calibrate; and bench, demo, gradcheck at their smallest."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from tiny import SEQUENCE, SETTINGS
+
+from endotsr.cli import main
+from endotsr.commands.evaluate import held_out_table
+from endotsr.commands.pictures import depth_bytes, depth_step
+from endotsr.opencv import read_png
+
+
+def render(run, out, *words):
+    assert main(["render", str(run), "--out", str(out), *words]) == 0
+    return json.loads((out / "render.json").read_text())
+
+
+def test_render_at_any_time(finished_run, tmp_path):
+    out = tmp_path / "pictures"
+    about = render(finished_run, out, "--times", "0", "0.06", "1", "--npy")
+    assert [p["time"] for p in about["pictures"]] == [0, 0.06, 1]
+    assert [p["camera_of_frame"] for p in about["pictures"]] == [0, 1, 8]
+    for picture in about["pictures"]:
+        stem = picture["file"].removesuffix(".png")
+        colour, depth, opacity = (np.load(out / name / f"{stem}.npy") for name in ("colour", "depth", "opacity"))
+        assert colour.shape == (3, 32, 48) and depth.shape == opacity.shape == (32, 48)
+        assert (
+            np.abs(read_png(out / "colour" / picture["file"]).transpose(2, 0, 1) / 255 - colour.clip(0, 1)).max()
+            < 0.003
+        )
+        stored = read_png(out / "depth" / picture["file"])
+        assert stored.dtype == np.uint16
+        assert np.abs(stored * about["depth_step"] - depth).max() <= 0.51 * about["depth_step"]
+        assert read_png(out / "opacity" / picture["file"]).shape == (32, 48)
+
+
+@pytest.mark.parametrize(("which", "count"), [("test", 1), ("train", 8), ("all", 9)])
+def test_render_frames(which, count, finished_run, tmp_path):
+    about = render(finished_run, tmp_path / "pictures", "--frames", which)
+    assert len(about["pictures"]) == count == len(list((tmp_path / "pictures" / "colour").iterdir()))
+
+
+def test_render_between_frames_is_between_times(finished_run, tmp_path):
+    about = render(finished_run, tmp_path / "pictures", "--count", "5", "--camera", "3")
+    assert [p["time"] for p in about["pictures"]] == [0, 0.25, 0.5, 0.75, 1]
+    assert {p["camera_of_frame"] for p in about["pictures"]} == {3}
+
+
+def test_render_of_a_held_out_frame_is_that_of_the_evaluation(finished_run, tmp_path):
+    render(finished_run, tmp_path / "pictures", "--frames", "test")
+    again = read_png(tmp_path / "pictures" / "colour" / "simulated-000001.png")
+    assert np.array_equal(again, read_png(finished_run / "renders" / "simulated-000001.png"))
+
+
+def test_render_without_a_component_differs(finished_run, tmp_path):
+    render(finished_run, tmp_path / "a", "--times", "0.4", "--npy")
+    render(finished_run, tmp_path / "b", "--times", "0.4", "--npy", "--without", "appearance", "spectral_motion")
+    a, b = (np.load(tmp_path / name / "colour" / "00000.npy") for name in "ab")
+    assert not np.array_equal(a, b)
+
+
+def test_depth_pictures_keep_a_known_step():
+    depth = np.array([[0.0, 50.0], [99.9, np.nan]])
+    step = depth_step({"largest_depth": 80.0}, depth)
+    assert np.log2(step) == round(np.log2(step))
+    stored = depth_bytes(depth, step)
+    assert stored[0, 0] == 0 and stored[1, 1] == 0
+    assert np.abs(stored * step - np.nan_to_num(depth)).max() <= step / 2
+    assert depth_bytes(np.array([[1e9]]), step)[0, 0] == 65535
+
+
+def test_evaluate_again_gives_the_same_numbers(finished_run, tmp_path, capsys):
+    out = tmp_path / "run"
+    shutil.copytree(finished_run, out)
+    (out / "report.html").unlink()
+    shutil.rmtree(out / "renders")
+    assert main(["evaluate", str(out), "--paper-row", "pulling"]) == 0
+    said = capsys.readouterr().out
+    before, after = (json.loads((folder / "metrics.json").read_text()) for folder in (finished_run, out))
+    assert before["held_out"] == after["held_out"] and before["baselines"] == after["baselines"]
+    for row in ("this model", "Temporal mean", "nearest", "two neighbouring", "Optical-flow", "as published"):
+        assert row in said
+    assert "39.34" in said and str(out / "report.html") in said
+    page = (out / "report.html").read_text()
+    assert "rendered without A, colour residual" in page and "39.34" in page
+
+
+def test_table_writes_a_dash_for_no_value():
+    metrics = {
+        "held_out": {"mean": {"psnr_full": None, "psnr_tissue": 20.0}, "per_frame": [{}]},
+        "baselines": {},
+        "published": [],
+        "training": {"mean": {}},
+        "lpips_reason": "no weights",
+    }
+    table = held_out_table(metrics)
+    assert "20.00" in table and "no weights" in table and "nan" not in table.lower()
+
+
+def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):
+    before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
+    words = ["calibrate", str(finished_run), "--json", str(tmp_path / "found.json"), "--loss.ssim-weight", "0.2"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert f"lambda_lap = {found['lambda_lap']:.6g} ({len(found['ratios'])} views)" in said
+    assert "simulated-000000" in said and "loss.ssim_weight = 0.2 (run: 0.1)" in said
+    assert before == {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
+
+
+def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
+    from endotsr.errors import CalibrationError
+    from endotsr.fitting import trainer
+
+    def no_answer(*_):
+        raise CalibrationError("calibration: none of the 2 views is valid\nview a\nview b")
+
+    monkeypatch.setattr(trainer, "calibrate_on", no_answer)
+    assert main(["calibrate", str(finished_run)]) == 2
+    said = capsys.readouterr()
+    assert said.err == "endotsr: error: calibration: none of the 2 views is valid\n"
+    assert "view a\nview b" in said.out
+
+
+def test_bench_times_every_stage(tmp_path, capsys):
+    file = tmp_path / "bench.json"
+    sizes = ["--gaussians", "200", "--width", "48", "--height", "32", "--repeats", "3", "--threads", "1"]
+    assert main(["bench", "iteration", *sizes, "--json", str(file)]) == 0
+    said = capsys.readouterr().out
+    result = json.loads(file.read_text())
+    assert {"scene", "render", "losses", "render reverse", "scene reverse", "optimiser"} <= set(result["stages"])
+    total = sum(stage["median_ms"] for stage in result["stages"].values())
+    assert total == pytest.approx(result["iteration"]["median_ms"], rel=0.5)
+    assert all(name in said for name in result["stages"]) and "peak memory" in said
+
+
+def test_bench_refuses_nothing_to_time(capsys):
+    assert main(["bench", "--repeats", "0"]) == 2
+    assert "--repeats 0" in capsys.readouterr().err
+
+
+def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
+    out = tmp_path / "run"
+    words = ["--out", str(out), *SEQUENCE, *SETTINGS, "--iterations", "4"]
+    assert main(["demo", *words]) == 0
+    assert f"report: {out / 'report.html'}" in capsys.readouterr().out
+    assert json.loads((out / "metrics.json").read_text())["run"]["settings"]["preset"] == "demo"
+
+
+def test_gradcheck_names_what_it_does_not_know(capsys):
+    assert main(["gradcheck", "no_such_stage"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "no_such_stage" in said

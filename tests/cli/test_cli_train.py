@@ -1,0 +1,210 @@
+"""Training from the command line: what a run leaves behind, and how it goes on after it was stopped."""
+
+import errno
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
+
+from endotsr.cli import main
+from endotsr.commands import progress
+from endotsr.config import load_config
+from endotsr.fitting import trainer
+from endotsr.runs import RunFolder
+
+LAST = 30
+EVERY = 7
+
+
+def train_only(out, *more):
+    return train_words(out, "--no-evaluate", *more)
+
+
+def resume(out):
+    return ["train", "--out", str(out), "--resume", "--no-evaluate"]
+
+
+def test_run_folder_explains_itself(finished_run):
+    names = {p.name for p in finished_run.iterdir()}
+    expected = {"config.toml", "run.json", "sequence.json", "log.jsonl", "checkpoint.npz"}
+    assert names == expected | {"metrics.json", "renders", "curves.png", "report.html", "test"}
+    record = RunFolder(finished_run).record()
+    assert record["status"] == "finished" and record["iterations_done"] == LAST
+    assert record["seed"] == 0 and record["threads"] == 1 and record["versions"]["numba"]
+    assert record["machine"]["cores"] >= 1 and record["seconds"] > 0
+    assert len(record["input"]["arrays_sha256"]["images"]) == 64
+    assert record["input"]["simulator"]["width"] == 48
+    config = load_config(finished_run / "config.toml")
+    assert config.training.iterations == LAST and config.density.interval == 5
+
+
+def test_log_has_one_entry_an_iteration(finished_run):
+    entries = [json.loads(line) for line in (finished_run / "log.jsonl").read_text().splitlines()]
+    assert [entry["iteration"] for entry in entries] == list(range(1, LAST + 1))
+    assert all(np.isfinite(entry["loss"]) and entry["gaussians"] > 0 and entry["seconds"] >= 0 for entry in entries)
+    assert "msp" in entries[-1] and "msp" not in entries[0]  # the residuals are born half-way
+
+
+def test_pictures_have_the_names_of_the_peers(finished_run):
+    peers = finished_run / "test" / f"ours_{LAST}"
+    assert {p.name for p in peers.iterdir()} == {"renders", "gt", "masks"}
+    for folder in peers.iterdir():
+        assert [p.name for p in folder.iterdir()] == ["00000.png"]
+    assert (finished_run / "renders" / "simulated-000001.png").stat().st_size > 0
+
+
+def test_metrics_stand_alone(finished_run):
+    metrics = json.loads((finished_run / "metrics.json").read_text())
+    assert metrics["held_out"]["mean"]["psnr_tissue"] > 5
+    assert set(metrics["baselines"]) == {"temporal_mean", "nearest_frame", "two_neighbours", "flow_interpolation"}
+    assert metrics["run"]["iteration"] == LAST and metrics["run"]["settings"]["model"]["beta"] == 0.3
+    assert [row["label"].split()[0] for row in metrics["components"]] == ["the", "rendered", "rendered"]
+
+
+def test_equal_settings_give_equal_runs_for_any_number_of_threads(finished_run, tmp_path):
+    assert main(train_only(tmp_path / "run", "--threads", "2")) == 0
+    assert_same_run(finished_run, tmp_path / "run")
+
+
+def test_another_seed_gives_another_run(finished_run, tmp_path):
+    assert main(train_only(tmp_path / "run", "--seed", "1", "--iterations", "3")) == 0
+    assert log_without_seconds(tmp_path / "run")[0] != log_without_seconds(finished_run)[0]
+
+
+@pytest.mark.parametrize("at", [3, 17])
+def test_ctrl_c_keeps_the_last_checkpoint_and_resume_is_bitwise_equal(at, finished_run, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "run"
+    update = progress.Progress.update
+
+    def interrupt(self, entry):
+        update(self, entry)
+        if entry["iteration"] == at:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(progress.Progress, "update", interrupt)
+    code, said = run_line(capsys, *train_only(out))
+    monkeypatch.undo()
+    assert code == 130
+    last = said.strip().splitlines()[-1]
+    assert f"--out {out} --resume" in last
+    assert (f"checkpoint of iteration {at // EVERY * EVERY}" if at > EVERY else "no checkpoint yet") in last
+    assert RunFolder(out).record()["status"] == "interrupted"
+    assert main(resume(out)) == 0
+    assert_same_run(finished_run, out)
+    record = RunFolder(out).record()
+    assert record["status"] == "finished" and record["resumed"][0]["after_iteration"] == at // EVERY * EVERY
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
+def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
+    out = tmp_path / "run"
+    process = start(train_only(out), tmp_path)
+    lines = random.randrange(1, LAST - 2)  # a new moment every time
+    deadline = time.monotonic() + 300
+    while not (out / "log.jsonl").exists() or (out / "log.jsonl").read_bytes().count(b"\n") < lines:
+        assert process.poll() is None and time.monotonic() < deadline, process.stderr.read()
+        time.sleep(0.005)
+    process.send_signal(how)
+    said = process.communicate(timeout=120)[1]
+    # a process that was through before the signal arrived has nothing to say
+    assert process.returncode in (0, 130 if how == signal.SIGINT else -how)
+    if process.returncode == 130:
+        assert "--resume" in said.strip().splitlines()[-1] and "Traceback" not in said
+    assert main(resume(out)) == 0
+    assert_same_run(finished_run, out)
+    assert not [p.name for p in out.iterdir() if p.name.startswith(".")]
+
+
+@pytest.mark.parametrize("checkpoint", [1, 3])
+def test_full_disk_keeps_the_last_checkpoint_or_leaves_nothing(checkpoint, finished_run, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "run"
+    calls = []
+    save = trainer.save_state
+
+    def full(path, *rest):
+        calls.append(path)
+        if len(calls) == checkpoint:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        save(path, *rest)
+
+    monkeypatch.setattr(trainer, "save_state", full)
+    code, said = run_line(capsys, *train_only(out))
+    monkeypatch.undo()
+    assert code == 2 and "disk is full" in said.strip().splitlines()[-1]
+    if checkpoint == 1:
+        assert list(tmp_path.iterdir()) == []
+    else:
+        assert RunFolder(out).record()["status"] == "failed"
+        assert main(resume(out)) == 0
+        assert_same_run(finished_run, out)
+
+
+def test_files_that_may_not_grow_leave_nothing_half_written(tmp_path):
+    """The operating system itself refuses: files of at most 30 kB, so that the first checkpoint breaks off."""
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, "-m", "endotsr.cli", *train_only(tmp_path / "run")],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000)),
+        env=os.environ | {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", "")},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert done.stderr.strip().splitlines()[-1].startswith("endotsr: error: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_run_that_holds_a_run_is_refused(finished_run, capsys):
+    before = (finished_run / "run.json").read_bytes()
+    assert_refused(capsys, train_words(finished_run), str(finished_run), "--resume")
+    assert (finished_run / "run.json").read_bytes() == before
+
+
+def test_resume_of_a_finished_run_changes_nothing(finished_run, tmp_path, capsys):
+    out = tmp_path / "run"
+    shutil.copytree(finished_run, out)
+    assert main(resume(out)) == 0
+    assert f"after iteration {LAST} of {LAST}" in capsys.readouterr().out
+    assert_same_run(finished_run, out)
+
+
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        (["--model.beta", "0.2"], ["model.beta = 0.2", "keeps the settings"]),
+        (["--iterations", "40"], ["keeps the settings"]),
+        (["--seed", "1"], ["training.seed = 1"]),
+        (["--simulator.seed", "1"], ["images differ", "sha256"]),
+    ],
+)
+def test_resume_refuses_what_would_change_the_result(more, named, finished_run, tmp_path, capsys):
+    out = tmp_path / "run"
+    shutil.copytree(finished_run, out)
+    assert_refused(capsys, [*resume(out), *more], *named)
+    assert_same_run(finished_run, out)
+
+
+def test_resume_may_repeat_the_command_line(finished_run, tmp_path):
+    out = tmp_path / "run"
+    shutil.copytree(finished_run, out)
+    assert main(train_only(out, "--resume", "--threads", "2")) == 0
+
+
+@pytest.mark.parametrize("damage", ["truncated", "foreign"])
+def test_damaged_checkpoint_is_one_line(damage, finished_run, tmp_path, capsys):
+    out = tmp_path / "run"
+    shutil.copytree(finished_run, out)
+    file = out / "checkpoint.npz"
+    file.write_bytes(file.read_bytes()[:5000] if damage == "truncated" else b"PK not really")
+    for words in (resume(out), ["evaluate", str(out)], ["render", str(out), "--out", str(tmp_path / "pictures")]):
+        assert_refused(capsys, words, "checkpoint.npz")
+    assert not (tmp_path / "pictures").exists()
