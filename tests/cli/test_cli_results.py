@@ -150,7 +150,7 @@ def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
     assert json.loads((out / "metrics.json").read_text())["run"]["settings"]["preset"] == "demo"
 
 
-def test_gradcheck_names_what_it_does_not_know(capsys):
+def test_check_command_names_what_it_does_not_know(capsys):
     assert main(["gradcheck", "no_such_stage"]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "no_such_stage" in said
