@@ -282,10 +282,11 @@ def _log_entry(
     config: Config,
 ) -> dict[str, Any]:
     """What the log keeps of an iteration. Raises FloatingPointError on a loss that is not finite."""
-    total = loss.loss + config.loss.lambda_msp * (penalty or 0.0)
+    total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
     if not math.isfinite(total):
         raise FloatingPointError(f"iteration {iteration}, frame {index}: loss is {total}; terms {loss.terms}")
-    entry: dict[str, Any] = {"iteration": iteration, "frame": index, "loss": total, **loss.terms}
+    terms = {name: float(value) for name, value in loss.terms.items()}
+    entry: dict[str, Any] = {"iteration": iteration, "frame": index, "loss": total, **terms}
     if penalty is not None:
         entry["msp"] = penalty
     if iteration % PSNR_EVERY == 0 or iteration == 1:
