@@ -40,6 +40,7 @@ from endotsr.fitting.schedules import (
     smoothness_active,
     statistics_active,
 )
+from endotsr.memory import keep_freed_memory
 from endotsr.scene.density_control import (
     DensityStatistics,
     densify,
@@ -104,6 +105,7 @@ class Workshop:
 
 def workshop(sequence: Sequence, config: Config) -> Workshop:
     """Spectral constants and scene extent of a sequence."""
+    keep_freed_memory()
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
     return Workshop(sequence, config, spectral, extent, {})

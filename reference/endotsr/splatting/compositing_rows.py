@@ -21,7 +21,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
+from endotsr.jit import jit, jit_inline
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.compositing import Composite, composite_limits
 from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
@@ -73,39 +73,58 @@ def supports(settings: RasterSettings) -> bool:
     )
 
 
-def _rows(record, top, height_limit):
+def _rows(record, top):
     """First and last tile row (inclusive) whose samples the ellipse may reach; margin beyond rounding."""
     real = record.dtype.type
     half, zero = real(0.5), real(0)
     reach = record[HALF_HEIGHT]
     reach += (reach + abs(record[V])) * real(1e-5) + real(1e-3)
     low = max(record[V] - reach - half - real(top), zero)
-    high = min(record[V] + reach - half - real(top), real(height_limit - 1))
+    high = min(record[V] + reach - half - real(top), real(TILE_HEIGHT - 1))
     return math.ceil(low), math.floor(high)
 
 
-def _span(record, dy, reach, left):
-    """First and last tile column (inclusive) of one row; `reach` is log2(alpha / cutoff) at the row's centre line."""
+def _spans(record, top, left, log2_cutoff, rows, columns):
+    """Of all rows of a tile at once (vector code): dy, exponent and shift of the centre line, and the columns to visit.
+
+    rows     (3, TILE_HEIGHT) filled with dy, log2 alpha on the centre line, shift m dy
+    columns  (2, TILE_HEIGHT) int32, first and last tile column, first > last where the row is not reached
+
+    The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
+    beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm.
+    """
     real = record.dtype.type
-    half, zero, two = real(0.5), real(0), real(2)
-    ln2 = real(1) / real(LOG2_E)
-    shift = record[SLOPE] * dy
-    width = math.sqrt(max(two * ln2 * reach / record[PRECISION], zero))
-    width += (width + abs(shift) + abs(record[U])) * real(1e-5) + real(1e-3)
-    centre = record[U] + shift - half - real(left)
-    return math.ceil(max(centre - width, zero)), math.floor(min(centre + width, real(TILE_WIDTH - 1)))
+    half, one, zero, relative = real(0.5), real(1), real(0), real(1e-5)
+    u, v, slope, log2_opacity = record[U], record[V], record[SLOPE], record[LOG2_OPACITY]
+    r2 = half * real(LOG2_E) * record[INVERSE_C]
+    spread, margin = one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * relative + real(1e-3)
+    first_row, right = real(top) + half - v, real(TILE_WIDTH - 1)
+    offset = u - half - real(left)
+    dys, exponents, shifts, firsts, lasts = rows[0], rows[1], rows[2], columns[0], columns[1]
+    for y in range(TILE_HEIGHT):
+        k = _U64(y)
+        dy = first_row + real(y)
+        exponent = log2_opacity - r2 * dy * dy
+        shift = slope * dy
+        width = math.sqrt(max(spread * (exponent - log2_cutoff), zero))
+        width += (width + abs(shift)) * relative + margin
+        low, high = offset + shift - width, min(offset + shift + width, right)
+        dys[k], exponents[k], shifts[k] = dy, exponent, shift
+        firsts[k] = np.int32(min(max(low, zero), real(TILE_WIDTH)))
+        lasts[k] = np.int32(high) if high >= zero else np.int32(-1)
 
 
-_rows_kernel = jit(_rows, contract=True)
-_span_kernel = jit(_span, contract=True)
+_rows_kernel = jit_inline(_rows)
+_spans_kernel = jit_inline(_spans)
 
 
 def _finished(buffer):
     """Whether no pixel of the tile can take another pair: every T is zero or marked negative."""
-    best = buffer[0]
+    zero = buffer.dtype.type(0)
+    alive = np.int32(0)
     for j in range(PLANE):
-        best = max(best, buffer[_U64(j)])
-    return best <= buffer.dtype.type(0)
+        alive += np.int32(buffer[_U64(j)] > zero)
+    return alive == 0
 
 
 _finished_kernel = jit(_finished, contract=True)
@@ -119,14 +138,14 @@ def _spread(turn, tiles):
 _spread_kernel = jit(_spread)
 
 
-def _blend_row(buffer, base, dx0, a2, row2, slope_dy, record, log2_cutoff, stop, alpha_max):
+def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max):
     """Blend one Gaussian into LANES pixels of one row."""
     real = buffer.dtype.type
     zero = real(0)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
     for lane in range(LANES):
         j = base + _U64(lane)
-        e = dx0 + real(lane) - slope_dy
+        e = e0 + real(lane)
         exponent = row2 - a2 * e * e
         alpha = min(exp2_nonpositive(exponent), alpha_max)
         t = buffer[j]
@@ -142,7 +161,7 @@ def _blend_row(buffer, base, dx0, a2, row2, slope_dy, record, log2_cutoff, stop,
         buffer[j + _U64(4 * PLANE)] += weight * depth
 
 
-_blend_row_kernel = jit(_blend_row, contract=True)
+_blend_row_kernel = jit_inline(_blend_row)
 
 
 def _blend(records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
@@ -157,6 +176,7 @@ def _blend(records, starts, ranks, limits, background, colour, depth, opacity, t
         tile = _spread_kernel(np.int64(turn), tiles)
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(5 * PLANE, records.dtype)
+        rows, columns = np.empty((3, TILE_HEIGHT), records.dtype), np.empty((2, TILE_HEIGHT), np.int32)
         for y in range(TILE_HEIGHT):
             for x in range(TILE_WIDTH):
                 buffer[y * PITCH + x] = one
@@ -164,16 +184,14 @@ def _blend(records, starts, ranks, limits, background, colour, depth, opacity, t
             if (p - starts[tile]) % _CHECK_EVERY == _CHECK_EVERY - 1 and _finished_kernel(buffer):
                 break
             record = records[ranks[p]]
-            first, last = _rows_kernel(record, top, TILE_HEIGHT)
-            a2, r2 = half * real(LOG2_E) * record[PRECISION], half * real(LOG2_E) * record[INVERSE_C]
+            first, last = _rows_kernel(record, top)
+            _spans_kernel(record, top, left, log2_cutoff, rows, columns)
+            a2 = half * real(LOG2_E) * record[PRECISION]
             for y in range(first, last + 1):
-                dy = real(top + y) + half - record[V]
-                row2 = record[LOG2_OPACITY] - r2 * dy * dy
-                x0, x1 = _span_kernel(record, dy, row2 - log2_cutoff, left)
-                for x in range(x0, x1 + 1, LANES):
+                for x in range(columns[0, y], columns[1, y] + 1, LANES):
                     _blend_row_kernel(
-                        buffer, _U64(y * PITCH + x), real(left + x) + half - record[U], a2, row2,
-                        record[SLOPE] * dy, record, log2_cutoff, stop, alpha_max,
+                        buffer, _U64(y * PITCH + x), real(left + x) + half - record[U] - rows[2, y], a2, rows[1, y],
+                        record, log2_cutoff, stop, alpha_max,
                     )  # fmt: skip
         for y in range(min(TILE_HEIGHT, height - top)):
             for x in range(min(TILE_WIDTH, width - left)):
@@ -186,14 +204,14 @@ def _blend(records, starts, ranks, limits, background, colour, depth, opacity, t
                 depth[top + y, left + x] = buffer[j + 4 * PLANE]
 
 
-def _blend_row_reverse(buffer, sums, base, dx0, dy, a2, row2, slope_dy, record, log2_cutoff, stop, alpha_max):
+def _blend_row_reverse(buffer, sums, base, e0, dy, a2, row2, record, log2_cutoff, stop, alpha_max):
     """Replay one Gaussian over LANES pixels: planes T, behind, g_red, g_green, g_blue, g_depth."""
     real = buffer.dtype.type
     zero, one = real(0), real(1)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
     for lane in range(LANES):
         j, k = base + _U64(lane), _U64(lane)
-        e = dx0 + real(lane) - slope_dy
+        e = e0 + real(lane)
         exponent = row2 - a2 * e * e
         value = exp2_nonpositive(exponent)
         alpha = min(value, alpha_max)
@@ -224,7 +242,21 @@ def _blend_row_reverse(buffer, sums, base, dx0, dy, a2, row2, slope_dy, record, 
         sums[k + _U64(9 * LANES)] += weight * gz
 
 
-_blend_row_reverse_kernel = jit(_blend_row_reverse, contract=True)
+_blend_row_reverse_kernel = jit_inline(_blend_row_reverse)
+
+
+def _fold_lanes(sums, out):
+    """Add the lanes of each sum in halves: the same order always, and vector adds."""
+    for j in range(GRADIENT):
+        base = _U64(j * LANES)
+        for lane in range(LANES // 2):
+            sums[base + _U64(lane)] += sums[base + _U64(lane + LANES // 2)]
+        for lane in range(LANES // 4):
+            sums[base + _U64(lane)] += sums[base + _U64(lane + LANES // 4)]
+        out[_U64(j)] = (sums[base] + sums[base + _U64(2)]) + (sums[base + _U64(1)] + sums[base + _U64(3)])
+
+
+_fold_lanes_kernel = jit_inline(_fold_lanes)
 
 
 def _blend_reverse(
@@ -244,6 +276,7 @@ def _blend_reverse(
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(6 * PLANE, records.dtype)
         sums = np.zeros(GRADIENT * LANES, records.dtype)
+        rows, columns = np.empty((3, TILE_HEIGHT), records.dtype), np.empty((2, TILE_HEIGHT), np.int32)
         for y in range(min(TILE_HEIGHT, height - top)):
             for x in range(min(TILE_WIDTH, width - left)):
                 j = y * PITCH + x
@@ -272,20 +305,16 @@ def _blend_reverse(
             record = records[ranks[p]]
             for j in range(GRADIENT * LANES):
                 sums[_U64(j)] = zero
-            first, last = _rows_kernel(record, top, TILE_HEIGHT)
-            a2, r2 = half * real(LOG2_E) * record[PRECISION], half * real(LOG2_E) * record[INVERSE_C]
+            first, last = _rows_kernel(record, top)
+            _spans_kernel(record, top, left, log2_cutoff, rows, columns)
+            a2 = half * real(LOG2_E) * record[PRECISION]
             for y in range(first, last + 1):
-                dy = real(top + y) + half - record[V]
-                row2 = record[LOG2_OPACITY] - r2 * dy * dy
-                x0, x1 = _span_kernel(record, dy, row2 - log2_cutoff, left)
-                for x in range(x0, x1 + 1, LANES):
+                for x in range(columns[0, y], columns[1, y] + 1, LANES):
                     _blend_row_reverse_kernel(
-                        buffer, sums, _U64(y * PITCH + x), real(left + x) + half - record[U], dy, a2, row2,
-                        record[SLOPE] * dy, record, log2_cutoff, stop, alpha_max,
+                        buffer, sums, _U64(y * PITCH + x), real(left + x) + half - record[U] - rows[2, y], rows[0, y],
+                        a2, rows[1, y], record, log2_cutoff, stop, alpha_max,
                     )  # fmt: skip
-            for j in range(GRADIENT):
-                for lane in range(LANES):
-                    out[j] += sums[j * LANES + lane]
+            _fold_lanes_kernel(sums, out)
 
 
 _blend_kernel = jit(_blend, parallel=True, contract=True)
