@@ -251,7 +251,14 @@ def with_iterations(config: Config, iterations: int) -> Config:
     return msgspec.structs.replace(config, **changed)
 
 
-DEMO = msgspec.structs.replace(with_iterations(PAPER, 600), preset="demo")
+DEMO = msgspec.structs.replace(
+    with_iterations(PAPER, 600),
+    preset="demo",
+    # wide time bases and jitter suit its 24 frames; as many points as its 160x128 pixels can tell apart
+    model=ModelConfig(initial_width=0.1),
+    initialisation=InitialisationConfig(first_frame_points=6000, other_frame_points=1500),
+)
+DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, time_jitter=1.0))
 PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
 
 
