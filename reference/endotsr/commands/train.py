@@ -111,6 +111,7 @@ def train_new(
     _say_settings(config, schedule_note)
     _say_sequence(source, sequence)
     threads = use_threads(config.training.threads)
+    print("starting; the first run on a machine also compiles, which takes about a minute", flush=True)
     state = new_training(sequence, config)
     record = {
         "status": "running",
