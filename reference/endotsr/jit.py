@@ -18,7 +18,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -57,15 +57,17 @@ def jit(function: F, *, parallel: bool = False, contract: bool = False) -> F:
     parallel   the body uses `numba.prange`; iterations must write to disjoint cells (never `+=` into a shared one)
     contract   allow fused multiply-add; for the fast path only
     """
-    return numba.njit(
+    compiled: Any = numba.njit(
         cache=True,
         nogil=True,
         error_model="numpy",  # 1/0 is inf as in NumPy: one meaning with the JIT on or off
         parallel=parallel,
         fastmath={"contract"} if contract else False,
     )(function)
+    return compiled  # to a type checker a kernel is the function it was made from
 
 
 def jit_inline(function: F) -> F:
     """Compile a small helper that other kernels call; it is inlined into them and has no cache entry of its own."""
-    return numba.njit(inline="always", error_model="numpy")(function)
+    compiled: Any = numba.njit(inline="always", error_model="numpy")(function)
+    return compiled

@@ -61,6 +61,7 @@ def _run(inputs: Arrays):
     rendered, saved = render_forward(scene, _camera(), WIDE, path="rows")
     targets = frame_targets(_frame(scene.position.dtype), CONFIG)
     loss = image_loss(rendered, targets, WEIGHTS, CONFIG.loss)
+    assert gaussians.motion_coefficients is not None
     penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, _spectral().rho)
     return rendered, targets, loss, penalty, saved, scene_saved, penalty_saved
 

@@ -9,7 +9,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.compositing import TILE_HEIGHT, TILE_WIDTH, composite_forward, composite_reverse
 from endotsr.splatting.compositing_rows import TILE_HEIGHT as ROWS_HEIGHT
 from endotsr.splatting.compositing_rows import TILE_WIDTH as ROWS_WIDTH
-from endotsr.splatting.compositing_rows import composite_rows_forward, composite_rows_reverse
+from endotsr.splatting.compositing_rows import RowsSaved, composite_rows_forward, composite_rows_reverse
 from endotsr.splatting.covariance import Shape, covariance_forward, covariance_reverse
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 from endotsr.splatting.projection import Projected, projection_forward, projection_reverse
@@ -131,7 +131,9 @@ def _projection_pair(name: str, settings: RasterSettings) -> Pair:
         }
 
     def blocks(inputs: Arrays) -> dict[str, tuple[str, object]]:
-        axes = {f"position {axis}": ("position", (k, slice(None))) for k, axis in enumerate("xyz")}
+        axes: dict[str, tuple[str, object]] = {
+            f"position {axis}": ("position", (k, slice(None))) for k, axis in enumerate("xyz")
+        }
         return axes | {key: (key, ...) for key in inputs if key != "position"}
 
     function = "endotsr.splatting.projection.projection_forward"
@@ -187,7 +189,9 @@ def _harmonics_pair(degree: int) -> Pair:
     run = run if degree > 0 else run_degree_0
 
     def blocks(inputs: Arrays) -> dict[str, tuple[str, object]]:
-        out = {f"degree {d}": ("harmonics", slice(d * d, (d + 1) ** 2)) for d in range(degree + 1)}
+        out: dict[str, tuple[str, object]] = {
+            f"degree {d}": ("harmonics", slice(d * d, (d + 1) ** 2)) for d in range(degree + 1)
+        }
         return out | {key: (key, ...) for key in inputs if key != "harmonics"}
 
     return Pair(
@@ -247,7 +251,7 @@ def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
         out, saved, projected, order = run(inputs)
         images = (cotangents["colour_image"], cotangents["depth_image"], cotangents["opacity_image"])
-        pairs = (composite_rows_reverse if rows else composite_reverse)(*images, saved)
+        pairs = (composite_rows_reverse if isinstance(saved, RowsSaved) else composite_reverse)(*images, saved)  # pyright: ignore[reportArgumentType]
         grads = gather_gradients(
             order, saved.records, saved.lists, pairs, projected.determinant, inputs["opacity_logit"],
             conic_epsilon=0.0, keep_depth=True,

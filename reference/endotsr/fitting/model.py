@@ -29,9 +29,9 @@ FloatArray = NDArray[np.floating]
 class Spectral(NamedTuple):
     """What the Fourier components share: fixed by the configuration and the training times."""
 
-    omega: NDArray[np.float64]  # (F,) cycles per sequence
+    omega: FloatArray  # (F,) float64, cycles per sequence
     statistics: AtomStatistics  # mean and RMS of the atoms over the training times
-    rho: NDArray[np.float64]  # (F,) Matern weights of the penalty, mean 1
+    rho: FloatArray  # (F,) float64, Matern weights of the penalty, mean 1
 
 
 class SceneSaved(NamedTuple):

@@ -39,7 +39,8 @@ class Gaussians(NamedTuple):
 
 def gather(gaussians: Gaussians, index: NDArray[np.integer]) -> Gaussians:
     """The Gaussians named by `index` (in that order, repeats allowed), every array copied."""
-    return Gaussians(*(None if a is None else np.ascontiguousarray(a[..., index]) for a in gaussians))
+    taken = {name: np.ascontiguousarray(a[..., index]) for name, a in arrays(gaussians).items()}
+    return gaussians._replace(**taken)
 
 
 def arrays(gaussians: Gaussians) -> dict[str, FloatArray]:

@@ -59,7 +59,7 @@ def exp2_nonpositive(x):
     Reverse: ln(2) 2^x, written out where it is used.
     Oracle:  numpy.exp2.
     """
-    return _exp2_float32(x) if isinstance(x, np.float32) else _exp2_float64(np.float64(x))
+    return _exp2_float32(x) if np.asarray(x).dtype == np.float32 else _exp2_float64(np.float64(x))
 
 
 @overload(exp2_nonpositive, inline="always")
