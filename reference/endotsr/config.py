@@ -197,6 +197,8 @@ class TrainingConfig(_Section, frozen=True, kw_only=True):
     """iterations between raises of the active harmonic degree"""
     time_jitter: NonNegative = 0.0
     """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
+    bridge_share: Fraction = 0.0
+    """share of iterations at a time between two training frames, compared with either by its nearness in time"""
     seed: Count = 0
     """seed of every random draw"""
     threads: Count = 0

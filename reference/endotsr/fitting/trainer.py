@@ -219,11 +219,28 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
 
 
 def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
-    """A training frame, uniform with replacement, and its time (jittered when asked for)."""
+    """A training frame, uniform with replacement, and its time (jittered or bridged when asked for)."""
+    training = shop.config.training
+    if training.bridge_share > 0 and rng.random() < training.bridge_share:
+        return _draw_bridge(rng, shop)
     index = int(shop.sequence.train_index[rng.integers(len(shop.sequence.train_index))])
     t = float(shop.sequence.times[index])
-    jitter = shop.config.training.time_jitter
+    jitter = training.time_jitter
     return index, t + jitter * rng.uniform(-0.5, 0.5) / shop.sequence.count if jitter > 0 else t
+
+
+def _draw_bridge(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
+    """A time uniform between the first and the last training frame, and one of its two training neighbours.
+
+    The neighbour is drawn with the weight that linear interpolation would give it, so that the expected target at
+    every time is the blend of its neighbours: what lies between two frames is no longer free.
+    """
+    index = shop.sequence.train_index
+    times = shop.sequence.times[index]
+    t = float(rng.uniform(times[0], times[-1]))
+    right = min(max(int(np.searchsorted(times, t, side="right")), 1), len(times) - 1)
+    nearness = (t - times[right - 1]) / (times[right] - times[right - 1])
+    return int(index[right if rng.random() < nearness else right - 1]), t
 
 
 def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:

@@ -69,6 +69,12 @@ class CompositeSaved(NamedTuple):
     out: Composite
 
 
+def empty_composite(width: int, height: int, dtype) -> Composite:
+    """Images to be written."""
+    plane = (height, width)
+    return Composite(np.empty((3, *plane), dtype), *(np.empty(plane, dtype) for _ in range(3)))
+
+
 def composite_limits(settings: RasterSettings, dtype) -> FloatArray:
     """alpha cutoff, transmittance stop, alpha max in the dtype of the run."""
     return np.array([settings.alpha_cutoff, settings.transmittance_stop, settings.alpha_max], dtype)
@@ -202,12 +208,7 @@ def composite_forward(
     Oracle:  tests/oracle/splatting_oracle.py.
     """
     dtype = records.dtype
-    out = Composite(
-        np.empty((3, height, width), dtype),
-        np.empty((height, width), dtype),
-        np.empty((height, width), dtype),
-        np.empty((height, width), dtype),
-    )
+    out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
     _composite_kernel(records, lists.starts, lists.ranks, limits, background, *out)
     return out, CompositeSaved(records, lists, limits, background, settings.deviations.pass_clamped_alpha, out)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from endotsr.jit import jit, jit_inline
 from endotsr.splatting.binning import TileLists
-from endotsr.splatting.compositing import Composite, composite_limits
+from endotsr.splatting.compositing import Composite, composite_limits, empty_composite
 from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
 from endotsr.splatting.records import (
     BLUE,
@@ -330,12 +330,7 @@ def composite_rows_forward(
            at most T alpha |c - behind|, see tests/splatting.
     """
     dtype = records.dtype
-    out = Composite(
-        np.empty((3, height, width), dtype),
-        np.empty((height, width), dtype),
-        np.empty((height, width), dtype),
-        np.empty((height, width), dtype),
-    )
+    out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
     _blend_kernel(records, lists.starts, lists.ranks, limits, background, *out)
     return out, RowsSaved(records, lists, limits, background, out)

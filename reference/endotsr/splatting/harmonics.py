@@ -112,76 +112,6 @@ _basis_kernel = jit(_basis)
 _basis_gradient_kernel = jit(_basis_gradient)
 
 
-def _colour_blocks(harmonics, residual, position, centre, degree, colour, clamped):
-    real = position.dtype.type
-    y00, half, zero = real(Y00), real(0.5), real(0)
-    n = position.shape[1]
-    bands = (degree + 1) * (degree + 1)
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        basis = np.empty((15, e - a), position.dtype)
-        if degree > 0:
-            d = np.empty((4, e - a), position.dtype)
-            _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
-            _basis_kernel(degree, d[0], d[1], d[2], basis)
-        for channel in range(3):
-            out, flag, base = colour[channel, a:e], clamped[channel, a:e], harmonics[0, channel, a:e]
-            if residual.shape[1] > 0:
-                extra = residual[channel, a:e]
-                for i in range(out.size):
-                    out[i] = half + y00 * (base[i] + extra[i])
-            else:
-                for i in range(out.size):
-                    out[i] = half + y00 * base[i]
-            for k in range(1, bands):
-                y, h = basis[k - 1], harmonics[k, channel, a:e]
-                for i in range(out.size):
-                    out[i] += y[i] * h[i]
-            for i in range(out.size):
-                flag[i] = out[i] < zero
-                out[i] = max(out[i], zero)
-
-
-def _colour_reverse_blocks(
-    harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centres
-):
-    """`d_base` is the gradient of the residual, shape (3, 0) when there is none."""
-    real = position.dtype.type
-    y00, zero = real(Y00), real(0)
-    n = position.shape[1]
-    bands = (degree + 1) * (degree + 1)
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        g = np.empty((3, e - a), position.dtype)
-        d = np.empty((4, e - a), position.dtype)
-        basis = np.empty((15, e - a), position.dtype)
-        weight = np.zeros((15, e - a), position.dtype)  # sum over channels of g h_k
-        if degree > 0:
-            _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
-            _basis_kernel(degree, d[0], d[1], d[2], basis)
-        for channel in range(3):
-            gc, up, flag = g[channel], d_colour[channel, a:e], clamped[channel, a:e]
-            out = d_harmonics[0, channel, a:e]
-            for i in range(gc.size):
-                gc[i] = zero if flag[i] else up[i]
-                out[i] = y00 * gc[i]
-            if d_base.shape[1] > 0:
-                extra = d_base[channel, a:e]
-                for i in range(gc.size):
-                    extra[i] = out[i]
-            for k in range(1, harmonics.shape[0]):
-                out = d_harmonics[k, channel, a:e]
-                if k >= bands:
-                    for i in range(out.size):
-                        out[i] = zero
-                    continue
-                y, h, w = basis[k - 1], harmonics[k, channel, a:e], weight[k - 1]
-                for i in range(out.size):
-                    out[i] = y[i] * gc[i]
-                    w[i] += gc[i] * h[i]
-        _direction_to_position(degree, d, weight, d_position[:, a:e], d_centres[block])
-
-
 def _direction_to_position_block(degree, d, weight, d_position, d_centre):
     """From direction to position: drop the radial part, divide by the distance; the centre gets minus the sum."""
     real = d.dtype.type
@@ -208,6 +138,95 @@ def _direction_to_position_block(degree, d, weight, d_position, d_centre):
 
 
 _direction_to_position = jit(_direction_to_position_block)
+
+
+def _colour_block(harmonics, residual, position, centre, degree, colour, clamped, a, e):
+    """Gaussians a to e; `residual` has shape (3, 0) when there is none."""
+    real = position.dtype.type
+    y00, half, zero = real(Y00), real(0.5), real(0)
+    bands = (degree + 1) * (degree + 1)
+    basis = np.empty((15, e - a), position.dtype)
+    if degree > 0:
+        d = np.empty((4, e - a), position.dtype)
+        _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
+        _basis_kernel(degree, d[0], d[1], d[2], basis)
+    for channel in range(3):
+        out, flag, base = colour[channel, a:e], clamped[channel, a:e], harmonics[0, channel, a:e]
+        if residual.shape[1] > 0:
+            extra = residual[channel, a:e]
+            for i in range(out.size):
+                out[i] = half + y00 * (base[i] + extra[i])
+        else:
+            for i in range(out.size):
+                out[i] = half + y00 * base[i]
+        for k in range(1, bands):
+            y, h = basis[k - 1], harmonics[k, channel, a:e]
+            for i in range(out.size):
+                out[i] += y[i] * h[i]
+        for i in range(out.size):
+            flag[i] = out[i] < zero
+            out[i] = max(out[i], zero)
+
+
+def _colour_reverse_block(
+    harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centre, a, e
+):
+    """Gaussians a to e; `d_base` is the gradient of the residual, shape (3, 0) when there is none."""
+    real = position.dtype.type
+    y00, zero = real(Y00), real(0)
+    bands = (degree + 1) * (degree + 1)
+    gc = np.empty(e - a, position.dtype)
+    d = np.empty((4, e - a), position.dtype)
+    basis = np.empty((15, e - a), position.dtype)
+    weight = np.zeros((15, e - a), position.dtype)  # sum over channels of g h_k
+    if degree > 0:
+        _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
+        _basis_kernel(degree, d[0], d[1], d[2], basis)
+    for channel in range(3):
+        up, flag, out = d_colour[channel, a:e], clamped[channel, a:e], d_harmonics[0, channel, a:e]
+        for i in range(gc.size):
+            gc[i] = zero if flag[i] else up[i]
+            out[i] = y00 * gc[i]
+        if d_base.shape[1] > 0:
+            extra = d_base[channel, a:e]
+            for i in range(gc.size):
+                extra[i] = out[i]
+        for k in range(1, harmonics.shape[0]):
+            out = d_harmonics[k, channel, a:e]
+            if k >= bands:
+                for i in range(out.size):
+                    out[i] = zero
+                continue
+            y, h, w = basis[k - 1], harmonics[k, channel, a:e], weight[k - 1]
+            for i in range(out.size):
+                out[i] = y[i] * gc[i]
+                w[i] += gc[i] * h[i]
+    _direction_to_position(degree, d, weight, d_position[:, a:e], d_centre)
+
+
+_colour_kernel = jit(_colour_block)
+_colour_reverse_kernel = jit(_colour_reverse_block)
+
+
+def _colour_blocks(harmonics, residual, position, centre, degree, colour, clamped):
+    n = position.shape[1]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        _colour_kernel(harmonics, residual, position, centre, degree, colour, clamped, a, e)
+
+
+def _colour_reverse_blocks(
+    harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centres
+):
+    n = position.shape[1]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        _colour_reverse_kernel(
+            harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position,
+            d_centres[block], a, e,
+        )  # fmt: skip
+
+
 _colour_parallel = jit(_colour_blocks, parallel=True)
 _colour_reverse_parallel = jit(_colour_reverse_blocks, parallel=True)
 
