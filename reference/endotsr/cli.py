@@ -4,7 +4,6 @@ Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit c
 comparison did not pass, 2 input or usage that cannot be used, 130 interrupted.
 """
 
-import errno
 import importlib
 import os
 import sys
@@ -49,6 +48,8 @@ def main(argv: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
+        from endotsr.runs import os_error_line
+
         return _fail(os_error_line(error))
     except FloatingPointError as error:
         _fail(f"the training left the numbers: {error}; a smaller learning rate may help")
@@ -66,14 +67,6 @@ def _command(name: str):
 def _fail(message: str) -> int:
     print(f"endotsr: error: {' '.join(message.split())}", file=sys.stderr)
     return 2
-
-
-def os_error_line(error: OSError) -> str:
-    """One line for what the file system refused."""
-    where = f"{error.filename}: " if error.filename else ""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"{where}the disk is full; what was finished before is kept"
-    return f"{where}{error.strerror or error}"
 
 
 def _overview() -> str:

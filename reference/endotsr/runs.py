@@ -13,6 +13,7 @@ is cut at the checkpoint. Knows file names and JSON; knows nothing of models or 
 
 import contextlib
 import datetime
+import errno
 import importlib.metadata
 import json
 import math
@@ -91,16 +92,19 @@ def refuse_existing(path: Path) -> None:
 def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:
     """A new run folder, filled beside its final name and then renamed: it never exists half-written.
 
-    Raises:  InputError if `path` exists; OSError as the file system reports it (nothing stays behind).
+    Raises:  InputError if `path` exists or the file system refuses (nothing stays behind).
     """
     path = Path(path)
     refuse_existing(path)
-    path.absolute().parent.mkdir(parents=True, exist_ok=True)
-    with replacing_folder(path) as folder:
-        (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
-        write_json(folder / "run.json", record)
-        write_json(folder / "sequence.json", sequence_record)
-        (folder / "log.jsonl").touch()
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with replacing_folder(path) as folder:
+            (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
+            write_json(folder / "run.json", record)
+            write_json(folder / "sequence.json", sequence_record)
+            (folder / "log.jsonl").touch()
+    except OSError as error:
+        raise InputError(os_error_line(error, path)) from None
     return RunFolder(path)
 
 
@@ -212,6 +216,14 @@ def _finite(data: Any) -> Any:
     if hasattr(data, "tolist"):  # NumPy scalars and arrays
         return _finite(data.tolist())
     return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def os_error_line(error: OSError, where: object = None) -> str:
+    """One line for what the file system refused; `where` stands in for a file that the error does not name."""
+    place = error.filename or where
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    reason = "the disk is full" if full else error.strerror or str(error)
+    return f"{place}: {reason}" if place else reason
 
 
 def versions() -> dict[str, str]:

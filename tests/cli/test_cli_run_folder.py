@@ -45,7 +45,7 @@ def test_failure_while_filling_leaves_nothing(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(runs, "write_json", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(InputError, match="run: the disk is full"):
         created(tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 

@@ -138,7 +138,9 @@ def test_full_disk_keeps_the_last_checkpoint_or_leaves_nothing(checkpoint, finis
     monkeypatch.setattr(trainer, "save_state", full)
     code, said = run_line(capsys, *train_only(out))
     monkeypatch.undo()
-    assert code == 2 and "disk is full" in said.strip().splitlines()[-1]
+    last = said.strip().splitlines()[-1]
+    assert code == 2 and "disk is full" in last and str(out) in last
+    assert ("iteration 14 is kept" in last and "--resume" in last) == (checkpoint == 3)
     if checkpoint == 1:
         assert list(tmp_path.iterdir()) == []
     else:
@@ -159,7 +161,8 @@ def test_files_that_may_not_grow_leave_nothing_half_written(tmp_path):
         timeout=600,
     )
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert done.stderr.strip().splitlines()[-1].startswith("endotsr: error: ")
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("endotsr: error: ") and str(tmp_path / "run") in last
     assert list(tmp_path.iterdir()) == []
 
 

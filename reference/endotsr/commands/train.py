@@ -20,6 +20,7 @@ from endotsr.runs import (
     machine,
     now,
     open_run,
+    os_error_line,
     peak_memory_bytes,
     refuse_existing,
     versions,
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
 
 RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run: they change no number
 DEMONSTRATION = SimulatorSettings()
+
+
+class RunStopped(InputError):
+    """The file system refused in the middle of a run."""
 
 
 @dataclass
@@ -132,10 +137,11 @@ def train_new(
     folder = create_run(out, config, record, sequence_record(sequence))
     try:
         train_on(folder, state, sequence, config)
-    except OSError:
-        if not folder.checkpoint.exists():  # the disk filled up before anything of use was written
-            shutil.rmtree(folder.path, ignore_errors=True)
-        raise
+    except RunStopped as stopped:
+        if folder.checkpoint.exists():
+            raise
+        shutil.rmtree(folder.path, ignore_errors=True)  # nothing of use was written
+        raise InputError(str(stopped).split(";")[0]) from None
     return folder, sequence
 
 
@@ -174,8 +180,8 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
 def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config) -> Any:
     """Train from `state` to the end, with log, checkpoints and progress; returns the last state.
 
-    Raises:  KeyboardInterrupt with a line that says how to go on; OSError if the disk is full. The last checkpoint
-             and the log up to it are whole in both cases.
+    Raises:  KeyboardInterrupt or RunStopped (a full disk) with a line that says how to go on; the last checkpoint
+             and the log up to it are whole in both cases. FloatingPointError if the loss is not finite.
     """
     from endotsr.commands.progress import Progress
     from endotsr.commands.state import save_training
@@ -207,15 +213,22 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         folder.update(status="finished", finished=now(), iterations_done=last.iteration, **_costs(offset, began))
     except KeyboardInterrupt:
         _mark(folder, "interrupted")
-        kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet, it starts again"
-        raise KeyboardInterrupt(f"{kept}; continue with `endotsr train --out {folder.path} --resume`") from None
-    except (OSError, FloatingPointError):
+        raise KeyboardInterrupt(_way_on(folder, saved)) from None
+    except OSError as error:
+        _mark(folder, "failed")
+        raise RunStopped(f"{os_error_line(error, folder.path)}; {_way_on(folder, saved)}") from None
+    except FloatingPointError:
         _mark(folder, "failed")
         raise
     finally:
         progress.close()
         log.close()
     return last
+
+
+def _way_on(folder: RunFolder, saved: int | None) -> str:
+    kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet, it starts again"
+    return f"{kept}; continue with `endotsr train --out {folder.path} --resume`"
 
 
 def _mark(folder: RunFolder, status: str) -> None:
