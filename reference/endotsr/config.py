@@ -229,7 +229,7 @@ SHARP = Config(
     preset="sharp",
     model=ModelConfig(initial_width=0.05),
     loss=LossConfig(ssim_weight=0.2, lambda_lap="auto"),
-    training=TrainingConfig(time_jitter=1.0),
+    training=TrainingConfig(bridge_share=1.0),
 )
 
 # Milestones of the schedule, by section: they stretch with the length of the run.
@@ -256,11 +256,11 @@ def with_iterations(config: Config, iterations: int) -> Config:
 DEMO = msgspec.structs.replace(
     with_iterations(PAPER, 600),
     preset="demo",
-    # wide time bases and jitter suit its 24 frames; as many points as its 160x128 pixels can tell apart
+    # wide time bases and bridged times suit its 24 frames; as many points as its 160x128 pixels can tell apart
     model=ModelConfig(initial_width=0.1),
     initialisation=InitialisationConfig(first_frame_points=6000, other_frame_points=1500),
 )
-DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, time_jitter=1.0))
+DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, bridge_share=1.0))
 PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
 
 
