@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from endotsr import runs
+from endotsr.commands.sources import remembered_cameras, sequence_record
 from endotsr.config import PAPER
 from endotsr.errors import InputError
+from endotsr.simulator.settings import CameraMotion, SimulatorSettings
+from endotsr.simulator.simulate import simulate
 
 
 def created(path):
@@ -141,3 +144,17 @@ def test_machine_and_versions_say_something():
     assert {"endotsr", "python", "numpy", "numba"} <= set(runs.versions())
     peak = runs.peak_memory_bytes()
     assert peak is None or peak > 10_000_000
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_cameras_are_remembered_to_the_last_bit(moving, tmp_path):
+    settings = SimulatorSettings(width=32, height=24, frames=9, camera_motion=CameraMotion(on=moving))
+    sequence = simulate(settings).sequence
+    runs.write_json(tmp_path / "sequence.json", sequence_record(sequence))
+    record = json.loads((tmp_path / "sequence.json").read_text())
+    cameras = remembered_cameras(record)
+    assert len(cameras) == 9 and len(record["cameras"]) == (9 if moving else 1)
+    for camera, remembered in zip(sequence.cameras, cameras, strict=True):
+        for a, b in zip(camera, remembered, strict=True):
+            assert np.array_equal(a, b)
+    assert record["times"] == sequence.times.tolist() and record["test_index"] == sequence.test_index.tolist()

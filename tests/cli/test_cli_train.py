@@ -202,6 +202,26 @@ def test_resume_may_repeat_the_command_line(finished_run, tmp_path):
     assert main(train_only(out, "--resume", "--threads", "2")) == 0
 
 
+def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypatch):
+    words = ["--iterations", "12", "--loss.lambda-lap", "auto", "--training.checkpoint-every", "7"]
+    assert main(train_only(tmp_path / "a", *words)) == 0
+    weight = RunFolder(tmp_path / "a").record()["lambda_lap"]
+    assert weight > 0
+    save = trainer.save_state
+
+    def stop(path, state, config):
+        save(path, state, config)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(trainer, "save_state", stop)
+    assert main(train_only(tmp_path / "b", *words)) == 130
+    monkeypatch.undo()
+    monkeypatch.setattr(trainer, "calibrated_weight", None)  # a second calibration would be an error
+    assert main(resume(tmp_path / "b")) == 0
+    assert_same_run(tmp_path / "a", tmp_path / "b")
+    assert RunFolder(tmp_path / "b").record()["lambda_lap"] == weight
+
+
 @pytest.mark.parametrize("damage", ["truncated", "foreign"])
 def test_damaged_checkpoint_is_one_line(damage, finished_run, tmp_path, capsys):
     out = tmp_path / "run"
