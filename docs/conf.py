@@ -1,5 +1,6 @@
 """Sphinx configuration. Build: sphinx-build -W -b html docs docs/_build/html (extra `docs`)."""
 
+import os
 import shutil
 import sys
 from importlib.util import find_spec
@@ -13,8 +14,8 @@ author = "the endotsr authors"
 copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
 
 extensions = ["myst_nb", "paper_equations"]
-exclude_patterns = ["_build", "_extensions", "results/README.md", "**/*.json"]
-source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
+exclude_patterns = ["_build", "_extensions", "conf.py", "results/README.md", "results/*.py", "**/*.json"]
+source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
 # To add API pages: append "autodoc2" here and set
 #   autodoc2_packages = [{"path": "../reference/endotsr", "auto_mode": False}]
@@ -23,7 +24,13 @@ source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
-nb_execution_mode = "off"
+
+# The notebooks (docs/notebooks -> ../notebooks) are pages. Running all of them at full size takes minutes, so pages carry
+# their pictures only when asked for: ENDOTSR_DOCS_EXECUTE=1 runs each notebook once and keeps the results.
+nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
+nb_execution_mode = "cache" if os.environ.get("ENDOTSR_DOCS_EXECUTE") else "off"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 1200
 
 # The label is the number: `eq-b5` is displayed as (B5), see _extensions/paper_equations.py.
 numfig = True

@@ -1,0 +1,269 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 1. Time: the Fourier dictionary and its normalised atoms
+#
+# Both residuals of Endo-TSR are driven by the same $2F$ sinusoids of time. This notebook builds them, centres and scales
+# them over the training stamps, and shows the one case in which scaling would be fatal: an atom that is
+# zero at every stamp.
+#
+# Equations {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such words are links.
+#
+# How to read these notebooks: each equation is printed as the specification prints it, then **transcribed** into
+# NumPy symbol by symbol, then compared with the compiled function by an `assert`. Change one sign in either and the
+# notebook stops.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.equations.fourier import (
+    atom_statistics,
+    dictionary_forward,
+    dictionary_reverse,
+    frequencies,
+    normalise_forward,
+    normalise_reverse,
+    report_atoms,
+)
+
+# %% [markdown]
+# ## The dictionary
+#
+# The frequencies are log-spaced, in cycles per sequence:
+#
+# $$
+# \omega_f = \omega_{\min}\left(\frac{\omega_{\max}}{\omega_{\min}}\right)^{\frac{f-1}{F-1}},\qquad f = 1,\dots,F .
+# $$
+#
+# and the atoms are all sines, then all cosines:
+#
+# $$
+# \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
+# $$
+
+# %% tags=["transcription"]
+F, omega_min, omega_max = 8, 1.0, 16.0
+f = np.arange(1, F + 1)
+omega_text = omega_min * (omega_max / omega_min) ** ((f - 1) / (F - 1))
+
+
+def phi_text(t, omega):
+    """Equation (1) as printed."""
+    return np.concatenate([np.sin(2 * np.pi * omega * t), np.cos(2 * np.pi * omega * t)])
+
+
+# %% [markdown]
+# The functions of the package are `frequencies` and `dictionary_forward`. They agree with the text to rounding.
+
+# %%
+omega = frequencies(F, omega_min, omega_max)
+np.testing.assert_allclose(omega, omega_text, rtol=1e-14)
+assert omega[0] == 1.0 and omega[-1] == 16.0, "the end points are set, not computed"
+
+for t in (0.0, 0.137, 0.37, 0.81, -0.4, 1.9):
+    phi, _ = dictionary_forward(t, omega)
+    np.testing.assert_allclose(phi, phi_text(t, omega), atol=1e-13)
+
+# %% [markdown]
+# ### Why the phase is folded first
+#
+# $\sin(2\pi\cdot16\cdot\tfrac{5}{32})$ is the sine of five half turns: exactly 0. Floating point does not know $\pi$
+# exactly, so the printed formula gives noise. The specification removes whole turns and quarter turns **before** $\pi$
+# enters; both removals are exact. With $p=\omega t$, $r = p - \operatorname{round}(p)$, $k=\operatorname{round}(4r)$ and
+# $\delta = r - k/4$:
+#
+# $$
+# (\sin 2\pi p,\ \cos 2\pi p) =
+# \begin{cases}
+# (\phantom{-}\sin 2\pi\delta,\ \phantom{-}\cos 2\pi\delta) & k \equiv 0 \\
+# (\phantom{-}\cos 2\pi\delta,\ -\sin 2\pi\delta) & k \equiv 1 \\
+# (-\sin 2\pi\delta,\ -\cos 2\pi\delta) & k \equiv 2 \\
+# (-\cos 2\pi\delta,\ \phantom{-}\sin 2\pi\delta) & k \equiv 3
+# \end{cases}
+# \pmod 4 .
+# $$
+
+
+# %% tags=["transcription"]
+def folded_text(p):
+    """(sin 2 pi p, cos 2 pi p) with the phase p in turns, case by case."""
+    r = p - np.round(p)
+    k = np.round(4 * r)
+    delta = r - k / 4
+    s, c = np.sin(2 * np.pi * delta), np.cos(2 * np.pi * delta)
+    return {0: (s, c), 1: (c, -s), 2: (-s, -c), 3: (-c, s)}[int(k) % 4]
+
+
+# %%
+rng = np.random.default_rng(1)
+for t in rng.uniform(0, 1, 20):
+    phi, _ = dictionary_forward(t, omega)
+    sines, cosines = zip(*(folded_text(w * t) for w in omega))
+    np.testing.assert_allclose(phi, [*sines, *cosines], atol=1e-16)
+
+phi, _ = dictionary_forward(5 / 32, omega)
+print("as printed:", phi_text(5 / 32, omega)[F - 1], "  folded:", phi[F - 1])
+assert phi[F - 1] == 0.0 and phi_text(5 / 32, omega)[F - 1] != 0.0
+
+# %% [markdown]
+# ## Centred and scaled over the training stamps
+#
+# The colour residual must not be able to change the mean colour of a Gaussian: that is the job of its base colour. So its
+# atoms have mean 0 over the training stamps $\mathcal T$; and RMS 1, so that a coefficient means the same at every frequency:
+#
+# $$
+# \begin{aligned}
+# m_k &= \frac1n\sum_{t\in\mathcal T}\phi_k(t),\qquad
+# \rho^{\mathrm{rms}}_k = \sqrt{\frac1n\sum_{t\in\mathcal T}\bigl(\phi_k(t)-m_k\bigr)^2},\\
+# \bar\phi_k(t) &= \begin{cases} \dfrac{\phi_k(t)-m_k}{\rho^{\mathrm{rms}}_k} & \rho^{\mathrm{rms}}_k \ge 10^{-6}\\[2ex] 0 & \text{otherwise (dead)} \end{cases}
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def normalise_text(phi, stamps, omega):
+    """Equation (1b) as printed, for one vector of raw atoms."""
+    atoms = np.array([phi_text(t, omega) for t in stamps])
+    n = len(stamps)
+    m = atoms.sum(axis=0) / n
+    rms = np.sqrt(((atoms - m) ** 2).sum(axis=0) / n)
+    return np.array([(p - mk) / rk if rk >= 1e-6 else 0.0 for p, mk, rk in zip(phi, m, rms)])
+
+
+# %%
+stamps = np.delete(np.arange(24), [1, 9, 17]) / 24  # 24 frames, every eighth is held out
+statistics = atom_statistics(stamps, omega)
+for t in (0.0, 0.31, 0.77):
+    phi, _ = dictionary_forward(t, omega)
+    phi_bar, saved_bar = normalise_forward(phi, statistics)
+    np.testing.assert_allclose(phi_bar, normalise_text(phi, stamps, omega), atol=1e-12)
+
+bars = np.array([normalise_forward(dictionary_forward(t, omega)[0], statistics)[0] for t in stamps])
+np.testing.assert_allclose(bars.mean(axis=0), 0, atol=1e-14)
+np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
+
+# %% [markdown]
+# ## The dead atom
+#
+# Take a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$: the atom exists between the
+# frames, but no frame ever sees it. Its RMS is 0. Divided by computed noise, it would come back as a random
+# signal of size 1 and be trained on. The rule: RMS below $10^{-6}$, and the atom is 0 in value and in gradient.
+
+# %%
+stamps_32 = np.arange(32) / 32
+statistics_32 = atom_statistics(stamps_32, omega)
+assert np.flatnonzero(statistics_32.dead).tolist() == [F - 1]
+print(report_atoms(stamps_32, omega))
+
+naive = np.array([np.sin(2 * np.pi * 16.0 * t) for t in stamps_32])
+resurrected = (naive - naive.mean()) / naive.std()  # what a division without the rule makes of rounding noise
+right = [normalise_forward(dictionary_forward(t, omega)[0], statistics_32)[0][F - 1] for t in stamps_32]
+assert np.abs(resurrected).max() > 1 and not np.any(right)
+
+# %%
+fine = np.linspace(0, 1, 801)
+raw = np.array([dictionary_forward(t, omega)[0] for t in fine])
+bar = np.array([normalise_forward(p, statistics)[0] for p in raw])
+figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+shown = ((F, "cos, 1 cycle", "tab:blue"), (1, "sin, 1.5 cycles", "tab:red"), (3, "sin, 3.3 cycles", "tab:green"))
+for panel, values, title in (
+    (axes[0], raw, "raw atoms $\\phi_k(t)$"),
+    (axes[1], bar, "normalised atoms $\\bar\\phi_k(t)$"),
+):
+    for k, label, colour in shown:
+        panel.plot(fine, values[:, k], color=colour, lw=1.2, label=label)
+        panel.plot(stamps, np.interp(stamps, fine, values[:, k]), ".", color=colour, ms=6)
+        on_frames = np.interp(stamps, fine, values[:, k]).mean()
+        panel.axhline(on_frames, color=colour, ls=":", lw=1)
+    panel.set(title=title, xlabel="t")
+    panel.set_ylim(-1.7, 1.7)
+axes[0].legend(loc="lower left", fontsize=8, ncols=3, columnspacing=0.8)
+axes[1].text(0.02, 0.03, "dots: training stamps; dotted: their mean", transform=axes[1].transAxes, fontsize=8)
+axes[2].plot(fine, np.sin(2 * np.pi * 16 * fine), color="0.75", lw=0.8, label="sin, 16 cycles")
+axes[2].plot(stamps_32, resurrected, "x", color="tab:red", label="divided by its noise")
+axes[2].plot(stamps_32, right, "o", color="tab:green", ms=4, label="endotsr: dead, exactly 0")
+axes[2].set(title="the dead atom, 32 frames", xlabel="t")
+axes[2].set_ylim(-3.2, 3.2)
+axes[2].legend(fontsize=8, loc="lower left")
+
+# %% [markdown]
+# ## The reverse pass
+#
+# $g_X$ always means $\partial\mathcal L/\partial X$. In words: a step $\mathrm d\omega_f$ moves the phase by
+# $2\pi t\,\mathrm d\omega_f$; a step of the phase moves the sine by $+\cos$ and the cosine by $-\sin$:
+# $\mathrm d\phi_f = c_f\,\mathrm d(2\pi\omega_f t)$ and $\mathrm d\phi_{F+f} = -s_f\,\mathrm d(2\pi\omega_f t)$. Collect both:
+#
+# $$
+# g_{\omega_f} = 2\pi t\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr),\qquad
+# g_t = \sum_{f=1}^{F} 2\pi\omega_f\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr).
+# $$
+#
+# The statistics are constants of the derivative, so normalising only scales:
+#
+# $$
+# g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
+# $$
+
+
+# %% tags=["transcription"]
+def dictionary_reverse_text(g_phi, t, omega):
+    s, c = np.sin(2 * np.pi * omega * t), np.cos(2 * np.pi * omega * t)
+    g_omega = 2 * np.pi * t * (g_phi[:F] * c - g_phi[F:] * s)
+    g_t = np.sum(2 * np.pi * omega * (g_phi[:F] * c - g_phi[F:] * s))
+    return g_t, g_omega
+
+
+def normalise_reverse_text(g_phi_bar, rms):
+    return np.array([g / rk if rk >= 1e-6 else 0.0 for g, rk in zip(g_phi_bar, rms)])
+
+
+# %%
+g_phi = rng.normal(size=2 * F)
+_, saved = dictionary_forward(0.37, omega)
+grads = dictionary_reverse(g_phi, saved)
+g_t, g_omega = dictionary_reverse_text(g_phi, 0.37, omega)
+np.testing.assert_allclose(grads.t, g_t, rtol=1e-12)
+np.testing.assert_allclose(grads.omega, g_omega, rtol=1e-11)
+
+_, saved_32 = normalise_forward(phi, statistics_32)
+np.testing.assert_allclose(
+    normalise_reverse(g_phi, saved_32), normalise_reverse_text(g_phi, statistics_32.rms), rtol=1e-14
+)
+
+# %% [markdown]
+# ## The gradient check
+#
+# No formula is believed on sight. `check_pair` compares the reverse pass with differences of the forward pass along random
+# directions and single entries. There is no absolute tolerance: a zero gradient against a non-zero difference fails.
+
+# %%
+with one_thread():
+    reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in ("dictionary", "normalise")]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## Exercise
+#
+# The dictionary has 16 atoms. Over 24 frames with three held out there are 21 stamps, more than 16. Can the stamps tell all
+# 16 atoms apart? And with 32 frames, none held out? Guess the rank of the normalised dictionary in both cases, then
+# open the answer.
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead, so at most 15 remain: that
+# is why the rank is reported, and why a clip whose frames lie on the grid of the highest frequency is a special one.
+assert report_atoms(stamps, omega).rank == 16
+assert report_atoms(stamps_32, omega).rank == 15
+print(report_atoms(stamps, omega).rank, report_atoms(stamps_32, omega).rank)

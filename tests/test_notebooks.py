@@ -1,0 +1,81 @@
+"""The notebooks run, stay text, print the displays of the specification and cover the paper's equations."""
+
+import os
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
+SPECIFICATION = ROOT / "docs" / "specification"
+DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
+
+
+def prose(file: Path) -> str:
+    """The Markdown cells as text, comment signs removed."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return "\n".join(line.removeprefix("#").removeprefix(" ") for line in lines if line.startswith("#"))
+
+
+def displays(text: str) -> list[tuple[str, str]]:
+    """(content, label or "") of every display."""
+    return [(content, label or "") for content, label in DISPLAY.findall(text)]
+
+
+def in_specification() -> dict[str, str]:
+    text = "\n\n".join(page.read_text(encoding="utf-8") for page in sorted(SPECIFICATION.glob("*.md")))
+    return dict(displays(text))
+
+
+@pytest.fixture(autouse=True)
+def _drawn_to_nowhere(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setenv("ENDOTSR_NOTEBOOK_SIZE", os.environ.get("ENDOTSR_NOTEBOOK_SIZE", "small"))
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("Agg")
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_notebook_runs(file, capsys):
+    runpy.run_path(str(file), run_name="__main__")
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_notebook_is_one_for_jupyter(file):
+    jupytext = pytest.importorskip("jupytext")
+    book = jupytext.read(file, fmt="py:percent")
+    text = jupytext.writes(book, fmt="ipynb")
+    assert '"nbformat": 4' in text
+    assert book.metadata["kernelspec"]["name"] == "python3"
+    answers = [cell for cell in book.cells if "hide-cell" in cell.metadata.get("tags", [])]
+    assert len(answers) == 1, "one exercise with a hidden answer"
+    assert all(cell.metadata["jupyter"]["source_hidden"] for cell in answers)
+    assert any("transcription" in cell.metadata.get("tags", []) for cell in book.cells)
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_displays_are_those_of_the_specification(file):
+    """Every display is printed as the specification prints it, and every equation of the title is displayed."""
+    known = in_specification()
+    shown = displays(prose(file))
+    for content, _ in shown:
+        assert content in known, f"not in the specification:\n{content}"
+    announced = LINK.findall(prose(file).split("\n## ")[0])
+    missing = set(announced) - {known[content] for content, _ in shown}
+    assert announced and not missing, f"announced, but not displayed: {sorted(missing)}"
+
+
+@pytest.mark.parametrize("label", list("1234567"))
+def test_every_equation_of_the_paper_has_a_notebook(label):
+    content = {label: content for content, label in in_specification().items()}[label]
+    assert [file.name for file in NOTEBOOKS if content in prose(file)], f"equation ({label}) is displayed nowhere"
+
+
+def test_no_stored_notebooks():
+    assert not list((ROOT / "notebooks").rglob("*.ipynb")), "notebooks are kept as py:percent text only"
