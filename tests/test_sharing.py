@@ -1,0 +1,117 @@
+"""Ranges of a kernel on several threads: every task once, errors reach the caller, forks and other threads work."""
+
+import gc
+import multiprocessing
+import threading
+import time
+import weakref
+from itertools import pairwise
+
+import numba
+import numpy as np
+import pytest
+
+from endotsr import sharing
+from endotsr.jit import jit
+from endotsr.sharing import share
+
+
+def _count(first, stop, out):
+    for i in range(first, stop):
+        out[i] += 1
+
+
+count = jit(_count)
+
+
+@pytest.fixture(params=(1, 2))
+def threads(request):
+    if request.param > numba.config.NUMBA_NUM_THREADS:  # type: ignore[attr-defined]
+        pytest.skip("one thread only (NUMBA_NUM_THREADS)")
+    before = numba.get_num_threads()
+    numba.set_num_threads(request.param)
+    yield request.param
+    numba.set_num_threads(before)
+
+
+@pytest.mark.parametrize("tasks", [0, 1, 2, 3, 7, 8, 9, 1000])
+def test_every_task_once(threads, tasks):
+    out = np.zeros(tasks, np.int64)
+    for _ in range(3):
+        share(count, tasks, out)
+    assert (out == 3).all()
+
+
+class Recorder:
+    """Stands for a compiled kernel: it has overloads."""
+
+    def __init__(self, fail_at=None):
+        self.ranges, self.fail_at, self.overloads = [], fail_at, {"one": None}
+
+    def __call__(self, first, stop):
+        self.ranges.append((first, stop))
+        if self.fail_at is not None and first <= self.fail_at < stop:
+            raise ValueError(f"task {self.fail_at}")
+
+
+def test_ranges_make_up_the_whole(threads):
+    recorder = Recorder()
+    share(recorder, 37)
+    ranges = sorted(recorder.ranges)
+    assert ranges[0][0] == 0 and ranges[-1][1] == 37
+    assert all(a[1] == b[0] for a, b in pairwise(ranges))
+    assert len(ranges) == (1 if threads == 1 else threads * sharing.PIECES)
+
+
+def test_errors_reach_the_caller_and_the_threads_live_on(threads):
+    with pytest.raises(ValueError, match="task 30"):
+        share(Recorder(fail_at=30), 37)
+    test_every_task_once(threads, 100)
+
+
+def test_undecorated_functions_run_here(threads):
+    seen = []
+    share(lambda first, stop: seen.append((first, stop, threading.current_thread())), 5)
+    assert seen == [(0, 5, threading.current_thread())]
+
+
+def test_calls_from_several_threads(threads):
+    outs = [np.zeros(5000, np.int64) for _ in range(4)]
+    callers = [
+        threading.Thread(target=lambda out=out: [share(count, out.size, out) for _ in range(50)]) for out in outs
+    ]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert all((out == 50).all() for out in outs)
+
+
+def test_arrays_are_let_go(threads):
+    out = np.zeros(100, np.int64)
+    share(count, 100, out)
+    gone = weakref.ref(out)
+    del out
+    end = time.monotonic() + 20
+    while gone() is not None and time.monotonic() < end:  # a delayed thread still has to take its leave
+        time.sleep(0.005)
+        gc.collect()
+    assert gone() is None
+
+
+def _shared_in_a_fork(queue):
+    out = np.zeros(100, np.int64)
+    share(count, 100, out)
+    queue.put(int(out.sum()))
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own(threads):
+    share(count, 100, np.zeros(100, np.int64))
+    fork = multiprocessing.get_context("fork")
+    queue = fork.SimpleQueue()
+    child = fork.Process(target=_shared_in_a_fork, args=(queue,))
+    child.start()
+    child.join(30)
+    assert child.exitcode == 0 and queue.get() == 100
