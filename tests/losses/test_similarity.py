@@ -85,12 +85,12 @@ def _mean_inside(rendered, observed, inside, everywhere):
 
     target = similarity.ssim_target(observed, everywhere)
     shape = (1, 34, 34)
-    difference, total = np.empty(shape, observed.dtype), np.empty(shape, observed.dtype)
-    similarity._difference_and_sum_kernel(rendered, target.image, everywhere, difference, total)
+    difference, total = np.zeros(shape, observed.dtype), np.zeros(shape, observed.dtype)
+    similarity._difference_and_sum_kernel(0, 24, rendered, target.image, everywhere, difference, total)
     totals = np.empty(24)
     slopes = np.empty((3, *shape), observed.dtype)
     weights = similarity.window(observed.dtype)
-    similarity._similarity_kernel(difference, total, inside, weights, slopes, totals)
+    similarity._similarity_kernel(0, 24, difference, total, inside, weights, slopes, totals)
     return 1 - totals.sum() / inside.sum()
 
 

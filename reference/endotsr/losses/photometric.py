@@ -6,11 +6,11 @@ is selected, not multiplied, by the mask: whatever stands under an instrument, N
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from endotsr.jit import jit
 from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.sharing import share
 
 
 class MaskedL1Saved(NamedTuple):
@@ -44,7 +44,7 @@ def masked_l1_forward(rendered: FloatArray, observed: FloatArray, mask: BoolArra
     if saved.count == 0:
         return 0.0, saved
     totals = np.empty(rendered.shape[0] * rendered.shape[1])
-    _absolute_difference_kernel(rendered, observed, mask, totals)
+    share(_absolute_difference_kernel, totals.size, rendered, observed, mask, totals)
     return float(totals.sum()) / saved.count, saved
 
 
@@ -53,26 +53,27 @@ def masked_l1_reverse(d_loss: float, saved: MaskedL1Saved) -> FloatArray:
     d_rendered = np.zeros_like(saved.rendered)
     if saved.count > 0:
         step = saved.rendered.dtype.type(float(d_loss) / saved.count)
-        _sign_kernel(saved.rendered, saved.observed, saved.mask, step, d_rendered)
+        rows = d_rendered.shape[0] * d_rendered.shape[1]
+        share(_sign_kernel, rows, saved.rendered, saved.observed, saved.mask, step, d_rendered)
     return d_rendered
 
 
-def _absolute_difference(rendered, observed, mask, totals):
-    channels, height, width = rendered.shape
+def _absolute_difference(first, stop, rendered, observed, mask, totals):
+    height, width = mask.shape
     zero = rendered.dtype.type(0)
-    for index in numba.prange(channels * height):
+    line = np.empty(width, rendered.dtype)
+    for index in range(first, stop):
         channel, y = index // height, index % height
         seen, wanted, tissue = rendered[channel, y], observed[channel, y], mask[y]
-        line = np.empty(width, rendered.dtype)
         for i in range(width):
             line[i] = abs(seen[i] - wanted[i]) if tissue[i] else zero
         totals[index] = row_total(line)
 
 
-def _sign(rendered, observed, mask, step, d_rendered):
-    channels, height, width = rendered.shape
+def _sign(first, stop, rendered, observed, mask, step, d_rendered):
+    height, width = mask.shape
     zero = rendered.dtype.type(0)
-    for index in numba.prange(channels * height):
+    for index in range(first, stop):
         channel, y = index // height, index % height
         seen, wanted, tissue = rendered[channel, y], observed[channel, y], mask[y]
         out = d_rendered[channel, y]
@@ -82,5 +83,5 @@ def _sign(rendered, observed, mask, step, d_rendered):
             out[i] = slope if tissue[i] else zero
 
 
-_absolute_difference_kernel = jit(_absolute_difference, parallel=True)
-_sign_kernel = jit(_sign, parallel=True)
+_absolute_difference_kernel = jit(_absolute_difference)
+_sign_kernel = jit(_sign)

@@ -7,7 +7,7 @@ number of threads, and the row totals are added by one thread, so a loss is bitw
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit_inline
+from endotsr.jit import jit
 
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
@@ -27,7 +27,7 @@ def _row_total(row):
     return (first + second) + (third + fourth)
 
 
-row_total = jit_inline(_row_total)
+row_total = jit(_row_total)
 
 
 def check_image(name: str, image: FloatArray, mask: BoolArray) -> FloatArray:

@@ -21,11 +21,11 @@ weight w0 = 0.27 bounds the cancellation: sigma^2 >= w0 sum w (x - c)^2 in eithe
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from endotsr.jit import jit, jit_inline
+from endotsr.jit import jit
 from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.sharing import share
 
 RADIUS = 5  # the window spans 11 pixels
 TAPS = 2 * RADIUS + 1
@@ -84,8 +84,10 @@ def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float
         return 1.0, saved
     image = target.image.astype(rendered.dtype, copy=False)
     totals = np.empty(channels * height)
-    _difference_and_sum_kernel(rendered, image, target.mask, difference, total)
-    _similarity_kernel(difference, total, target.mask, window(rendered.dtype), slopes, totals)
+    for array in (difference, total, slopes):
+        _clear_border(array)
+    share(_difference_and_sum_kernel, totals.size, rendered, image, target.mask, difference, total)
+    share(_similarity_kernel, totals.size, difference, total, target.mask, window(rendered.dtype), slopes, totals)
     return 1.0 - float(totals.sum()) / target.count, saved
 
 
@@ -96,7 +98,8 @@ def masked_ssim_reverse(d_ssim: float, saved: SsimSaved) -> FloatArray:
     if target.count > 0:
         scale = d_rendered.dtype.type(float(d_ssim) / target.count)
         weights = window(d_rendered.dtype)
-        _similarity_reverse_kernel(*saved[:3], target.mask, weights, scale, d_rendered)
+        rows = target.image.shape[0] * target.image.shape[1]
+        share(_similarity_reverse_kernel, rows, *saved[:3], target.mask, weights, scale, d_rendered)
     return d_rendered
 
 
@@ -107,30 +110,24 @@ def window(dtype: np.dtype) -> FloatArray:
     return (weights / weights.sum()).astype(dtype)
 
 
-def _difference_and_sum(rendered, image, mask, difference, total):
-    """e and s on tissue, 0 elsewhere and in the padding."""
-    channels, height, width = rendered.shape
+def _clear_border(padded: FloatArray) -> None:
+    """The padding of the last two axes set to 0."""
+    for border in (slice(None, RADIUS), slice(-RADIUS, None)):
+        padded[..., border, :] = 0
+        padded[..., border] = 0
+
+
+def _difference_and_sum(first, stop, rendered, image, mask, difference, total):
+    """e and s on tissue, 0 elsewhere."""
+    height, width = mask.shape
     zero = rendered.dtype.type(0)
-    for index in numba.prange(channels * (height + 2 * RADIUS)):
-        channel, y = index // (height + 2 * RADIUS), index % (height + 2 * RADIUS)
-        difference_row, total_row = difference[channel, y], total[channel, y]
-        if y < RADIUS or y >= height + RADIUS:
-            difference_row[:] = zero
-            total_row[:] = zero
-        else:
-            _clear_ends(difference_row)
-            _clear_ends(total_row)
-            seen, wanted, tissue = rendered[channel, y - RADIUS], image[channel, y - RADIUS], mask[y - RADIUS]
-            e, s = difference_row[RADIUS : RADIUS + width], total_row[RADIUS : RADIUS + width]
-            for i in range(width):
-                e[i] = seen[i] - wanted[i] if tissue[i] else zero
-                s[i] = seen[i] + wanted[i] if tissue[i] else zero
-
-
-def _clear_ends(row):
-    for i in range(RADIUS):
-        row[i] = row.dtype.type(0)
-        row[row.size - 1 - i] = row.dtype.type(0)
+    for index in range(first, stop):
+        channel, y = index // height, index % height
+        seen, wanted, tissue = rendered[channel, y], image[channel, y], mask[y]
+        e, s = difference[channel, y + RADIUS, RADIUS:], total[channel, y + RADIUS, RADIUS:]
+        for i in range(width):
+            e[i] = seen[i] - wanted[i] if tissue[i] else zero
+            s[i] = seen[i] + wanted[i] if tissue[i] else zero
 
 
 def _column_moments(rows, weights, mean, variance):
@@ -162,7 +159,7 @@ def _row_moments(column_mean, column_variance, weights, mean, variance):
         variance[i] = second - first * first
 
 
-def _similarity(difference, total, mask, weights, slopes, totals):
+def _similarity(first, stop, difference, total, mask, weights, slopes, totals):
     """1 - SSIM summed along each row, and the three slope maps of the reverse pass.
 
     d sum_p SSIM_p / dx_q = sum_p w(p - q) [a + 2 b (e_q - mu_e) + 2 c (s_q - mu_s)] with, all at tissue pixel p,
@@ -173,19 +170,19 @@ def _similarity(difference, total, mask, weights, slopes, totals):
     real = difference.dtype.type
     zero, half, one, two = real(0), real(0.5), real(1), real(2)
     c1, c2 = real(C1), real(C2)
-    for index in numba.prange(totals.size):
+    columns = np.empty((4, width + 2 * RADIUS), difference.dtype)
+    lines = np.empty((5, width), difference.dtype)
+    mean_e, variance_e, mean_s, variance_s, dissimilarity = lines[0], lines[1], lines[2], lines[3], lines[4]
+    for index in range(first, stop):
         channel, y = index // height, index % height
-        columns = np.empty((4, width + 2 * RADIUS), difference.dtype)
         _column_moments(difference[channel, y : y + TAPS], weights, columns[0], columns[1])
         _column_moments(total[channel, y : y + TAPS], weights, columns[2], columns[3])
-        lines = np.empty((5, width), difference.dtype)
-        mean_e, variance_e, mean_s, variance_s, dissimilarity = lines[0], lines[1], lines[2], lines[3], lines[4]
         _row_moments(columns[0], columns[1], weights, mean_e, variance_e)
         _row_moments(columns[2], columns[3], weights, mean_s, variance_s)
         tissue = mask[y]
-        slope_1 = slopes[0, channel, y + RADIUS, RADIUS : RADIUS + width]
-        slope_e = slopes[1, channel, y + RADIUS, RADIUS : RADIUS + width]
-        slope_s = slopes[2, channel, y + RADIUS, RADIUS : RADIUS + width]
+        slope_1 = slopes[0, channel, y + RADIUS, RADIUS:]
+        slope_e = slopes[1, channel, y + RADIUS, RADIUS:]
+        slope_s = slopes[2, channel, y + RADIUS, RADIUS:]
         for i in range(width):
             b1 = (mean_s[i] * mean_s[i] + mean_e[i] * mean_e[i]) * half + c1
             b2 = (variance_s[i] + variance_e[i]) * half + c2
@@ -200,28 +197,21 @@ def _similarity(difference, total, mask, weights, slopes, totals):
             slope_e[i] = b if tissue[i] else zero
             slope_s[i] = c if tissue[i] else zero
         totals[index] = row_total(dissimilarity)
-        for k in range(3):
-            _clear_ends(slopes[k, channel, y + RADIUS])
-            if y == 0:
-                slopes[k, channel, :RADIUS] = zero
-            if y == height - 1:
-                slopes[k, channel, height + RADIUS :] = zero
 
 
-def _similarity_reverse(difference, total, slopes, mask, weights, scale, d_rendered):
+def _similarity_reverse(first, stop, difference, total, slopes, mask, weights, scale, d_rendered):
     """The transposed window is the window itself: three smoothed maps, combined at each tissue pixel."""
-    channels, height, width = d_rendered.shape
+    height, width = mask.shape
     two, zero = d_rendered.dtype.type(2), d_rendered.dtype.type(0)
-    for index in numba.prange(channels * height):
+    columns = np.empty(width + 2 * RADIUS, d_rendered.dtype)
+    smooth = np.empty((3, width), d_rendered.dtype)
+    alone, with_e, with_s = smooth[0], smooth[1], smooth[2]
+    for index in range(first, stop):
         channel, y = index // height, index % height
-        columns = np.empty((3, width + 2 * RADIUS), d_rendered.dtype)
-        smooth = np.empty((3, width), d_rendered.dtype)
         for k in range(3):
-            _smooth_columns(slopes[k, channel, y : y + TAPS], weights, columns[k])
-            _smooth_row(columns[k], weights, smooth[k])
-        alone, with_e, with_s = smooth[0], smooth[1], smooth[2]
-        e = difference[channel, y + RADIUS, RADIUS : RADIUS + width]
-        s = total[channel, y + RADIUS, RADIUS : RADIUS + width]
+            _smooth_columns(slopes[k, channel, y : y + TAPS], weights, columns)
+            _smooth_row(columns, weights, smooth[k])
+        e, s = difference[channel, y + RADIUS, RADIUS:], total[channel, y + RADIUS, RADIUS:]
         out, tissue = d_rendered[channel, y], mask[y]
         for i in range(width):
             slope = scale * (alone[i] + two * (e[i] * with_e[i] + s[i] * with_s[i]))
@@ -244,9 +234,8 @@ def _smooth_row(line, weights, out):
         out[i] = value
 
 
-_clear_ends = jit_inline(_clear_ends)
-_column_moments, _row_moments = jit_inline(_column_moments), jit_inline(_row_moments)
-_smooth_columns, _smooth_row = jit_inline(_smooth_columns), jit_inline(_smooth_row)
-_difference_and_sum_kernel = jit(_difference_and_sum, parallel=True)
-_similarity_kernel = jit(_similarity, parallel=True)
-_similarity_reverse_kernel = jit(_similarity_reverse, parallel=True)
+_column_moments, _row_moments = jit(_column_moments), jit(_row_moments)
+_smooth_columns, _smooth_row = jit(_smooth_columns), jit(_smooth_row)
+_difference_and_sum_kernel = jit(_difference_and_sum)
+_similarity_kernel = jit(_similarity)
+_similarity_reverse_kernel = jit(_similarity_reverse)

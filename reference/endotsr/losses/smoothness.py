@@ -11,11 +11,11 @@ gradient. Edges come as a boolean array from outside (the edge detector is not d
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from endotsr.jit import jit, jit_inline
+from endotsr.jit import jit
 from endotsr.losses.rows import BoolArray, FloatArray, check_image, check_plane, row_total
+from endotsr.sharing import share
 
 FEW_PIXELS = 1e-6  # keeps S finite without valid pixels
 
@@ -76,8 +76,9 @@ def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads
     d_depth, d_rendered = np.zeros_like(depth), np.zeros_like(rendered)
     if factor != 0:
         d_variation = float(d_loss) * factor
-        _variation_reverse_kernel(depth[None], saved.mask, depth.dtype.type(d_variation / depth.size), d_depth[None])
-        _variation_reverse_kernel(rendered, saved.mask, rendered.dtype.type(d_variation / rendered.size), d_rendered)
+        for image, d_image in ((depth[None], d_depth[None]), (rendered, d_rendered)):
+            weight = image.dtype.type(d_variation / image.size)
+            share(_variation_reverse_kernel, image.shape[0] * image.shape[1], image, saved.mask, weight, d_image)
     twice = depth.dtype.type(2 * float(d_loss) * _smooth_weight(saved.smooth))
     _squared_steps_reverse_kernel(depth, saved.smooth, twice, d_depth)
     return SmoothnessGrads(rendered=d_rendered, rendered_depth=d_depth)
@@ -90,42 +91,43 @@ def _smooth_weight(smooth: BoolArray) -> float:
 def _total_variation(image: FloatArray, mask: BoolArray) -> float:
     """TV((1 - M) image), dimension of the image."""
     totals = np.empty(image.shape[0] * image.shape[1])
-    _variation_kernel(image, mask, totals)
+    share(_variation_kernel, totals.size, image, mask, totals)
     return float(totals.sum()) / image.size
 
 
-def _variation(image, mask, totals):
+def _variation(first, stop, image, mask, totals):
     """Sum of |step| to the right and downwards, per (channel, row)."""
-    channels, height, width = image.shape
-    zero = image.dtype.type(0)
-    for index in numba.prange(channels * height):
+    height, width = mask.shape
+    scratch = np.empty((3, width), image.dtype)
+    line, other, steps = scratch[0], scratch[1], scratch[2]
+    for index in range(first, stop):
         channel, y = index // height, index % height
-        line, other, steps = np.empty(width, image.dtype), np.empty(width, image.dtype), np.empty(width, image.dtype)
         _outside_tissue(image[channel, y], mask[y], line)
-        steps[width - 1] = zero
+        steps[width - 1] = image.dtype.type(0)
         for i in range(width - 1):
             steps[i] = abs(line[i + 1] - line[i])
         if y + 1 < height:
-            below, tissue_below = image[channel, y + 1], mask[y + 1]
-            _outside_tissue(below, tissue_below, other)
+            _outside_tissue(image[channel, y + 1], mask[y + 1], other)
             for i in range(width):
                 steps[i] += abs(other[i] - line[i])
         totals[index] = row_total(steps)
 
 
-def _variation_reverse(image, mask, weight, d_image):
+def _variation_reverse(first, stop, image, mask, weight, d_image):
     """Adds weight x (sign of the steps that end here - sign of the steps that start here) outside tissue."""
-    channels, height, width = image.shape
+    height, width = mask.shape
     zero = image.dtype.type(0)
-    for index in numba.prange(channels * height):
+    scratch = np.empty((3, width), image.dtype)
+    line, other, slope = scratch[0], scratch[1], scratch[2]
+    for index in range(first, stop):
         channel, y = index // height, index % height
-        line, other, slope = np.empty(width, image.dtype), np.empty(width, image.dtype), np.zeros(width, image.dtype)
         _outside_tissue(image[channel, y], mask[y], line)
+        slope[width - 1] = zero
         for i in range(width - 1):
             slope[i] = _sign(line[i] - line[i + 1])
         for i in range(width - 1):
             slope[i + 1] += _sign(line[i + 1] - line[i])
-        for neighbour in (y - 1, y + 1):
+        for neighbour in range(y - 1, y + 2, 2):
             if 0 <= neighbour < height:
                 _outside_tissue(image[channel, neighbour], mask[neighbour], other)
                 for i in range(width):
@@ -183,7 +185,7 @@ def _squared_steps_reverse(depth, smooth, twice, d_depth):
         for i in range(width - 1):
             change = twice * (row[i + 1] - row[i])
             out[i + 1] += change if use[i] & use[i + 1] else zero
-        for neighbour in (y - 1, y + 1):
+        for neighbour in range(y - 1, y + 2, 2):
             if 0 <= neighbour < height:
                 other, use_other = depth[neighbour], smooth[neighbour]
                 for i in range(width):
@@ -191,8 +193,8 @@ def _squared_steps_reverse(depth, smooth, twice, d_depth):
                     out[i] += change if use[i] & use_other[i] else zero
 
 
-_outside_tissue, _sign = jit_inline(_outside_tissue), jit_inline(_sign)
+_outside_tissue, _sign = jit(_outside_tissue), jit(_sign)
 _squared_steps_kernel = jit(_squared_steps)
 _squared_steps_reverse_kernel = jit(_squared_steps_reverse)
-_variation_kernel = jit(_variation, parallel=True)
-_variation_reverse_kernel = jit(_variation_reverse, parallel=True)
+_variation_kernel = jit(_variation)
+_variation_reverse_kernel = jit(_variation_reverse)
