@@ -9,11 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from endotsr.equations.atom_sums import BLOCK, combine, spread
-from endotsr.jit import jit, jit_inline
+from endotsr.equations.atom_sums import combine, spread
+from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
 
 FloatArray = NDArray[np.floating]
@@ -53,7 +53,7 @@ def _exp_nonpositive(z):
     return exp2_nonpositive(-k) * exp2_nonpositive(-(r * real(LOG2_E)))
 
 
-_exp_nonpositive_inline = jit_inline(_exp_nonpositive)
+_exp_nonpositive_kernel = jit(_exp_nonpositive)
 
 
 def _tanh_and_slope(x):
@@ -66,7 +66,7 @@ def _tanh_and_slope(x):
     """
     real = type(x)
     size = abs(x)
-    e = _exp_nonpositive_inline(size + size)
+    e = _exp_nonpositive_kernel(size + size)
     one_more = real(1.0) + e
     large = (real(1.0) - e) / one_more
     q = min(x * x, real(1.0))  # the convergent is used below 1/2 only; elsewhere it must not overflow
@@ -77,24 +77,18 @@ def _tanh_and_slope(x):
     return math.copysign(value, x), real(4.0) * (e / one_more) / one_more
 
 
-_tanh_and_slope_inline = jit_inline(_tanh_and_slope)
+_tanh_and_slope_kernel = jit(_tanh_and_slope)
 
 
-def _squash(argument, scale, residual, slope):
-    n = argument.size
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        start = block * BLOCK
-        stop = min(n, start + BLOCK)
-        x = argument[start:stop]
-        value = residual[start:stop]
-        derivative = slope[start:stop]
-        for k in range(x.size):
-            v, d = _tanh_and_slope_inline(x[k])
-            value[k] = scale * v
-            derivative[k] = scale * d
+def _squash(first, stop, argument, scale, residual, slope):
+    x, value, derivative = argument[first:stop], residual[first:stop], slope[first:stop]
+    for k in range(x.size):
+        v, d = _tanh_and_slope_kernel(x[k])
+        value[k] = scale * v
+        derivative[k] = scale * d
 
 
-_squash_kernel = jit(_squash, parallel=True)
+_squash_kernel = jit(_squash)
 
 
 def appearance_forward(
@@ -117,7 +111,8 @@ def appearance_forward(
         raise ValueError(f"beta {beta}; allowed: finite, > 0")
     argument = combine(colour_coefficients, phi_bar)
     residual, slope = np.empty_like(argument), np.empty_like(argument)
-    _squash_kernel(argument.reshape(-1), argument.dtype.type(beta / Y00), residual.reshape(-1), slope.reshape(-1))
+    x, value, derivative = argument.reshape(-1), residual.reshape(-1), slope.reshape(-1)
+    share(_squash_kernel, x.size, x, argument.dtype.type(beta / Y00), value, derivative)
     return residual, AppearanceSaved(colour_coefficients, phi_bar, slope)
 
 

@@ -6,10 +6,10 @@ float64, block by block.
 """
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 
@@ -17,10 +17,10 @@ BLOCK = 1024  # Gaussians a task; a few rows of a block stay in the first-level 
 LANES = 64  # partial sums side by side: enough to fill the vector units
 
 
-def _combine(coefficients, atoms, out):
+def _combine(first, last, coefficients, atoms, out):
     axes, count, n = coefficients.shape
     zero = coefficients.dtype.type(0.0)
-    for block in prange((n + BLOCK - 1) // BLOCK):
+    for block in range(first, last):
         start = block * BLOCK
         stop = min(n, start + BLOCK)
         for c in range(axes):
@@ -34,13 +34,13 @@ def _combine(coefficients, atoms, out):
                     total[k] += atom * row[k]
 
 
-def _spread(d_out, coefficients, atoms, d_coefficients, partial):
+def _spread(first, last, d_out, coefficients, atoms, d_coefficients, partial):
     axes, count, n = coefficients.shape
-    for block in prange((n + BLOCK - 1) // BLOCK):
+    lanes = np.empty(LANES)
+    for block in range(first, last):
         start = block * BLOCK
         stop = min(n, start + BLOCK)
         strips = (stop - start) // LANES
-        lanes = np.empty(LANES)
         for a in range(count):
             atom = atoms[a]
             for k in range(LANES):
@@ -53,8 +53,7 @@ def _spread(d_out, coefficients, atoms, d_coefficients, partial):
                 for k in range(upstream.size):
                     d_row[k] = atom * upstream[k]
                 for s in range(strips):
-                    x = upstream[s * LANES : (s + 1) * LANES]
-                    y = row[s * LANES : (s + 1) * LANES]
+                    x, y = upstream[s * LANES :], row[s * LANES :]
                     for k in range(LANES):
                         lanes[k] += np.float64(x[k]) * np.float64(y[k])
                 for k in range(strips * LANES, upstream.size):
@@ -64,8 +63,12 @@ def _spread(d_out, coefficients, atoms, d_coefficients, partial):
             partial[block, a] = rest
 
 
-_combine_kernel = jit(_combine, parallel=True)
-_spread_kernel = jit(_spread, parallel=True)
+def _blocks(n: int) -> int:
+    return (n + BLOCK - 1) // BLOCK
+
+
+_combine_kernel = jit(_combine)
+_spread_kernel = jit(_spread)
 
 
 def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
@@ -74,7 +77,8 @@ def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
         raise ValueError(f"coefficients {coefficients.shape} and atoms {atoms.shape}; expected (3, 2F, N) and (2F,)")
     coefficients = np.ascontiguousarray(coefficients)
     out = np.empty((coefficients.shape[0], coefficients.shape[2]), coefficients.dtype)
-    _combine_kernel(coefficients, np.ascontiguousarray(atoms, coefficients.dtype), out)
+    atoms = np.ascontiguousarray(atoms, coefficients.dtype)
+    share(_combine_kernel, _blocks(out.shape[1]), coefficients, atoms, out)
     return out
 
 
@@ -85,8 +89,8 @@ def spread(d_out: FloatArray, coefficients: FloatArray, atoms: FloatArray) -> tu
     if d_out.shape != (coefficients.shape[0], coefficients.shape[2]):
         raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")
     d_coefficients = np.empty(coefficients.shape, dtype)
-    blocks = (coefficients.shape[2] + BLOCK - 1) // BLOCK
-    partial = np.zeros((blocks, coefficients.shape[1]))
+    partial = np.zeros((_blocks(coefficients.shape[2]), coefficients.shape[1]))
     d_out = np.ascontiguousarray(d_out, dtype)
-    _spread_kernel(d_out, coefficients, np.ascontiguousarray(atoms, dtype), d_coefficients, partial)
+    atoms = np.ascontiguousarray(atoms, dtype)
+    share(_spread_kernel, partial.shape[0], d_out, coefficients, atoms, d_coefficients, partial)
     return d_coefficients, partial.sum(axis=0).astype(dtype)

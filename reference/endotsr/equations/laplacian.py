@@ -14,7 +14,6 @@ under the instrument (NaN included) reaches none of them, and equal images have 
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.equations.pyramid import (
@@ -34,6 +33,7 @@ from endotsr.equations.pyramid import (
     reflect_indices,
 )
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 MaskArray = NDArray[np.bool_]
@@ -124,32 +124,33 @@ def support_masks(mask: MaskArray, levels: int = LEVELS, upsampling: Upsampling 
     return SupportMasks(mask, tuple(bands), upsampling)
 
 
-def _difference(rendered, observed, mask, out):
-    channels, h, w = rendered.shape
+def _difference(first, stop, rendered, observed, mask, out):
+    h, w = mask.shape
     real = rendered.dtype.type
-    for task in prange(channels * h):
-        c, y = task // h, task % h
+    for index in range(first, stop):
+        c, y = index // h, index % h
         a, b, keep, target = rendered[c, y], observed[c, y], mask[y], out[c, y]
         for x in range(w):
             d = a[x] - b[x]
             target[x] = d if keep[x] else real(0.0)
 
 
-def _band_signs(fine, coarse, even, odd, valid, signs, sums):
+def _band_signs(first, stop, fine, coarse, even, odd, valid, signs, sums):
     """signs = sign of fine - expand(coarse) where valid; sums[task] = sum of its magnitude over ROWS rows."""
-    channels, h, w = fine.shape
+    h, w = valid.shape
     m = coarse.shape[2]
     real = fine.dtype.type
     chunks = (h + ROWS - 1) // ROWS
-    for task in prange(channels * chunks):
-        c = task // chunks
-        first = (task % chunks) * ROWS
-        blend = np.empty(m + 2, fine.dtype)
-        pairs = np.empty((m, 2), fine.dtype)
-        columns = np.zeros(w)  # float64: one partial sum a column
-        for y in range(first, min(h, first + ROWS)):
+    blend = np.empty(m + 2, fine.dtype)
+    pairs = np.empty((m, 2), fine.dtype)
+    smooth = pairs.reshape(-1)
+    columns = np.empty(w)  # float64: one partial sum a column
+    for task in range(first, stop):
+        c, top = task // chunks, (task % chunks) * ROWS
+        for x in range(w):
+            columns[x] = 0.0
+        for y in range(top, min(h, top + ROWS)):
             expand_row(coarse[c], y, even, odd, blend, pairs)
-            smooth = pairs.reshape(-1)
             row, keep, sign = fine[c, y], valid[y], signs[c, y]
             for x in range(w):
                 band = row[x] - smooth[x]
@@ -162,51 +163,46 @@ def _band_signs(fine, coarse, even, odd, valid, signs, sums):
         sums[task] = total
 
 
-def _expand_adjoint(field, scale, starts, index, weight, even, odd, out):
+def _expand_adjoint(first, stop, field, scale, starts, index, weight, even, odd, out):
     """out = scale * expand^T(field)"""
-    channels, mh, m = out.shape
-    w = field.shape[2]
-    chunks = (mh + ROWS - 1) // ROWS
-    for task in prange(channels * chunks):
-        c = task // chunks
-        first = (task % chunks) * ROWS
-        pairs = np.zeros((m + 2, 2), out.dtype)
-        inside = pairs.reshape(-1)[2 : 2 + w]
-        for y in range(first, min(mh, first + ROWS)):
-            gather_rows(field[c], starts, index, weight, y, inside)
-            target = out[c, y]
-            expand_row_adjoint(pairs, even, odd, target)
-            for x in range(m):
-                target[x] *= scale
+    mh, m = out.shape[1:]
+    pairs = np.zeros((m + 2, 2), out.dtype)
+    inside = pairs.reshape(-1)[2 : 2 + field.shape[2]]
+    for task in range(first, stop):
+        c, y = task // mh, task % mh
+        gather_rows(field[c], starts, index, weight, y, inside)
+        target = out[c, y]
+        expand_row_adjoint(pairs, even, odd, target)
+        for x in range(m):
+            target[x] *= scale
 
 
-def _reduce_adjoint(d_coarse, starts, index, weight, field, scale, keep_out, gate, out):
+def _reduce_adjoint(first, stop, d_coarse, starts, index, weight, field, scale, keep_out, gate, out):
     """out = gate * (out if keep_out else 0 + scale * field + reduce^T(d_coarse))"""
-    channels, h, w = out.shape
+    h, w = gate.shape
     m = d_coarse.shape[2]
     real = out.dtype.type
-    chunks = (h + ROWS - 1) // ROWS
-    for task in prange(channels * chunks):
-        c = task // chunks
-        first = (task % chunks) * ROWS
-        gathered = np.zeros(m + 4, out.dtype)
-        pairs = np.empty((m + 2, 2), out.dtype)
-        for y in range(first, min(h, first + ROWS)):
-            gather_rows(d_coarse[c], starts, index, weight, y, gathered[2 : 2 + m])
-            reduce_row_adjoint(gathered, pairs, w)
-            pulled, source, allowed, target = pairs.reshape(-1)[2:], field[c, y], gate[y], out[c, y]
-            if not keep_out:
-                for x in range(w):
-                    target[x] = real(0.0)
+    gathered = np.zeros(m + 4, out.dtype)
+    middle = gathered[2 : 2 + m]
+    pairs = np.empty((m + 2, 2), out.dtype)
+    pulled = pairs.reshape(-1)[2:]
+    for task in range(first, stop):
+        c, y = task // h, task % h
+        gather_rows(d_coarse[c], starts, index, weight, y, middle)
+        reduce_row_adjoint(gathered, pairs, w)
+        source, allowed, target = field[c, y], gate[y], out[c, y]
+        if not keep_out:
             for x in range(w):
-                d = target[x] + (scale * real(source[x]) + pulled[x])
-                target[x] = d if allowed[x] else real(0.0)
+                target[x] = real(0.0)
+        for x in range(w):
+            d = target[x] + (scale * real(source[x]) + pulled[x])
+            target[x] = d if allowed[x] else real(0.0)
 
 
-_difference_kernel = jit(_difference, parallel=True)
-_band_signs_kernel = jit(_band_signs, parallel=True)
-_expand_adjoint_kernel = jit(_expand_adjoint, parallel=True)
-_reduce_adjoint_kernel = jit(_reduce_adjoint, parallel=True)
+_difference_kernel = jit(_difference)
+_band_signs_kernel = jit(_band_signs)
+_expand_adjoint_kernel = jit(_expand_adjoint)
+_reduce_adjoint_kernel = jit(_reduce_adjoint)
 
 
 def laplacian_loss_forward(
@@ -235,13 +231,14 @@ def laplacian_loss_forward(
     even, odd = (dtype.type(weight) for weight in expand_weights(upsampling))
     fine = np.empty_like(rendered, order="C")
     observed = np.ascontiguousarray(observed, dtype)
-    _difference_kernel(np.ascontiguousarray(rendered), observed, masks.image, fine)
+    rows = channels * rendered.shape[1]
+    share(_difference_kernel, rows, np.ascontiguousarray(rendered), observed, masks.image, fine)
     loss, signs, weights = 0.0, [], []
     for valid, count in zip(masks.bands, masks.counts):
         coarse = reduce_image(fine)
         sign = np.empty(fine.shape, np.int8)
         sums = np.empty(channels * ((fine.shape[1] + ROWS - 1) // ROWS))
-        _band_signs_kernel(fine, coarse, even, odd, valid, sign, sums)
+        share(_band_signs_kernel, sums.size, fine, coarse, even, odd, valid, sign, sums)
         weight = 1.0 / (len(masks.bands) * channels * count) if count else 0.0
         loss += weight * float(sums.sum())
         signs.append(sign)
@@ -275,7 +272,8 @@ def pull_back(
         channels, h, w = fields[level].shape
         out = np.empty((channels, coarse_length(h), coarse_length(w)), dtype)
         table = expand_adjoint_table(h, upsampling)
-        _expand_adjoint_kernel(fields[level], real(-scales[level]), *table, even, odd, out)
+        rows = channels * out.shape[1]
+        share(_expand_adjoint_kernel, rows, fields[level], real(-scales[level]), *table, even, odd, out)
         return out
 
     last = len(fields) - 1
@@ -286,6 +284,7 @@ def pull_back(
         out = expanded_part(level - 1) if inner else np.empty(field.shape, dtype)
         gate = np.ones(field.shape[1:], np.bool_) if inner else mask
         table = reduce_adjoint_table(field.shape[1])
-        _reduce_adjoint_kernel(d_coarse, *table, field, real(scales[level]), inner, gate, out)
+        rows, scale = field.shape[0] * field.shape[1], real(scales[level])
+        share(_reduce_adjoint_kernel, rows, d_coarse, *table, field, scale, inner, gate, out)
         d_coarse = out
     return d_coarse

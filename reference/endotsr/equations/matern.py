@@ -9,11 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import LANES
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 
@@ -53,15 +53,17 @@ def matern_weights(omega: FloatArray, length: float) -> FloatArray:
     return (density / (math.fsum(density) / density.size)).astype(omega.dtype)
 
 
-def _row_square_sums(rows, sums):
+def _row_square_sums(first, stop, rows, sums):
     """sums[r] = sum over n of rows[r, n]^2 in float64, in an order that only the length decides."""
     n = rows.shape[1]
     strips = n // LANES
-    for r in prange(rows.shape[0]):
+    lanes = np.empty(LANES)
+    for r in range(first, stop):
         row = rows[r]
-        lanes = np.zeros(LANES)
+        for k in range(LANES):
+            lanes[k] = 0.0
         for s in range(strips):
-            strip = row[s * LANES : (s + 1) * LANES]
+            strip = row[s * LANES :]
             for k in range(LANES):
                 v = np.float64(strip[k])
                 lanes[k] += v * v
@@ -74,8 +76,8 @@ def _row_square_sums(rows, sums):
         sums[r] = total
 
 
-def _scale_rows(rows, factors, out):
-    for r in prange(rows.shape[0]):
+def _scale_rows(first, stop, rows, factors, out):
+    for r in range(first, stop):
         row = rows[r]
         target = out[r]
         factor = factors[r]
@@ -83,8 +85,8 @@ def _scale_rows(rows, factors, out):
             target[k] = factor * row[k]
 
 
-_row_square_sums_kernel = jit(_row_square_sums, parallel=True)
-_scale_rows_kernel = jit(_scale_rows, parallel=True)
+_row_square_sums_kernel = jit(_row_square_sums)
+_scale_rows_kernel = jit(_scale_rows)
 
 
 def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> tuple[float, MaternSaved]:
@@ -106,7 +108,8 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
     if n == 0:
         return 0.0, saved
     sums = np.empty(axes * atoms)
-    _row_square_sums_kernel(np.ascontiguousarray(motion_coefficients).reshape(axes * atoms, n), sums)
+    rows = np.ascontiguousarray(motion_coefficients).reshape(axes * atoms, n)
+    share(_row_square_sums_kernel, sums.size, rows, sums)
     energy = sums.reshape(axes, 2, count).sum(axis=(0, 1))
     return math.fsum(rho.astype(np.float64) * energy) / (6.0 * n * count), saved
 
@@ -121,5 +124,5 @@ def matern_penalty_reverse(d_penalty: float, saved: MaternSaved) -> FloatArray:
     factor = rho.astype(np.float64) * (float(d_penalty) / (3.0 * n * rho.size))
     factors = np.tile(factor, 2 * axes).astype(coefficients.dtype)
     rows = np.ascontiguousarray(coefficients).reshape(axes * atoms, n)
-    _scale_rows_kernel(rows, factors, out.reshape(axes * atoms, n))
+    share(_scale_rows_kernel, axes * atoms, rows, factors, out.reshape(axes * atoms, n))
     return out

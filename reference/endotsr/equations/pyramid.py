@@ -17,10 +17,10 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 Upsampling = Literal["co_sited", "half_pixel"]
@@ -30,7 +30,7 @@ EXPAND_WEIGHTS: dict[str, tuple[float, float]] = {"co_sited": (1.0, 0.5), "half_
 
 BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
 MARGIN = 2  # taps of the binomial filter to either side
-ROWS = 16  # rows a task: few enough to share out evenly, many enough to hide the cost of a task
+ROWS = 16  # rows whose magnitudes are added up together
 
 
 def expand_weights(upsampling: Upsampling) -> tuple[float, float]:
@@ -214,15 +214,12 @@ reduce_row_adjoint = jit(_reduce_row_adjoint)
 expand_row_adjoint = jit(_expand_row_adjoint)
 
 
-def _reduce(fine, out):
-    channels, mh, m = out.shape
-    chunks = (mh + ROWS - 1) // ROWS
-    for task in prange(channels * chunks):
-        c = task // chunks
-        first = (task % chunks) * ROWS
-        pairs = np.empty((m + 2, 2), fine.dtype)
-        for y in range(first, min(mh, first + ROWS)):
-            reduce_row(fine[c], y, pairs, out[c, y])
+def _reduce(first, stop, fine, out):
+    mh, m = out.shape[1:]
+    pairs = np.empty((m + 2, 2), fine.dtype)
+    for index in range(first, stop):
+        c, y = index // mh, index % mh
+        reduce_row(fine[c], y, pairs, out[c, y])
 
 
 def _expand(coarse, even, odd, out):
@@ -236,7 +233,7 @@ def _expand(coarse, even, odd, out):
             out[c, y] = pairs.reshape(-1)[:w]
 
 
-_reduce_kernel = jit(_reduce, parallel=True)
+_reduce_kernel = jit(_reduce)
 _expand_kernel = jit(_expand)
 
 
@@ -244,7 +241,7 @@ def reduce_image(fine: FloatArray) -> FloatArray:
     """Binomial filter and even samples: (C, h, w) -> (C, ceil(h/2), ceil(w/2)), same dtype."""
     channels, h, w = fine.shape
     out = np.empty((channels, coarse_length(h), coarse_length(w)), fine.dtype)
-    _reduce_kernel(np.ascontiguousarray(fine), out)
+    share(_reduce_kernel, channels * out.shape[1], np.ascontiguousarray(fine), out)
     return out
 
 
