@@ -15,10 +15,10 @@ basis) row is streamed once, in pieces that stay in the first-level cache.
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from endotsr.jit import jit, jit_inline
+from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
 
 FloatArray = NDArray[np.floating]
@@ -70,7 +70,8 @@ def deformation_forward(
     """
     _check(fdm_weight, fdm_centre, fdm_width, basis)
     offsets = np.empty((CHANNELS, fdm_weight.shape[2]), fdm_weight.dtype)
-    _forward_kernel(fdm_weight, fdm_centre, fdm_width, float(t), basis == "quartic", offsets)
+    tasks = CHANNELS * ((fdm_weight.shape[2] + PIECE - 1) // PIECE)
+    share(_forward_kernel, tasks, fdm_weight, fdm_centre, fdm_width, float(t), basis == "quartic", offsets)
     return offsets, DeformationSaved(fdm_weight, fdm_centre, fdm_width, float(t), basis)
 
 
@@ -91,7 +92,8 @@ def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> Defor
         raise ValueError(f"d_offsets: expected {weight.dtype} (10, {weight.shape[2]}), got {d_offsets.shape}")
     d_weight, d_centre, d_width = np.empty_like(weight), np.empty_like(weight), np.empty_like(weight)
     row_sums = np.empty(weight.shape[:2], np.float64)
-    _reverse_kernel(weight, centre, width, t, basis == "quartic", d_offsets, d_weight, d_centre, d_width, row_sums)
+    inputs, outputs = (weight, centre, width, t, basis == "quartic", d_offsets), (d_weight, d_centre, d_width)
+    share(_reverse_kernel, row_sums.size, *inputs, *outputs, row_sums)
     return DeformationGrads(d_weight, d_centre, d_width, -float(row_sums.sum()))
 
 
@@ -189,19 +191,20 @@ def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre
         _reverse_gaussian_row(weight, centre, width, t, d_offset, d_weight, d_centre, d_width)
 
 
-reverse_row = jit_inline(_reverse_row)
+reverse_row = jit(_reverse_row)
 
 
-def _forward(weight, centre, width, t, quartic, offsets):
+def _forward(first, last, weight, centre, width, t, quartic, offsets):
     """Each task owns one piece of one channel, so no cell is written twice."""
-    channels, bases, count = weight.shape
+    bases, count = weight.shape[1:]
     pieces = (count + PIECE - 1) // PIECE
     time = weight.dtype.type(t)
-    for task in prange(channels * pieces):
+    for task in range(first, last):
         c, start = task // pieces, (task % pieces) * PIECE
         stop = min(count, start + PIECE)
         out = offsets[c, start:stop]
-        out[:] = weight.dtype.type(0)
+        for i in range(out.size):
+            out[i] = weight.dtype.type(0)
         for j in range(bases):
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
             if quartic:
@@ -210,11 +213,11 @@ def _forward(weight, centre, width, t, quartic, offsets):
                 _add_gaussian_row(w, m, s, time, out)
 
 
-def _reverse(weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d_width, row_sums):
+def _reverse(first, last, weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d_width, row_sums):
     """Each task owns one (channel, basis) row; its sum over Gaussians is taken in fixed order in float64."""
-    channels, bases, count = weight.shape
+    bases, count = weight.shape[1:]
     time = weight.dtype.type(t)
-    for row in prange(channels * bases):
+    for row in range(first, last):
         c, j = row // bases, row % bases
         total = 0.0
         for start in range(0, count, PIECE):
@@ -227,5 +230,5 @@ def _reverse(weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d
         row_sums[c, j] = total
 
 
-_forward_kernel = jit(_forward, parallel=True)
-_reverse_kernel = jit(_reverse, parallel=True)
+_forward_kernel = jit(_forward)
+_reverse_kernel = jit(_reverse)

@@ -15,10 +15,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 Rate = float | tuple[tuple[slice, float], ...]
@@ -113,7 +113,8 @@ def adam_step(
         raise ValueError("adam_step: arrays must be C-contiguous, or the update would go to a copy")
     rate, root = step_factors(step, learning_rate, beta1, beta2)
     p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous
-    _adam_kernel(p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
+    tasks = (p.size + PIECE - 1) // PIECE
+    share(_adam_kernel, tasks, p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
 
 
 def step_factors(step: int, learning_rate: float, beta1: float, beta2: float) -> tuple[float, float]:
@@ -142,12 +143,10 @@ def _adam_row(parameter, gradient, first, second, rate, root, beta1, beta2, epsi
 adam_row = jit(_adam_row)
 
 
-def _adam(parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
-    for task in prange((parameter.size + PIECE - 1) // PIECE):
-        start = task * PIECE
-        stop = min(parameter.size, start + PIECE)
-        p, g, m, v = parameter[start:stop], gradient[start:stop], first[start:stop], second[start:stop]
-        adam_row(p, g, m, v, rate, root, beta1, beta2, epsilon)
+def _adam(first_task, last_task, parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
+    start, stop = first_task * PIECE, min(parameter.size, last_task * PIECE)
+    p, g, m, v = parameter[start:stop], gradient[start:stop], first[start:stop], second[start:stop]
+    adam_row(p, g, m, v, rate, root, beta1, beta2, epsilon)
 
 
-_adam_kernel = jit(_adam, parallel=True)
+_adam_kernel = jit(_adam)

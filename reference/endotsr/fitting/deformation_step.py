@@ -6,12 +6,12 @@ for one piece of one row at a time, in the first-level cache. The arithmetic is 
 """
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.equations.deformation import CHANNELS, PIECE, DeformationSaved, reverse_row
 from endotsr.fitting.adam import AdamState, Rate, adam_row, rate_parts, step_factors
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 NAMES = ("fdm_weight", "fdm_centre", "fdm_width")
@@ -49,30 +49,41 @@ def deformation_adam_step(
         for part, value in rate_parts(rates[name]):
             rate[k, part], root[k] = step_factors(state.step[name], value, beta1, beta2)
     moments = (*first, *second)
-    betas = (float(beta1), float(beta2), float(epsilon))
-    _step_kernel(*parameters, saved.t, saved.basis == "quartic", d_offsets, moments, rate, root, betas)
+    inputs = (*parameters, saved.t, saved.basis == "quartic", d_offsets)
+    settings = (rate, root, float(beta1), float(beta2), float(epsilon))
+    share(_step_kernel, saved.weight.shape[0] * saved.weight.shape[1], *inputs, *moments, *settings)
 
 
-def _step(weight, centre, width, t, quartic, d_offsets, moments, rate, root, betas):
+def _adam_piece(parameter, gradient, first, second, c, j, start, rate, root, beta1, beta2, epsilon):
+    """Adam step of one piece of row (c, j) of a parameter; gradient (PIECE,) holds that of the piece."""
+    stop = min(parameter.shape[2], start + PIECE)
+    adam_row(
+        parameter[c, j, start:stop], gradient, first[c, j, start:stop], second[c, j, start:stop],
+        rate, root, beta1, beta2, epsilon,
+    )  # fmt: skip
+
+
+_adam_piece_kernel = jit(_adam_piece)
+
+
+def _step(
+    first, last, weight, centre, width, t, quartic, d_offsets, m_w, m_m, m_s, v_w, v_m, v_s,
+    rate, root, beta1, beta2, epsilon,
+):  # fmt: skip
     """Each task owns one (channel, basis) row of all nine arrays."""
-    m_w, m_m, m_s, v_w, v_m, v_s = moments
-    beta1, beta2, epsilon = betas
-    channels, bases, count = weight.shape
+    bases, count = weight.shape[1:]
     time = weight.dtype.type(t)
-    for row in prange(channels * bases):
+    gradient = np.empty((3, PIECE), weight.dtype)
+    d_w, d_m, d_s = gradient[0], gradient[1], gradient[2]
+    for row in range(first, last):
         c, j = row // bases, row % bases
-        gradient = np.empty((3, PIECE), weight.dtype)
         for start in range(0, count, PIECE):
             stop = min(count, start + PIECE)
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
-            d_w, d_m, d_s = gradient[0, : stop - start], gradient[1, : stop - start], gradient[2, : stop - start]
             reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)
-            first, second = m_w[c, j, start:stop], v_w[c, j, start:stop]
-            adam_row(w, d_w, first, second, rate[0, c], root[0], beta1, beta2, epsilon)
-            first, second = m_m[c, j, start:stop], v_m[c, j, start:stop]
-            adam_row(m, d_m, first, second, rate[1, c], root[1], beta1, beta2, epsilon)
-            first, second = m_s[c, j, start:stop], v_s[c, j, start:stop]
-            adam_row(s, d_s, first, second, rate[2, c], root[2], beta1, beta2, epsilon)
+            _adam_piece_kernel(weight, d_w, m_w, v_w, c, j, start, rate[0, c], root[0], beta1, beta2, epsilon)
+            _adam_piece_kernel(centre, d_m, m_m, v_m, c, j, start, rate[1, c], root[1], beta1, beta2, epsilon)
+            _adam_piece_kernel(width, d_s, m_s, v_s, c, j, start, rate[2, c], root[2], beta1, beta2, epsilon)
 
 
-_step_kernel = jit(_step, parallel=True)
+_step_kernel = jit(_step)
