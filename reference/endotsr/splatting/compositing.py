@@ -13,10 +13,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.records import (
     BLUE,
@@ -92,14 +92,15 @@ def _alpha(record, x, y):
 _alpha_kernel = jit(_alpha)
 
 
-def _composite(records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
+def _composite(
+    first_tile, last_tile, records, starts, ranks, limits, background, colour, depth, opacity, transmittance
+):
     real = records.dtype.type
     one, zero, half = real(1), real(0), real(0.5)
     cutoff, stop, alpha_max = limits[0], limits[1], limits[2]
     height, width = depth.shape
     tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    for turn in prange(starts.size - 1):
-        tile = np.int64(turn)
+    for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         for row in range(top, min(height, top + TILE_HEIGHT)):
             for column in range(left, min(width, left + TILE_WIDTH)):
@@ -128,15 +129,25 @@ def _composite(records, starts, ranks, limits, background, colour, depth, opacit
 
 
 def _composite_reverse(
-    records, starts, ranks, limits, background, pass_clamped, d_colour, d_depth, d_opacity, pair_gradients
+    first_tile,
+    last_tile,
+    records,
+    starts,
+    ranks,
+    limits,
+    background,
+    pass_clamped,
+    d_colour,
+    d_depth,
+    d_opacity,
+    pair_gradients,
 ):
     real = records.dtype.type
     one, zero, half = real(1), real(0), real(0.5)
     cutoff, stop, alpha_max = limits[0], limits[1], limits[2]
     height, width = d_depth.shape
     tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    for turn in prange(starts.size - 1):
-        tile = np.int64(turn)
+    for tile in range(first_tile, last_tile):
         first, length = starts[tile], starts[tile + 1] - starts[tile]
         for p in range(length):
             pair_gradients[first + p, :] = zero
@@ -184,8 +195,8 @@ def _composite_reverse(
                     out[SUM_DEPTH] += weight * gz
 
 
-_composite_kernel = jit(_composite, parallel=True)
-_composite_reverse_kernel = jit(_composite_reverse, parallel=True)
+_composite_kernel = jit(_composite)
+_composite_reverse_kernel = jit(_composite_reverse)
 
 
 def composite_forward(
@@ -210,7 +221,7 @@ def composite_forward(
     dtype = records.dtype
     out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
-    _composite_kernel(records, lists.starts, lists.ranks, limits, background, *out)
+    share(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
     return out, CompositeSaved(records, lists, limits, background, settings.deviations.pass_clamped_alpha, out)
 
 
@@ -219,7 +230,8 @@ def composite_reverse(
 ) -> FloatArray:
     """Pair gradients (pairs, 10) from dL/dcolour (3, H, W), dL/ddepth (H, W), dL/dopacity (H, W)."""
     pair_gradients = np.empty((saved.lists.ranks.size, GRADIENT), saved.records.dtype)
-    _composite_reverse_kernel(
+    share(
+        _composite_reverse_kernel, saved.lists.starts.size - 1,
         saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.background,
         saved.pass_clamped_alpha, d_colour, d_depth, d_opacity, pair_gradients,
     )  # fmt: skip

@@ -18,10 +18,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit, jit_inline
+from endotsr.sharing import share
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.compositing import Composite, composite_limits, empty_composite
 from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
@@ -130,14 +130,6 @@ def _finished(buffer):
 _finished_kernel = jit(_finished, contract=True)
 
 
-def _spread(turn, tiles):
-    """A permutation of the tiles that spreads dense regions of the image over the threads."""
-    return (turn * 7) % tiles if tiles % 7 != 0 else turn
-
-
-_spread_kernel = jit(_spread)
-
-
 def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max):
     """Blend one Gaussian into LANES pixels of one row."""
     real = buffer.dtype.type
@@ -164,16 +156,14 @@ def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max)
 _blend_row_kernel = jit_inline(_blend_row)
 
 
-def _blend(records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
+def _blend(first_tile, last_tile, records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
     real = records.dtype.type
     half, one = real(0.5), real(1)
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
     height, width = depth.shape
     tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    tiles = starts.size - 1
-    for turn in prange(tiles):
-        tile = _spread_kernel(np.int64(turn), tiles)
+    for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(5 * PLANE, records.dtype)
         rows, columns = np.empty((3, TILE_HEIGHT), records.dtype), np.empty((2, TILE_HEIGHT), np.int32)
@@ -260,6 +250,7 @@ _fold_lanes_kernel = jit_inline(_fold_lanes)
 
 
 def _blend_reverse(
+    first_tile, last_tile,
     records, starts, ranks, limits, background, colour, depth, transmittance, d_colour, d_depth, d_opacity,
     pair_gradients,
 ):  # fmt: skip
@@ -270,9 +261,7 @@ def _blend_reverse(
     log2_cutoff = real(math.log2(limits[0]))
     height, width = depth.shape
     tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    tiles = starts.size - 1
-    for turn in prange(tiles):
-        tile = _spread_kernel(np.int64(turn), tiles)
+    for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(6 * PLANE, records.dtype)
         sums = np.zeros(GRADIENT * LANES, records.dtype)
@@ -317,8 +306,8 @@ def _blend_reverse(
             _fold_lanes_kernel(sums, out)
 
 
-_blend_kernel = jit(_blend, parallel=True, contract=True)
-_blend_reverse_kernel = jit(_blend_reverse, parallel=True, contract=True)
+_blend_kernel = jit(_blend, contract=True)
+_blend_reverse_kernel = jit(_blend_reverse, contract=True)
 
 
 def composite_rows_forward(
@@ -332,7 +321,7 @@ def composite_rows_forward(
     dtype = records.dtype
     out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
-    _blend_kernel(records, lists.starts, lists.ranks, limits, background, *out)
+    share(_blend_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
     return out, RowsSaved(records, lists, limits, background, out)
 
 
@@ -343,7 +332,8 @@ def composite_rows_reverse(
     dtype = saved.records.dtype
     pair_gradients = np.empty((saved.lists.ranks.size, GRADIENT), dtype)
     extra = np.empty((0, 0), dtype) if d_opacity is None else d_opacity
-    _blend_reverse_kernel(
+    share(
+        _blend_reverse_kernel, saved.lists.starts.size - 1,
         saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.background, saved.out.colour,
         saved.out.depth, saved.out.transmittance, d_colour, d_depth, extra, pair_gradients,
     )  # fmt: skip

@@ -8,10 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 
@@ -208,18 +208,18 @@ _colour_kernel = jit(_colour_block)
 _colour_reverse_kernel = jit(_colour_reverse_block)
 
 
-def _colour_blocks(harmonics, residual, position, centre, degree, colour, clamped):
+def _colour_blocks(first, last, harmonics, residual, position, centre, degree, colour, clamped):
     n = position.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
+    for block in range(first, last):
         a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
         _colour_kernel(harmonics, residual, position, centre, degree, colour, clamped, a, e)
 
 
 def _colour_reverse_blocks(
-    harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centres
+    first, last, harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position, d_centres
 ):
     n = position.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
+    for block in range(first, last):
         a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
         _colour_reverse_kernel(
             harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position,
@@ -227,8 +227,8 @@ def _colour_reverse_blocks(
         )  # fmt: skip
 
 
-_colour_parallel = jit(_colour_blocks, parallel=True)
-_colour_reverse_parallel = jit(_colour_reverse_blocks, parallel=True)
+_colour_blocks_kernel = jit(_colour_blocks)
+_colour_reverse_blocks_kernel = jit(_colour_reverse_blocks)
 
 
 def harmonics_forward(
@@ -254,7 +254,8 @@ def harmonics_forward(
     colour = np.empty((3, position.shape[1]), dtype)
     clamped = np.empty(colour.shape, np.bool_)
     extra = np.empty((3, 0), dtype) if residual is None else residual
-    _colour_parallel(harmonics, extra, position, centre, degree, colour, clamped)
+    blocks = (position.shape[1] + BLOCK - 1) // BLOCK
+    share(_colour_blocks_kernel, blocks, harmonics, extra, position, centre, degree, colour, clamped)
     return colour, HarmonicsSaved(harmonics, residual, position, centre, degree, clamped)
 
 
@@ -266,7 +267,8 @@ def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsG
     d_residual = np.empty((3, 0 if saved.residual is None else n), dtype)
     d_position = np.empty((3, n), dtype)
     d_centres = np.empty(((n + BLOCK - 1) // BLOCK, 3), dtype)
-    _colour_reverse_parallel(
+    share(
+        _colour_reverse_blocks_kernel, d_centres.shape[0],
         saved.harmonics, saved.position, saved.centre, saved.degree, saved.clamped,
         d_colour, d_harmonics, d_residual, d_position, d_centres,
     )  # fmt: skip
