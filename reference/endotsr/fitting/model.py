@@ -20,7 +20,7 @@ from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
 from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import RenderGrads, RenderOut, Scene, render_forward
+from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
 
 FloatArray = NDArray[np.floating]
@@ -129,8 +129,11 @@ def render_at(
 
     appearance, spectral_motion   False leaves that component out, to see what it contributes
     returns                       colour (3, H, W), depth (H, W), opacity (H, W)
+
+    Raises: ValueError naming array and index if the scene holds a number that is not finite.
     """
     chosen = without(gaussians, appearance=appearance, spectral_motion=spectral_motion)
     scene, _ = scene_at(chosen, spectral, config.model, t)
+    check_scene(scene)
     degree = config.model.harmonics_degree  # bands that are not active yet hold zeros
     return render_forward(scene, camera, raster_settings(config), degree=degree, background=background)[0]

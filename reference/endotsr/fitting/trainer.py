@@ -51,7 +51,7 @@ from endotsr.scene.density_control import (
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals, initialise
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.render import RenderOut, render_forward, render_reverse
+from endotsr.splatting.render import RenderOut, check_finite, render_forward, render_reverse
 
 FloatArray = NDArray[np.floating]
 OnIteration = Callable[[dict[str, Any]], None]
@@ -158,8 +158,10 @@ def train(
 
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
     That pre-training is not checkpointed: interrupted, it starts again and gives the same weight.
-    Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite.
+    Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite; ValueError naming array
+            and index if the state holds a number that is not finite.
     """
+    check_finite(arrays(state.gaussians))
     if state.lambda_lap is None and config.model.laplacian:
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)

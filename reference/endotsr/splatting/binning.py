@@ -58,7 +58,7 @@ def _boxes(mean2d, covariance2d, determinant, log_opacity, visible, support, log
                 continue
             if support == _ELLIPSE:
                 reach = two * (log_opacity[i] - log_cutoff)
-                if reach < zero:
+                if not reach >= zero:  # too faint, or not a number
                     visible[i] = False
                     continue
                 ex, ey = math.sqrt(reach * a), math.sqrt(reach * c)

@@ -16,6 +16,7 @@ from endotsr.jit import jit, jit_inline
 FloatArray = NDArray[np.floating]
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
+SHORTEST = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
 BLOCK = 256  # Gaussians per parallel block: a few arrays of this length stay in the first-level cache
 
 
@@ -55,7 +56,7 @@ def _unit_quaternion(w, x, y, z):
     y /= largest
     z /= largest
     n = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / n, x / n, y / n, z / n, (one / n) / largest
+    return w / n, x / n, y / n, z / n, (one / n) / max(largest, type(zero)(SHORTEST))
 
 
 unit_quaternion = jit_inline(_unit_quaternion)
@@ -142,8 +143,8 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
     returns     Shape(rotation (3, 3, N), scale (3, N) scene units)
 
     Reverse: `covariance_reverse`; the gradient is orthogonal to the quaternion and scales with 1/|q|.
-    Edges:   the zero quaternion is the identity with zero gradient; a clipped log-scale has zero gradient
-             (`covariance_degenerate` counts both).
+    Edges:   the zero quaternion is the identity with zero gradient, below |q| = 1e-20 the gradient is that of 1e-20;
+             a clipped log-scale has zero gradient (`covariance_degenerate` counts zeros and clipped).
     Oracle:  scipy.spatial.transform.Rotation; tests/oracle/splatting_oracle.py.
     """
     n = quaternion.shape[1]

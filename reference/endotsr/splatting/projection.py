@@ -6,6 +6,7 @@ non-negative terms, low_pass^2 + low_pass |T S|^2 + sum_{k<l} (s_k s_l (t_k x t_
 loses every digit for a needle seen at an angle.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,8 @@ from endotsr.splatting.settings import RasterSettings
 FloatArray = NDArray[np.floating]
 
 BLOCK = 256
-# A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
+# px. A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
+# A centre farther out is not drawn.
 AXIS_LIMIT = {np.dtype(np.float32): 1e8, np.dtype(np.float64): 1e60}
 
 
@@ -31,7 +33,7 @@ class Projected(NamedTuple):
     covariance2d: FloatArray  # (3, N) a, b, c in px^2, low-pass included
     determinant: FloatArray  # (N,) a c - b^2 in px^4, formed without cancellation
     depth: FloatArray  # (N,) view-space z, scene units
-    visible: NDArray[np.bool_]  # (N,) z > near
+    visible: NDArray[np.bool_]  # (N,) z > near, centre within the axis limit, all entries finite
 
 
 class ProjectionSaved(NamedTuple):
@@ -85,17 +87,14 @@ def _project_block(position, rotation, scale, constants, pose, mean2d, covarianc
         x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
         y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
         z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
-        seen = z > near
-        visible[i] = seen
-        if not seen:
-            mean2d[0, i] = mean2d[1, i] = depth[i] = determinant[i] = zero
-            covariance2d[0, i] = covariance2d[1, i] = covariance2d[2, i] = zero
+        visible[i] = False
+        mean2d[0, i] = mean2d[1, i] = depth[i] = determinant[i] = zero
+        covariance2d[0, i] = covariance2d[1, i] = covariance2d[2, i] = zero
+        if not z > near:
             continue
         inverse_z = one / z
         slope_x, slope_y = x * inverse_z, y * inverse_z
-        mean2d[0, i] = fx * slope_x + cx
-        mean2d[1, i] = fy * slope_y + cy
-        depth[i] = z
+        mean_x, mean_y = fx * slope_x + cx, fy * slope_y + cy
         slope_x = min(max(slope_x, -limit_x), limit_x)
         slope_y = min(max(slope_y, -limit_y), limit_y)
         j00, j02 = fx * inverse_z, -fx * slope_x * inverse_z
@@ -128,8 +127,13 @@ def _project_block(position, rotation, scale, constants, pose, mean2d, covarianc
             n = (k + 1) % 3
             area = s[k] * s[n] * (t0[k] * t1[n] - t0[n] * t1[k])
             areas += area * area
+        det = low_pass * low_pass + low_pass * spread + areas
+        # a centre out of range, or any NaN or infinity: not drawn, so that no index is ever made of such a number
+        if not (abs(mean_x) <= axis_limit and abs(mean_y) <= axis_limit and math.isfinite(det + z)):
+            continue
+        visible[i] = True
+        mean2d[0, i], mean2d[1, i], depth[i], determinant[i] = mean_x, mean_y, z, det
         covariance2d[0, i], covariance2d[1, i], covariance2d[2, i] = a, b, c
-        determinant[i] = low_pass * low_pass + low_pass * spread + areas
 
 
 def _project_reverse_block(
@@ -260,7 +264,8 @@ def projection_forward(
     returns   Projected; Gaussians with z <= near are invisible and all their entries are zero
 
     Reverse: `projection_reverse`, through the mean, the Jacobian, the rotation and the pose.
-    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient.
+    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient; a centre farther
+             out than that, and a Gaussian with a number that is not finite, are invisible.
     Oracle:  tests/oracle/splatting_oracle.py; determinant against mpmath.
     """
     dtype = position.dtype

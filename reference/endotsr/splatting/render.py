@@ -5,6 +5,7 @@ every parameter and, when asked for, to the background and the camera pose. Know
 """
 
 import math
+from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -73,6 +74,20 @@ class RenderGrads(NamedTuple):
     visible: NDArray[np.bool_]  # (N,) reached at least one pixel box
     background: FloatArray | None
     camera: CameraGrads | None
+
+
+def check_finite(arrays: Mapping[str, FloatArray | None]) -> None:
+    """Refuse numbers that are not finite, before any kernel runs. Raises: ValueError naming array and index."""
+    for name, array in arrays.items():
+        if array is None or np.isfinite(array).all():
+            continue
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name}[{', '.join(map(str, index))}] is {array[index]}: finite numbers expected")
+
+
+def check_scene(scene: Scene) -> None:
+    """As `check_finite`, for every array of a scene."""
+    check_finite(scene._asdict())
 
 
 def choose_path(settings: RasterSettings, path: Path) -> Path:

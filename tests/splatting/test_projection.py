@@ -1,0 +1,373 @@
+"""Covariance and projection: hard cases P1-P7, Q1, Q2, C1, C2, C3, C6 and the identities of B2 and B3."""
+
+import mpmath
+import numpy as np
+import pytest
+from made_up_scenes import (
+    U32,
+    U64,
+    as_dtype,
+    assert_bitwise,
+    assert_close,
+    assert_finite,
+    lens,
+    plain_camera,
+    random_scene,
+    rules,
+    run,
+    screen_scene,
+    select,
+    turned_camera,
+    world,
+)
+from scipy.spatial.transform import Rotation
+
+from endotsr.splatting.camera import Camera, backproject, camera_centre, scale_camera
+from endotsr.splatting.covariance import (
+    Shape,
+    covariance_degenerate,
+    covariance_forward,
+    covariance_matrix,
+    covariance_reverse,
+)
+from endotsr.splatting.projection import projection_forward, projection_reverse
+from endotsr.splatting.records import INVERSE_C, PRECISION, SLOPE, log_opacity, pack_records
+from endotsr.splatting.render import Scene
+from endotsr.splatting.settings import EXACT, PAPER
+from oracle import splatting_oracle as oracle
+
+CAMERA = plain_camera(33, 29, 25.0)
+BACKGROUND = np.array([0.3, 0.6, 0.1])
+PLACES = [(sx * f, sy * g) for f, g in ((0.9, 0.2), (1.1, 0.2), (0.2, 0.9), (0.2, 1.1), (1.1, 1.1))
+          for sx, sy in ((1, 1), (-1, -1))]  # fmt: skip
+
+
+# --- covariance (B2) ---
+
+
+def test_rotation_and_covariance_equal_scipy_and_the_oracle():
+    rng = np.random.default_rng(0)
+    q, s = rng.normal(0, 2, (4, 300)), rng.normal(0, 1, (3, 300))
+    shape, _ = covariance_forward(q, s)
+    wanted = Rotation.from_quat(q.T, scalar_first=True).as_matrix().transpose(1, 2, 0)
+    assert np.abs(shape.rotation - wanted).max() <= 16 * U64
+    np.testing.assert_allclose(shape.scale, np.exp(s), rtol=4 * U64)
+    assert_close({"sigma": covariance_matrix(shape)}, {"sigma": oracle.covariance(q, s)}, 1e-14)
+
+
+@pytest.mark.parametrize("dtype, u, exponents", [(np.float64, U64, (-300, 300)), (np.float32, U32, (-37, 37))])
+def test_hard_Q1_any_quaternion_length(dtype, u, exponents):
+    rng = np.random.default_rng(1)
+    q = rng.normal(0, 1, (4, 200)).astype(dtype)
+    zero = np.zeros((3, 200), dtype)
+    plain = covariance_forward(q, zero)[0].rotation
+    for exponent in (*exponents, -23, -5, 7, 23):
+        scaled = (q.astype(np.longdouble) * np.longdouble(10.0) ** exponent).astype(dtype)
+        found = covariance_forward(scaled, zero)[0].rotation
+        assert np.abs(found - plain).max() <= 32 * u
+        product = np.einsum("ikn,jkn->ijn", found, found)
+        assert np.abs(product - np.eye(3)[:, :, None]).max() <= 32 * u
+    for power in (-90, -20, 1, 60, 90):
+        np.testing.assert_array_equal(covariance_forward(np.ldexp(q, power), zero)[0].rotation, plain)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_Q1_zero_quaternion_is_the_identity_with_zero_gradient(dtype):
+    q = np.array([[0.0, 0.0, 1.0], [0.0, -0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], dtype)
+    s = np.zeros((3, 3), dtype)
+    shape, saved = covariance_forward(q, s)
+    np.testing.assert_array_equal(shape.rotation[:, :, 0], np.eye(3))
+    np.testing.assert_array_equal(shape.rotation[:, :, 1], np.eye(3))
+    rng = np.random.default_rng(2)
+    d = Shape(rng.normal(0, 1, (3, 3, 3)).astype(dtype), rng.normal(0, 1, (3, 3)).astype(dtype))
+    back = covariance_reverse(d, saved)
+    assert np.isfinite(back.quaternion).all() and (back.quaternion[:, :2] == 0).all() and back.quaternion[:, 2].any()
+    assert covariance_degenerate(q, s) == (2, 0)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_Q1_subnormal_quaternion_has_a_finite_gradient(dtype):
+    """1 / |q| overflows there: the gradient is limited, never Inf or NaN."""
+    tiny = np.nextafter(dtype(0), dtype(1))
+    q = np.array([[tiny, tiny * 3, 0, 0], [0, tiny, tiny, 0], [0, 0, tiny, 0], [0, tiny, 0, tiny * 9]], dtype)
+    shape, saved = covariance_forward(q, np.zeros((3, 4), dtype))
+    rng = np.random.default_rng(3)
+    d = Shape(rng.normal(0, 1, (3, 3, 4)).astype(dtype), rng.normal(0, 1, (3, 4)).astype(dtype))
+    assert_finite(shape._asdict(), covariance_reverse(d, saved)._asdict())
+
+
+def test_hard_Q2_gradient_is_orthogonal_and_scales_with_the_inverse_length():
+    rng = np.random.default_rng(4)
+    q, s = rng.normal(0, 1, (4, 200)), rng.normal(0, 1, (3, 200))
+    d = Shape(rng.normal(0, 1, (3, 3, 200)), rng.normal(0, 1, (3, 200)))
+    g = covariance_reverse(d, covariance_forward(q, s)[1]).quaternion
+    length = np.linalg.norm
+    assert (np.abs((g * q).sum(axis=0)) <= 1e-12 * length(g, axis=0) * length(q, axis=0)).all()
+    for factor in (1e-3, 7.0, 1e100):
+        other = covariance_reverse(d, covariance_forward(q * factor, s)[1]).quaternion
+        np.testing.assert_allclose(other * factor, g, rtol=1e-12, atol=1e-13)
+
+
+def test_hard_C6_log_scale_beyond_40_is_clipped_with_zero_gradient():
+    s = np.array([[-800.0, -40.0, 40.0, 40.1], [-41.0, 0.0, 800.0, 39.9], [0.0, 1.0, 2.0, 3.0]])
+    q = np.tile(np.array([[1.0], [0.5], [0], [0]]), (1, 4))
+    shape, saved = covariance_forward(q, s)
+    np.testing.assert_allclose(shape.scale, np.exp(np.clip(s, -40, 40)), rtol=4 * U64)
+    back = covariance_reverse(Shape(np.zeros((3, 3, 4)), np.ones((3, 4))), saved)
+    np.testing.assert_array_equal(back.log_scale != 0, np.abs(s) <= 40)
+    assert covariance_degenerate(q, s) == (0, 4)
+
+
+def test_hard_C6_log_scale_minus_800_leaves_the_low_pass_alone():
+    scene = random_scene(5, 20, CAMERA)
+    scene.log_scale[:] = -800.0
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    out, _ = projection_forward(scene.position, shape, CAMERA, PAPER)
+    seen = out.visible
+    np.testing.assert_array_equal(out.covariance2d[::2, seen], 0.3)
+    assert np.abs(out.covariance2d[1]).max() <= 1e-30  # squares of exp(-40)
+    np.testing.assert_array_equal(out.determinant[seen], 0.3 * 0.3)
+
+
+# --- the near plane ---
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("settings", [EXACT, PAPER], ids=["exact", "paper"])
+@pytest.mark.parametrize("near", [0.2, 1e-6, 50.0])
+def test_hard_P1_at_or_before_the_near_plane_nothing_happens(settings, near, dtype):
+    settings = settings._replace(near=near)
+    plane = float(dtype(near))
+    tiny = 1e-300 if dtype == np.float64 else 1e-40
+    hidden = [-1.0, -1e-12, 0.0, -0.0, tiny, plane, float(np.nextafter(dtype(near), dtype(0)))]
+    scene = random_scene(6, 40, CAMERA)
+    scene.position[:] = np.where(scene.position[2] > 0, 1, -1) * scene.position  # all in front
+    scene.position[2] += near
+    scene = as_dtype(scene, dtype)
+    extra = select(scene, np.arange(len(hidden)))
+    extra.position[2] = hidden
+    extra.position[:2] *= 0.01
+    extra.opacity_logit[:] = 5.0
+    n = len(hidden)
+    # every visible one keeps its index and the hidden ones stand before them
+    mixed = Scene(*(np.concatenate([a, b], axis=-1) if a is not None else None for a, b in zip(extra, scene)))
+    images, _ = run(scene, CAMERA, settings)
+    with_hidden, gradients = run(mixed, CAMERA, settings)
+    assert_bitwise(with_hidden, images)
+    for name in ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual", "mean2d"):
+        assert (gradients[name][..., :n] == 0).all(), name
+        assert gradients[name][..., n:].any(), name
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_P1_just_behind_the_near_plane_it_is_drawn(dtype):
+    scene = as_dtype(screen_scene(CAMERA, 16.0, 14.0, 0.2, 3.0, 0.8, [1, 1, 1]), dtype)
+    scene.position[2] = np.nextafter(dtype(0.2), dtype(1))
+    images, gradients = run(scene, CAMERA, PAPER)
+    assert images["opacity"].max() > 0.7 and gradients["position"].any()
+    assert_finite(images, gradients)
+
+
+@pytest.mark.parametrize("settings", [EXACT, PAPER], ids=["exact", "paper"])
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_hard_P1_scale_invariance(settings, factor):
+    """Positions, axes, near and camera translation times a factor: the image stays, depth scales."""
+    camera = turned_camera(33, 29, 25.0)
+    scene = random_scene(7, 60, camera)
+    images, gradients = run(scene, camera, settings, "definition")
+    bigger = scene._replace(position=scene.position * factor, log_scale=scene.log_scale + np.log(factor))
+    far = camera._replace(translation=camera.translation * factor)
+    scaled, back = run(bigger, far, settings._replace(near=settings.near * factor), "definition", given=None)
+    assert np.abs(scaled["colour"] - images["colour"]).max() <= 1e-12
+    assert np.abs(scaled["opacity"] - images["opacity"]).max() <= 1e-12
+    assert np.abs(scaled["depth"] / factor - images["depth"]).max() <= 1e-12 * images["depth"].max()
+    del gradients, back
+
+
+# --- projection (B3) ---
+
+
+def clamp_scene(settings=PAPER):
+    """Centres at 0.9 and 1.1 of the limit of the Jacobian clamp, both signs, both axes."""
+    limit = np.array([CAMERA.width / (2 * CAMERA.fx), CAMERA.height / (2 * CAMERA.fy)]) * settings.jacobian_clamp
+    z = 3.0 + 0.3 * np.arange(len(PLACES))
+    xy = np.array(PLACES).T * limit[:, None] * z
+    rng = np.random.default_rng(8)
+    n = len(PLACES)
+    return np.vstack([xy, z]), rng.normal(0, 1, (4, n)), np.log(rng.uniform(0.4, 1.5, (3, n)))
+
+
+@pytest.mark.parametrize("stage", ["mean2d", "covariance2d", "depth"])
+def test_hard_P2_P7_gradient_by_position_through_mean_jacobian_and_depth(stage):
+    """Against the complex step, each output of the projection alone, free and clamped centres."""
+    position, q, s = clamp_scene()
+    shape, _ = covariance_forward(q, s)
+    _, saved = projection_forward(position, shape, CAMERA, PAPER)
+    n = position.shape[1]
+    rng = np.random.default_rng(9)
+    given = {"mean2d": np.zeros((2, n)), "covariance2d": np.zeros((3, n)), "depth": np.zeros(n)}
+    given[stage] = rng.normal(0, 1, given[stage].shape)
+    found = projection_reverse(given["mean2d"], given["covariance2d"], given["depth"], saved).position
+    sigma = oracle.covariance(q, s)
+    for axis in range(3):
+        moved = position.astype(complex)
+        moved[axis] += 1e-40j
+        u, v, a, b, c, z = oracle.project(moved, sigma, (np.eye(3), np.zeros(3)), lens(CAMERA), rules(PAPER))
+        outputs = {"mean2d": np.array([u, v]), "covariance2d": np.array([a, b, c]), "depth": z[None]}
+        wanted = (given[stage].reshape(-1, n) * outputs[stage].imag / 1e-40).sum(axis=0)
+        np.testing.assert_allclose(found[axis], wanted, rtol=1e-11, atol=1e-13 * np.abs(found).max())
+
+
+def test_hard_P2_the_clamp_acts_on_the_jacobian_and_not_on_the_centre():
+    position, q, s = clamp_scene()
+    shape, _ = covariance_forward(q, s)
+    clamped, _ = projection_forward(position, shape, CAMERA, PAPER)
+    free, _ = projection_forward(position, shape, CAMERA, EXACT)
+    np.testing.assert_array_equal(clamped.mean2d, free.mean2d)
+    same = (clamped.covariance2d == free.covariance2d).all(axis=0)
+    np.testing.assert_array_equal(same, [max(abs(x), abs(y)) < 1 for x, y in PLACES])
+
+
+@pytest.mark.parametrize("width, height", [(64, 48), (65, 47), (1, 1), (640, 512)])
+def test_hard_P3_project_of_backproject_is_the_pixel_centre(width, height):
+    camera = turned_camera(width, height, 40.0)
+    rng = np.random.default_rng(10)
+    column, row = rng.integers(0, width, 200), rng.integers(0, height, 200)
+    position = backproject(camera, column, row, rng.uniform(0.5, 200, 200))
+    shape, _ = covariance_forward(np.ones((4, 200)), np.zeros((3, 200)))
+    out, _ = projection_forward(position, shape, camera, PAPER)
+    assert np.abs(out.mean2d[0] - (column + 0.5)).max() <= 1e-11
+    assert np.abs(out.mean2d[1] - (row + 0.5)).max() <= 1e-11
+    half = scale_camera(camera, 2 * width, 2 * height)
+    out2, _ = projection_forward(position, shape, half, PAPER)
+    np.testing.assert_allclose(out2.mean2d, 2 * out.mean2d, rtol=1e-12, atol=1e-11)
+
+
+def test_hard_P4_no_epsilon_is_added_to_the_depth():
+    z = np.array([1e-9, 1e-6, 1e-3, 1.0, 1e6, 1e12])
+    position = np.stack([0.3 * z, -0.2 * z, z])
+    shape, _ = covariance_forward(np.ones((4, 6)), np.full((3, 6), -10.0))
+    out, _ = projection_forward(position, shape, CAMERA, PAPER._replace(near=1e-12))
+    np.testing.assert_allclose(out.mean2d[0], CAMERA.fx * 0.3 + CAMERA.cx, rtol=8 * U64)
+    np.testing.assert_allclose(out.mean2d[1], CAMERA.fy * -0.2 + CAMERA.cy, rtol=8 * U64)
+
+
+@pytest.mark.parametrize("path, settings", [("definition", EXACT), ("definition", PAPER), ("rows", PAPER)])
+@pytest.mark.parametrize("dtype, bound", [(np.float64, 1e-9), (np.float32, 1e-6)])
+def test_hard_P5_splat_far_larger_than_the_image(path, settings, dtype, bound):
+    """Covariance 1e12 px^2: o c + (1 - o) background everywhere, next to no gradient by the mean."""
+    scene = as_dtype(screen_scene(CAMERA, 10.0, 12.0, 4.0, 1e6, 0.7, [0.2, 0.5, 0.8]), dtype)
+    images, gradients = run(scene, CAMERA, settings, path, background=BACKGROUND)
+    wanted = 0.7 * np.array([0.2, 0.5, 0.8]) + 0.3 * BACKGROUND
+    assert np.abs(images["colour"] - wanted[:, None, None]).max() <= bound
+    assert np.abs(gradients["mean2d"]).max() <= 1e-6 and gradients["opacity_logit"].any()
+
+
+# --- determinant and Mahalanobis form ---
+
+
+def needles(seed, count, dtype, low=-2.0, high=5.0):
+    """Semi-axes of 10^low to 10^high pixels at z = 2..9, random rotations; the rounded inputs are the exact ones."""
+    rng = np.random.default_rng(seed)
+    z = rng.uniform(2, 9, count)
+    position = np.stack([rng.uniform(-0.3, 0.3, count) * z, rng.uniform(-0.3, 0.3, count) * z, z]).astype(dtype)
+    rotation = Rotation.random(count, random_state=seed).as_matrix().transpose(1, 2, 0)
+    scale = 10 ** rng.uniform(low, high, (3, count)) * z / CAMERA.fx
+    return position, Shape(np.ascontiguousarray(rotation, dtype), scale.astype(dtype))
+
+
+def exact_screen(position, shape, i):
+    return oracle.determinant(
+        position[:, i], shape.rotation[:, :, i], shape.scale[:, i], (np.eye(3), np.zeros(3)), lens(CAMERA),
+        position.dtype.type(0.3),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("dtype, u", [(np.float64, U64), (np.float32, U32)])
+def test_hard_C1_determinant_of_needles_against_mpmath(dtype, u):
+    position, shape = needles(11, 150, dtype)
+    camera = Camera(np.eye(3), np.zeros(3), *lens(CAMERA))
+    out, _ = projection_forward(position, shape, camera, EXACT)
+    assert (out.determinant >= dtype(0.3) * dtype(0.3)).all()
+    for i in range(150):
+        det, a, _, c = exact_screen(position, shape, i)
+        with mpmath.workdps(60):
+            smaller = (a + c) / 2 - mpmath.sqrt(((a + c) / 2) ** 2 - det) - float(dtype(0.3))
+            second = float(mpmath.sqrt(max(smaller, 0)))  # second largest projected semi-axis, px
+            error = abs(float((mpmath.mpf(float(out.determinant[i])) - det) / det))
+        assert error <= (16 + 4 * second) * u, (i, error / u, second)
+
+
+@pytest.mark.parametrize("dtype, u", [(np.float64, U64), (np.float32, U32)])
+def test_hard_C2_mahalanobis_form_never_negative_and_accurate_along_needles(dtype, u):
+    """|error of q| <= 16 u (q + sqrt(q / 0.3) |d| + u |d|^2 / 0.3), along the needle and anywhere; inputs are exact.
+
+    16 = the roundings that m = b / c collects from the entries of T on.
+    """
+    count = 60
+    position, shape = needles(12, count, dtype, -2.0, 3.5)
+    out, _ = projection_forward(position, shape, CAMERA, EXACT)
+    records = pack_records(
+        np.arange(count, dtype=np.int32), out, log_opacity(np.zeros(count, dtype)), np.zeros((3, count), dtype), 0.0
+    )
+    rng = np.random.default_rng(13)
+    for i in range(count):
+        det, a, b, c = exact_screen(position, shape, i)
+        with mpmath.workdps(60):
+            angle = 0.5 * float(mpmath.atan2(2 * b, a - c))
+            longest = float(mpmath.sqrt((a + c) / 2 + mpmath.sqrt(((a + c) / 2) ** 2 - det)))
+        along = np.array([np.cos(angle), np.sin(angle)]) * longest
+        for d in (along, -0.5 * along, rng.normal(0, 3, 2), along + rng.normal(0, 1, 2)):
+            dx, dy = d.astype(dtype)
+            e = dx - records[i, SLOPE] * dy
+            q = records[i, INVERSE_C] * dy * dy + records[i, PRECISION] * e * e
+            assert q >= 0 and q.dtype == dtype
+            with mpmath.workdps(60):
+                x, y = mpmath.mpf(float(dx)), mpmath.mpf(float(dy))
+                exact = (c * x * x - 2 * b * x * y + a * y * y) / det
+                length = float(mpmath.sqrt(x * x + y * y))
+                bound = float(exact + mpmath.sqrt(exact / 0.3) * length) + u * length**2 / 0.3
+                error = abs(float(mpmath.mpf(float(q)) - exact))
+            assert error <= 16 * u * bound, (i, error / (u * bound))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_C3_determinant_is_at_least_the_low_pass_squared(dtype):
+    position, shape = needles(14, 2000, dtype, -9.0, 5.0)
+    out, _ = projection_forward(position, shape, CAMERA, PAPER)
+    assert (out.determinant >= dtype(0.3) * dtype(0.3)).all() and np.isfinite(out.determinant).all()
+
+
+def test_hard_C5_shear_gradient_end_to_end():
+    """A tilted splat, loss = one pixel: the gradient by the quaternion, through b, against the complex step."""
+    scene = screen_scene(CAMERA, 16.2, 13.8, 4.0, [3.0], 0.6, [1, 1, 1])
+    scene.log_scale[:, 0] += np.array([0.8, -0.9, 0.1])
+    scene.quaternion[:, 0] = [0.8, 0.1, -0.2, 0.5]
+    given = [np.zeros((3, CAMERA.height, CAMERA.width)), np.zeros((CAMERA.height, CAMERA.width)), None]
+    given[0][0, 15, 18] = 1.0
+    _, gradients = run(scene, CAMERA, EXACT, given=(given[0], given[1], np.zeros_like(given[1])))
+    named = {name: a for name, a in scene._asdict().items() if a is not None}
+    for k in range(4):
+        moved = named | {"quaternion": scene.quaternion.astype(complex)}
+        moved["quaternion"][k, 0] += 1e-40j
+        pose = (np.eye(3), np.zeros(3))
+        image = oracle.render(moved, pose, lens(CAMERA), rules(EXACT), np.zeros(3), 0)[0]
+        wanted = image[0, 15, 18].imag / 1e-40
+        assert abs(gradients["quaternion"][k, 0] - wanted) <= 1e-12 * np.abs(gradients["quaternion"]).max()
+
+
+# --- pose ---
+
+
+def test_moving_scene_and_camera_together_changes_nothing():
+    """The sum of the gradients by position equals rotation^T times that by the camera translation."""
+    camera = turned_camera(33, 29, 25.0)
+    scene = random_scene(15, 60, camera)
+    scene = scene._replace(harmonics=scene.harmonics[:1].copy())
+    _, gradients = run(scene, camera, PAPER, "definition")
+    np.testing.assert_allclose(
+        gradients["position"].sum(axis=1), camera.rotation.T @ gradients["translation"], rtol=1e-10, atol=1e-11
+    )
+    np.testing.assert_allclose(camera.rotation @ camera_centre(camera), -camera.translation, atol=1e-15)
+    np.testing.assert_allclose(world(camera, camera.rotation @ scene.position + camera.translation[:, None]),
+                               scene.position, atol=1e-12)  # fmt: skip

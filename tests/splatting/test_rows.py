@@ -1,0 +1,245 @@
+"""The fast path against the definition: images and every gradient, random scenes and hard ones, float64 and float32.
+
+Float64: 1e-12 of the largest entry, 1e-11 where alphas at the clamp of .99 are stacked (the fast path divides by
+1 - alpha >= 0.01, see `test_stacks_cost_at_most_a_hundred_roundings`). Float32: 1e-4 in relative L2.
+"""
+
+import numpy as np
+import pytest
+from made_up_scenes import (
+    U64,
+    as_dtype,
+    assert_bitwise,
+    assert_close,
+    assert_close_l2,
+    assert_finite,
+    plain_camera,
+    random_scene,
+    run,
+    screen_scene,
+    select,
+    turned_camera,
+)
+
+from endotsr.splatting import compositing_rows
+from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.splatting.covariance import covariance_forward
+from endotsr.splatting.harmonics import harmonics_forward
+from endotsr.splatting.projection import projection_forward
+from endotsr.splatting.records import HALF_HEIGHT, log_opacity, pack_records
+from endotsr.splatting.render import Scene, choose_path
+from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+
+BACKGROUND = np.array([0.9, 0.1, 0.4])
+CAMERA = plain_camera()
+
+
+def rgb_for(seed: int, count: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0.05, 1.0, (3, count))
+
+
+def random_65x47() -> tuple[Scene, Camera]:
+    camera = turned_camera()
+    return random_scene(1, 200, camera), camera
+
+
+def small_ones() -> tuple[Scene, Camera]:
+    """Nothing but the low-pass: footprints of two pixels."""
+    camera = turned_camera()
+    return random_scene(2, 400, camera, size=(1e-6, 0.3)), camera
+
+
+def needles() -> tuple[Scene, Camera]:
+    """Up to 3000 px long and thinner than a pixel, at all angles."""
+    scene = random_scene(3, 60, CAMERA)
+    rng = np.random.default_rng(4)
+    z = np.abs(scene.position[2])
+    scene.position[2] = z
+    axes = np.stack([10 ** rng.uniform(1, 3.5, 60), 10 ** rng.uniform(-3, 0, 60), 10 ** rng.uniform(-3, 0, 60)])
+    return scene._replace(log_scale=np.log(axes * z / CAMERA.fx)), CAMERA
+
+
+def huge() -> tuple[Scene, Camera]:
+    """Covariances up to 1e12 px^2, centres inside and far outside the image."""
+    rng = np.random.default_rng(5)
+    u, v = rng.uniform(-2000, 2000, 30), rng.uniform(-2000, 2000, 30)
+    return screen_scene(
+        CAMERA, u, v, rng.uniform(2, 9, 30), 10 ** rng.uniform(2, 6, 30), rng.uniform(0.02, 0.9, 30), rgb_for(6, 30)
+    ), CAMERA
+
+
+def opaque() -> tuple[Scene, Camera]:
+    """Opacities beyond the alpha clamp, from 0.98 to 1 exactly."""
+    scene = random_scene(7, 150, CAMERA, size=(2.0, 10.0))
+    scene.opacity_logit[:] = np.random.default_rng(8).uniform(4, 40, 150)
+    return scene, CAMERA
+
+
+def stacked() -> tuple[Scene, Camera]:
+    """2000 on one spot, alpha just above the cutoff: every pixel near it meets the stop."""
+    z = 3.0 + np.random.default_rng(9).permutation(2000) * 1e-3
+    return screen_scene(CAMERA, 30.2, 20.7, z, 8.0, 0.01, rgb_for(10, 2000)), CAMERA
+
+
+def equal_depths() -> tuple[Scene, Camera]:
+    scene = random_scene(11, 200, CAMERA)
+    scene.position[2] = 5.0
+    return scene, CAMERA
+
+
+def on_borders() -> tuple[Scene, Camera]:
+    """Centres on the borders of tiles and of the image, on pixel centres and just outside."""
+    u, v = np.meshgrid([0.0, 0.5, 15.5, 16.0, 31.5, 32.0, 48.0, 64.5, 65.0, 70.0], [-3.0, 0.0, 15.5, 16, 32, 46.5, 47])
+    n = u.size
+    sigma = np.random.default_rng(12).uniform(0.1, 6, n)
+    z = 3 + np.random.default_rng(13).permutation(n) * 0.1
+    return screen_scene(CAMERA, u.ravel(), v.ravel(), z, sigma, 0.8, rgb_for(14, n)), CAMERA
+
+
+def outside() -> tuple[Scene, Camera]:
+    """Nothing reaches a pixel."""
+    scene = random_scene(15, 20, CAMERA)
+    scene.position[0] = 1e4
+    return scene, CAMERA
+
+
+def none_at_all() -> tuple[Scene, Camera]:
+    return select(random_scene(16, 5, CAMERA), []), CAMERA
+
+
+def only_one() -> tuple[Scene, Camera]:
+    return screen_scene(CAMERA, 20.3, 30.1, 4.0, 5.0, 0.7, [0.2, 0.5, 0.8]), CAMERA
+
+
+def one_pixel() -> tuple[Scene, Camera]:
+    camera = plain_camera(1, 1)
+    return random_scene(17, 40, camera, size=(0.5, 3.0)), camera
+
+
+def extreme_logits() -> tuple[Scene, Camera]:
+    scene = random_scene(18, 60, CAMERA)
+    scene.opacity_logit[:] = np.resize([800.0, -800.0, 40.0, -40.0, 0.0, 1.0], 60)
+    return scene, CAMERA
+
+
+def tall_and_narrow() -> tuple[Scene, Camera]:
+    camera = turned_camera(3, 101)
+    return random_scene(19, 80, camera), camera
+
+
+SCENES = {
+    f.__name__: f
+    for f in (
+        random_65x47, small_ones, needles, huge, opaque, stacked, equal_depths, on_borders, outside, none_at_all,
+        only_one, one_pixel, extreme_logits, tall_and_narrow,
+    )
+}  # fmt: skip
+
+
+# Needles: the gradient by a, b, c loses (length / width)^2 = 1e7 roundings on its way to the long axis, in both paths.
+BOUNDS = {"opaque": 1e-11, "stacked": 1e-11, "needles": 1e-8}
+SHAPE = ("position", "quaternion", "log_scale", "rotation_matrix", "translation")
+
+
+def both(scene: Scene, camera: Camera, settings=PAPER):
+    """Images and gradients in one dictionary, of the definition and of the fast path."""
+    background = BACKGROUND.astype(scene.position.dtype)
+    results = []
+    for path in ("definition", "rows"):
+        images, gradients = run(scene, camera, settings, path, background=background)
+        assert_finite(images, gradients)
+        results.append({f"image {k}": a for k, a in images.items()} | gradients)
+    return results
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_fast_path_equals_definition_float64(name):
+    definition, rows = both(*SCENES[name]())
+    assert_close(rows, definition, BOUNDS.get(name, 1e-12))
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_fast_path_equals_definition_float32(name):
+    scene, camera = SCENES[name]()
+    definition, rows = both(as_dtype(scene, np.float32), camera)
+    assert all(a.dtype == np.float32 for a in rows.values())
+    if name == "needles":  # see BOUNDS: 1e7 roundings of float32 leave no digit of these
+        rows = {key: a for key, a in rows.items() if key not in SHAPE}
+    assert_close_l2(rows, definition, 1e-4)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        PAPER._replace(alpha_cutoff=1e-9),
+        PAPER._replace(alpha_cutoff=0.3, transmittance_stop=0.05),
+        PAPER._replace(transmittance_stop=0.0, alpha_max=0.999),
+        PAPER._replace(low_pass=0.01, jacobian_clamp=0.0, alpha_max=0.5),
+    ],
+    ids=["fine cutoff", "coarse cutoff and stop", "no stop", "sharp"],
+)
+def test_fast_path_equals_definition_for_other_dials(settings):
+    definition, rows = both(*random_65x47(), settings)
+    assert_close(rows, definition, 1e-10 if settings.alpha_max > 0.99 else 1e-11)
+
+
+def test_stacks_cost_at_most_a_hundred_roundings():
+    """|fast - definition| <= 100 u n of the largest gradient when n opaque ones stand one behind the other."""
+    n = 6
+    scene = screen_scene(CAMERA, 30.2, 20.7, 3.0 + np.arange(n), 6.0, 0.985, rgb_for(20, n))
+    definition, rows = both(scene, CAMERA, PAPER._replace(transmittance_stop=0.0))
+    assert_close(rows, definition, 100 * n * U64)
+
+
+def test_auto_takes_the_fast_path_exactly_where_it_computes_the_settings():
+    assert choose_path(PAPER, "auto") == "rows"
+    others = (EXACT, LEGACY, PAPER._replace(alpha_cutoff=0.0), PAPER._replace(alpha_max=1.0))
+    for settings in (*others, PAPER._replace(support="everywhere")):
+        assert choose_path(settings, "auto") == "definition"
+        with pytest.raises(ValueError, match="definition"):
+            choose_path(settings, "rows")
+    assert choose_path(PAPER, "definition") == "definition"
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("name", ["random_65x47", "needles", "huge", "on_borders"])
+def test_hard_C8_lossless_box_fast_path(name, dtype):
+    """Boxes of the whole image and rows of the whole tile in place of the tight ones: the same image, bit by bit."""
+    scene, camera = SCENES[name]()
+    scene = as_dtype(scene, dtype)
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, _ = projection_forward(scene.position, shape, camera, PAPER)
+    degree = int(np.sqrt(scene.harmonics.shape[0])) - 1
+    rgb, _ = harmonics_forward(scene.harmonics, scene.residual, scene.position, camera_centre(camera), degree)
+    log_alpha = log_opacity(scene.opacity_logit)
+    box, visible = screen_boxes(projected, log_alpha, PAPER, camera.width, camera.height)
+    results = []
+    for tight in (True, False):
+        if not tight:
+            visible = projected.visible
+            box = np.tile(np.array([0, camera.width - 1, 0, camera.height - 1], np.int32), (visible.size, 1))
+        order = depth_order(projected.depth, visible)
+        records = pack_records(order, projected, log_alpha, rgb, np.log(PAPER.alpha_cutoff))
+        if not tight:
+            records[:, HALF_HEIGHT] = 1e6
+        lists = tile_lists(
+            box, order, compositing_rows.TILE_WIDTH, compositing_rows.TILE_HEIGHT, camera.width, camera.height
+        )
+        out, _ = compositing_rows.composite_rows_forward(
+            records, lists, PAPER, BACKGROUND.astype(dtype), camera.width, camera.height
+        )
+        results.append(out._asdict())
+    assert_bitwise(*results)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "stacked"])
+def test_hard_C8_lossless_box_definition(name, dtype):
+    """Ellipse boxes against no boxes at all, same cutoff: images and gradients equal bit by bit."""
+    scene, camera = SCENES[name]()
+    scene = as_dtype(scene, dtype)
+    boxed = run(scene, camera, PAPER, "definition", background=BACKGROUND)
+    free = run(scene, camera, PAPER._replace(support="everywhere"), "definition", background=BACKGROUND)
+    for one, two in zip(boxed, free):
+        assert_bitwise(one, two)
