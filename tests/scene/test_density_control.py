@@ -232,3 +232,17 @@ def test_zero_quaternion_and_huge_scale_split_finitely(rng):
     result = run(gaussians, adam, steep(2, 0, 1))
     assert result.split == 2
     assert np.isfinite(result.gaussians.position).all()
+
+
+def test_consumed_moments_give_the_same_result_and_leave_nothing_behind(rng):
+    gaussians, adam = make(rng, 9)
+    statistics = steep(9, 2, 5)
+    kept = densify(gaussians, adam, statistics, CONFIG, np.random.default_rng(5), EXTENT)
+    assert adam.first and adam.second  # not consumed unless asked for
+    names = list(adam.first)
+    consumed = densify(gaussians, adam, statistics, CONFIG, np.random.default_rng(5), EXTENT, consume_moments=True)
+    assert not adam.first and not adam.second
+    assert list(consumed.adam.first) == names
+    for name in names:
+        np.testing.assert_array_equal(consumed.adam.first[name], kept.adam.first[name])
+        np.testing.assert_array_equal(consumed.adam.second[name], kept.adam.second[name])

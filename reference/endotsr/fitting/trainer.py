@@ -288,7 +288,10 @@ def _optimise(
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:
     """Clone, split and prune; statistics start anew."""
-    result = densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
+    density = shop.config.density
+    result = densify(
+        state.gaussians, state.adam, state.statistics, density, state.rng, shop.extent, consume_moments=True
+    )
     state.gaussians, state.adam, state.statistics = result.gaussians, result.adam, result.statistics
 
 

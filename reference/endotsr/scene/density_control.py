@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.config import DensityConfig
@@ -22,6 +21,7 @@ from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState
 from endotsr.jit import jit
 from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.sharing import share
 from endotsr.splatting.camera import Camera, camera_centre
 
 FloatArray = NDArray[np.floating]
@@ -93,8 +93,12 @@ def densify(
     config: DensityConfig,
     rng: np.random.Generator,
     extent: float,
+    *,
+    consume_moments: bool = False,
 ) -> Densified:
     """Clone, split and prune in one gather; the inputs are left as they are.
+
+    consume_moments   empty `adam` while the new moments are made, so that old and new never stand in memory together
 
     extent   scene units, see `scene_extent`
     returns  survivors in their old order, then clones, then first children, then second children, the last three
@@ -113,7 +117,7 @@ def densify(
     if split.size:
         _place_children(result, gaussians, split, rng)
     moments = [
-        {name: _take(array, index, survivors.size) for name, array in group.items()}
+        _take_moments(group if consume_moments else dict(group), index, survivors.size)
         for group in (adam.first, adam.second)
     ]
     pruned = gaussians.count - int(alive.sum())
@@ -187,12 +191,18 @@ def _take(array: FloatArray, index: IndexArray, old: int) -> FloatArray:
     out = np.empty((*array.shape[:-1], index.size), array.dtype)
     if out.size:
         rows = array.size // array.shape[-1]
-        _take_kernel(np.ascontiguousarray(array).reshape(rows, -1), index, old, out.reshape(rows, -1))
+        source = np.ascontiguousarray(array).reshape(rows, -1)
+        share(_take_kernel, rows, source, index, old, out.reshape(rows, -1))
     return out
 
 
-def _take_rows(source, index, old, out):
-    for row in prange(source.shape[0]):
+def _take_moments(group: dict[str, FloatArray], index: IndexArray, old: int) -> dict[str, FloatArray]:
+    """The moments of the new Gaussians; `group` is emptied on the way."""
+    return {name: _take(group.pop(name), index, old) for name in list(group)}
+
+
+def _take_rows(first, stop, source, index, old, out):
+    for row in range(first, stop):
         from_row, to_row = source[row], out[row]
         for i in range(old):
             to_row[i] = from_row[index[i]]
@@ -200,7 +210,7 @@ def _take_rows(source, index, old, out):
             to_row[i] = from_row.dtype.type(0)
 
 
-_take_kernel = jit(_take_rows, parallel=True)
+_take_kernel = jit(_take_rows)
 
 
 def check_lengths(gaussians: Gaussians, adam: AdamState) -> None:
