@@ -25,8 +25,8 @@ source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 
-# The notebooks (docs/notebooks -> ../notebooks) are pages. Running all of them at full size takes minutes, so pages carry
-# their pictures only when asked for: ENDOTSR_DOCS_EXECUTE=1 runs each notebook once and keeps the results.
+# The notebooks (docs/notebooks -> ../notebooks) are pages. Running all of them at full size takes minutes, so pages
+# carry their pictures only when asked for: ENDOTSR_DOCS_EXECUTE=1 runs each notebook once and keeps the results.
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode = "cache" if os.environ.get("ENDOTSR_DOCS_EXECUTE") else "off"
 nb_execution_raise_on_error = True

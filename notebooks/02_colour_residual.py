@@ -1,0 +1,185 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 2. The bounded colour residual (component A)
+#
+# Light changes during a clip: exposure drifts, tissue pales under pressure. Component A lets each Gaussian follow such a
+# change, by at most $\beta$ in display units, whatever its coefficients are. The bound keeps illumination change from being
+# abused as a texture.
+#
+# Equation {eq}`eq-2` of {doc}`/specification/02_appearance`; the atoms come from {doc}`01_dictionary`.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.equations.appearance import Y00, appearance_forward, appearance_reverse
+from endotsr.equations.fourier import atom_statistics, frequencies, normalised_atoms
+
+rng = np.random.default_rng(2)
+F, N, beta = 8, 5, 0.3
+omega = frequencies(F, 1.0, 16.0)
+stamps = np.delete(np.arange(63), np.arange(1, 63, 8)) / 63
+statistics = atom_statistics(stamps, omega)
+
+# %% [markdown]
+# ## The equation
+#
+# $$
+# x_{ci}(t) = \sum_{k=1}^{2F} A_{cki}\,\bar\phi_k(t),\qquad
+# \Delta h_{0,ci}(t) = \frac{\beta}{Y_{00}}\tanh x_{ci}(t),\qquad Y_{00}=\frac{1}{\sqrt{4\pi}} .
+# $$
+#
+# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0 harmonic
+# coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$ makes the
+# change of the **displayed** colour exactly $\beta\tanh x$.
+
+
+# %% tags=["transcription"]
+def residual_text(A, phi_bar, beta):
+    """Equation (2) as printed, one Gaussian and channel at a time."""
+    x = np.zeros((3, A.shape[2]))
+    for c in range(3):
+        for i in range(A.shape[2]):
+            x[c, i] = sum(A[c, k, i] * phi_bar[k] for k in range(2 * F))
+    Y_00 = 1 / np.sqrt(4 * np.pi)
+    return beta / Y_00 * np.tanh(x)
+
+
+# %%
+A = rng.normal(0, 0.4, (3, 2 * F, N))
+for t in (0.0, 0.2, 0.77):
+    phi_bar = normalised_atoms(t, omega, statistics)
+    residual, saved = appearance_forward(A, phi_bar, beta)
+    np.testing.assert_allclose(residual, residual_text(A, phi_bar, beta), rtol=1e-13)
+assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta * (1 + 1e-15)
+
+# %% [markdown]
+# **Identity at the start.** $A=0$ gives a residual of exactly 0: a model in which the component has just been switched on
+# renders the same image, bit by bit. The gradient of $A$ there is not 0 (see below), so it can start.
+
+# %%
+zero = np.zeros_like(A)
+assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
+
+# %% [markdown]
+# ## A picture: brightening explained by colour, or by motion
+#
+# One patch of tissue grows paler and recovers, without moving. Component A follows with a colour curve. A model without A
+# has one other way to make a pixel brighter at one moment: it moves a brighter Gaussian there. Below, a bright
+# neighbour 4 px away is shifted so that a pixel shows the same brightness at each time. The picture at this pixel is right in both
+# cases; the geometry of the second is wrong by up to 4 px. This is why the paper separates the two.
+
+# %%
+fine = np.linspace(0, 0.98, 197)
+target = 0.45 + 0.2 * np.exp(-(((fine - 0.55) / 0.12) ** 2))  # display brightness of a patch
+phis = np.array([normalised_atoms(t, omega, statistics) for t in fine])
+choices = np.linspace(0.4, 0.6, 2001)  # the base colour at which the argument x has mean 0, as every x must
+base = min(choices, key=lambda b: abs(np.arctanh((target - b) / beta).mean()))
+wanted = np.arctanh((target - base) / beta)
+coefficients = np.linalg.lstsq(phis, wanted, rcond=None)[0]
+one = np.zeros((3, 2 * F, 1))
+one[:, :, 0] = coefficients
+by_colour = base + np.array([Y00 * appearance_forward(one, p, beta)[0][0, 0] for p in phis])
+assert np.abs(by_colour - target).max() < 0.02
+
+# without A: a bright Gaussian (0.7) beside a dull one (0.45); the mixture at the pixel depends on how far it is
+distance = np.linspace(4, 0, 400)
+mixed = 0.45 + 0.25 * np.exp(-(distance**2) / 3)
+by_motion = distance[np.searchsorted(mixed, target.clip(mixed[0], mixed[-1])).clip(max=399)]
+assert 4 - by_motion.min() > 2, "the motion that explains the light is pixels, not noise"
+
+figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
+axes[0].plot(fine, target, color="0.6", lw=4, label="brightness of the patch")
+axes[0].plot(fine, by_colour, color="tab:blue", lw=1.5, label="base + $\\beta\\tanh x(t)$")
+axes[0].axhspan(base - beta, base + beta, color="tab:blue", alpha=0.08, label="all that A can reach")
+axes[0].set(title="explained by colour", xlabel="t", ylabel="display colour", ylim=(0.1, 0.9))
+axes[0].legend(fontsize=8, loc="lower left")
+axes[1].plot(fine, 4 - by_motion, color="tab:red", label="shift of a bright neighbour, no A")
+axes[1].axhline(0, color="tab:blue", label="true motion, and that with A")
+axes[1].set(title="explained by motion", xlabel="t", ylabel="displacement [px]", ylim=(-0.2, 4.6))
+axes[1].legend(fontsize=8, loc="upper left")
+x = np.linspace(0, 14, 300)
+e = np.exp(-2 * x.astype(np.float32))
+axes[2].semilogy(x, np.maximum(1 - np.tanh(x.astype(np.float32)) ** 2, 1e-14), color="tab:red", label="$1-\\tanh^2x$")
+axes[2].semilogy(x, 4 * e / (1 + e) ** 2, color="tab:green", label="$4e/(1+e)^2,\\ e=\\exp(-2|x|)$")
+axes[2].set(title="slope of tanh in float32", xlabel="x", ylim=(1e-13, 2))
+axes[2].legend(fontsize=8)
+
+# %% [markdown]
+# ## The reverse pass
+#
+# Step by step. $\Delta h_0$ depends on $x$ through $\tanh$, so $g_x=\frac{\beta}{Y_{00}}\tanh'(x)\,g_{\Delta h_0}$. $x$ is bilinear in $A$ and
+# $\bar\phi$: each coefficient meets exactly one atom, so $g_A=g_x\,\bar\phi$; each atom meets all Gaussians and
+# channels, so $g_{\bar\phi}$ is a sum over both.
+#
+# The right panel above shows why the slope is not written $1-\tanh^2x$: in float32 that is exactly 0 from $x\approx10$ on, and a
+# saturated residual could never come back. Hence:
+#
+# $$
+# g_{x_{ci}} = \frac{\beta}{Y_{00}}\,\frac{4e_{ci}}{(1+e_{ci})^2}\;g_{\Delta h_{0,ci}},\qquad
+# g_{A_{cki}} = g_{x_{ci}}\,\bar\phi_k,\qquad
+# g_{\bar\phi_k} = \sum_{i=1}^{N}\sum_{c=1}^{3} g_{x_{ci}}\,A_{cki} .
+# $$
+
+
+# %% tags=["transcription"]
+def reverse_text(g_h, A, phi_bar, beta):
+    x = np.einsum("cki,k->ci", A, phi_bar)
+    e = np.exp(-2 * np.abs(x))
+    g_x = beta * np.sqrt(4 * np.pi) * 4 * e / (1 + e) ** 2 * g_h
+    g_A = g_x[:, None, :] * phi_bar[None, :, None]
+    g_phi_bar = np.einsum("ci,cki->k", g_x, A)
+    return g_A, g_phi_bar
+
+
+# %%
+g_h = rng.normal(size=(3, N))
+grads = appearance_reverse(g_h, appearance_forward(A, phi_bar, beta)[1])
+g_A, g_phi_bar = reverse_text(g_h, A, phi_bar, beta)
+np.testing.assert_allclose(grads.colour_coefficients, g_A, rtol=1e-12)
+np.testing.assert_allclose(grads.phi_bar, g_phi_bar, rtol=1e-11)
+
+start = appearance_reverse(g_h, appearance_forward(zero, phi_bar, beta)[1]).colour_coefficients
+np.testing.assert_allclose(start, beta / Y00 * phi_bar[None, :, None] * g_h[:, None, :], rtol=1e-14)
+assert np.abs(start).max() > 0
+
+# %% [markdown]
+# ## The gradient check
+#
+# One block per atom: a mistake in a single atom cannot hide behind the other fifteen.
+
+# %%
+with one_thread():
+    report = check_pair(all_pairs()["appearance"], pair_stream("appearance", 0))
+print(table([report]))
+assert report.passed
+
+# %% [markdown]
+# ## Exercise
+#
+# The residual has mean **argument** $x$ equal to 0 over the training stamps, because each $\bar\phi_k$ has. Is the mean of
+# $\beta\tanh x$ then 0 too? Find an $A$ for which the mean colour over the training stamps moves.
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for the rest saturates at the top only,
+# so its mean after tanh is negative. The bound is what limits this: the mean can move by less than beta.
+bump = np.exp(-(((stamps - 0.5) / 0.05) ** 2))
+atoms = np.array([normalised_atoms(t, omega, statistics) for t in stamps])
+short = np.zeros((3, 2 * F, 1))
+short[:, :, 0] = 12 * np.linalg.lstsq(atoms, bump - bump.mean(), rcond=None)[0]
+change = np.array([Y00 * appearance_forward(short, p, beta)[0][0, 0] for p in atoms])
+argument = atoms @ short[0, :, 0]
+print(f"mean of x: {argument.mean():.1e}, mean change of colour: {change.mean():.3f}")
+assert abs(argument.mean()) < 1e-12 and change.mean() < -0.02

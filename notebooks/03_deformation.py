@@ -1,0 +1,193 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 3. The flexible deformation model (FDM)
+#
+# The base model that Endo-TSR extends moves, turns and scales each Gaussian by ten functions of time. Each function is a
+# sum of $B$ bumps, and for every bump three numbers are learned: a weight, a centre and a width.
+#
+# Equation {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.equations.deformation import deformation_forward, deformation_reverse
+
+rng = np.random.default_rng(3)
+B, N = 17, 4
+
+# %% [markdown]
+# ## The equation
+#
+# With $\Delta=t-\theta$ and $\Sigma=\sigma^2+10^{-4}$, element by element:
+#
+# $$
+# \psi_{ci}(t)=\sum_{j=1}^{B} w_{cji}\,e_{cji},\qquad
+# e=\begin{cases}
+# \exp(-u^2),\quad u=\Delta^2/\Sigma & \texttt{quartic}\\[0.5ex]
+# \exp\bigl(-\Delta^2/(2\Sigma)\bigr) & \texttt{gaussian}
+# \end{cases}
+# $$
+#
+# Channels 0-2 belong to the position, 3-6 to the raw quaternion, 7-9 to the log-scale. All are added **before** any activation:
+#
+# $$
+# \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
+# $$
+#
+# `quartic` is what the released code computes: the exponent is the square of a square. `gaussian` is the textbook form.
+# They are far apart: 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
+
+
+# %% tags=["transcription"]
+def bump_text(t, theta, sigma, basis):
+    Delta = t - theta
+    Sigma = sigma**2 + 1e-4
+    if basis == "quartic":
+        u = Delta**2 / Sigma
+        return np.exp(-(u**2))
+    return np.exp(-(Delta**2) / (2 * Sigma))
+
+
+def offsets_text(w, theta, sigma, t, basis):
+    return (w * bump_text(t, theta, sigma, basis)).sum(axis=1)
+
+
+# %%
+w = rng.normal(size=(10, B, N))
+theta = np.linspace(0, 1, B)[None, :, None] + rng.normal(0, 0.02, (10, B, N))
+sigma = rng.uniform(-0.1, 0.1, (10, B, N))  # the sign does not matter: only its square counts
+for basis in ("quartic", "gaussian"):
+    for t in (0.0, 0.4, 0.93):
+        psi, saved = deformation_forward(w, theta, sigma, t, basis)
+        np.testing.assert_allclose(psi, offsets_text(w, theta, sigma, t, basis), rtol=1e-12, atol=1e-15)
+
+for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
+    one = np.ones((10, 1, 1))
+    found = deformation_forward(one, 0.5 * one, 0.01 * one, 0.52, basis)[0]
+    assert abs(found[0, 0] - value) < 1e-4
+
+# %% [markdown]
+# ## A picture: which times do the bumps reach?
+#
+# At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. A weight
+# feels a frame only through $e$, the height of its bump there. With the published width of 0.01 there are times at which
+# no bump is higher than 0.001: a frame that lies there hardly moves anything at first. Not an error, but slow. The preset
+# `sharp` starts at 0.05.
+
+# %%
+fine = np.linspace(0, 1, 1201)
+centres = np.linspace(0, 1, B)
+figure, axes = plt.subplots(1, 3, figsize=(13, 3.4), layout="constrained")
+unit = np.zeros((10, B, B))
+unit[0] = np.eye(B)  # Gaussian j carries bump j alone: the offsets are the bumps themselves
+spread = np.broadcast_to(centres[None, :, None], unit.shape).copy()
+for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
+    bumps = np.array([deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine])
+    np.testing.assert_allclose(bumps, bump_text(fine[:, None], centres, width, "quartic"), atol=1e-15)
+    highest = bumps.max(axis=1)
+    panel.plot(fine, bumps, lw=0.8, color="tab:blue")
+    panel.fill_between(fine, 0, 1, where=highest < 1e-3, color="tab:red", alpha=0.25, lw=0)
+    panel.set(title=f"{B} bumps, width {width}", xlabel="t", xlim=(0, 0.5), ylim=(-0.03, 1.15))
+    if width == 0.01:
+        frames = np.arange(63) / 63
+        assert int((np.interp(frames, fine, highest) < 1e-3).sum()) == 16
+        panel.text(0.01, 1.06, "red: no bump above 0.001 (16 of 63 frames)", fontsize=8)
+learned = rng.normal(0, 1, (10, B, 1))
+curve = [deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][:3, 0] for t in fine]
+axes[2].plot(fine, np.array(curve), label=["x", "y", "z"])
+axes[2].set(title="a trajectory: weights at random, width 0.06", xlabel="t", ylabel="offset [scene units]")
+axes[2].legend()
+
+# %% [markdown]
+# ## The reverse pass
+#
+# $\psi$ is linear in $w$, so $g_w=e\,g_\psi$. For `quartic`, $e=\exp(-u^2)$ gives $\mathrm de=-2ue\,\mathrm du$, and $u=\Delta^2/\Sigma$ gives
+# $\mathrm du=\frac{2\Delta}{\Sigma}\mathrm d\Delta-\frac{u}{\Sigma}\mathrm d\Sigma$ with $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. Multiplied out: two
+# minus signs meet in each case, and both gradients begin with $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$.
+# The time enters every $\Delta$ with the opposite sign of $\theta$:
+#
+# $$
+# \begin{aligned}
+# g_{w} &= e\,g_\psi,\\
+# \texttt{quartic:}\quad g_\theta &= 4we\,\frac{u\,\Delta}{\Sigma}\,g_\psi,\qquad
+# g_\sigma = 4we\,\frac{u^2\sigma}{\Sigma}\,g_\psi,\\
+# \texttt{gaussian:}\quad g_\theta &= we\,\frac{\Delta}{\Sigma}\,g_\psi,\qquad
+# g_\sigma = we\,\frac{\Delta^2\sigma}{\Sigma^2}\,g_\psi,\\
+# g_t &= -\sum_{c,j,i} g_{\theta,cji} .
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def reverse_text(g_psi, w, theta, sigma, t, basis):
+    g = g_psi[:, None, :]  # broadcast over the bumps j
+    e = bump_text(t, theta, sigma, basis)
+    Delta, Sigma = t - theta, sigma**2 + 1e-4
+    u = Delta**2 / Sigma
+    if basis == "quartic":
+        g_theta = 4 * w * e * u * Delta / Sigma * g
+        g_sigma = 4 * w * e * u**2 * sigma / Sigma * g
+    else:
+        g_theta = w * e * Delta / Sigma * g
+        g_sigma = w * e * Delta**2 * sigma / Sigma**2 * g
+    return e * g, g_theta, g_sigma, -g_theta.sum()
+
+
+# %%
+g_psi = rng.normal(size=(10, N))
+for basis in ("quartic", "gaussian"):
+    _, saved = deformation_forward(w, theta, sigma, 0.4, basis)
+    grads = deformation_reverse(g_psi, saved)
+    for found, text in zip(grads, reverse_text(g_psi, w, theta, sigma, 0.4, basis)):
+        np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
+
+# %% [markdown]
+# Two consequences to know. With all weights 0 the gradients of centre and width are exactly 0: only weights learn at first.
+# And a width of exactly 0 has gradient 0: it is stuck.
+
+# %%
+_, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
+still = deformation_reverse(g_psi, saved)
+assert np.any(still.weight) and not np.any(still.centre) and not np.any(still.width)
+
+# %% [markdown]
+# ## The gradient check
+
+# %%
+with one_thread():
+    reports = [
+        check_pair(all_pairs()[f"deformation_{b}"], pair_stream(f"deformation_{b}", 0)) for b in ("quartic", "gaussian")
+    ]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## Exercise
+#
+# At which distance from its centre does a quartic bump push its centre hardest, that is, where is $|g_\theta|$ largest? Work in
+# $v=\Delta/\sqrt\Sigma$. How far out does a `gaussian` bump of equal $\Sigma$ push hardest?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v = (3/4)^(1/4) = 0.931.
+# Gaussian: g_theta ~ exp(-v^2/2) v, largest at v = 1. So the reach is alike; beyond it the quartic bump is much darker.
+v = np.linspace(0, 3, 300_001)
+assert abs(v[np.argmax(np.exp(-(v**4)) * v**3)] - 0.75**0.25) < 1e-4
+assert abs(v[np.argmax(np.exp(-(v**2) / 2) * v)] - 1) < 1e-4
+one = np.ones((10, 1, 2001))
+t = 0.5 + np.sqrt(0.05**2 + 1e-4) * np.linspace(0, 2, 2001)
+_, saved = deformation_forward(one, 0.5 - (t - 0.5)[None, None, :] * one, 0.05 * one, 0.5)
+push = deformation_reverse(np.ones((10, 2001)), saved).centre[0, 0]
+assert abs(np.linspace(0, 2, 2001)[np.argmax(push)] - 0.75**0.25) < 1e-3

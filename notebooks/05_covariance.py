@@ -1,0 +1,237 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 5. Quaternions, scales and the covariance
+#
+# A Gaussian has a shape: three semi-axes and a rotation. Both are stored raw, so that any real numbers are allowed: the
+# quaternion of any length, the axes as logarithms.
+#
+# Equation {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_function, check_pair, one_thread, pair_stream, table
+from endotsr.splatting.covariance import Shape, covariance_forward, covariance_matrix, covariance_reverse
+
+rng = np.random.default_rng(5)
+N = 6
+
+# %% [markdown]
+# ## The equation
+#
+# $$
+# \begin{aligned}
+# q&=\frac{\tilde q}{\|\tilde q\|},\qquad S_k=e^{s_k},\\
+# R(q)&=\begin{bmatrix}
+# 1-2(y^2+z^2) & 2(xy-wz) & 2(xz+wy)\\
+# 2(xy+wz) & 1-2(x^2+z^2) & 2(yz-wx)\\
+# 2(xz-wy) & 2(yz+wx) & 1-2(x^2+y^2)
+# \end{bmatrix},\\
+# \Sigma &= R\,\mathrm{diag}(S)^2R^\top .
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def rotation_text(q_tilde):
+    w, x, y, z = q_tilde / np.sqrt((q_tilde**2).sum(axis=0))
+    return np.array(
+        [
+            [1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)],
+        ]
+    )
+
+
+def covariance_text(R, s):
+    S = np.exp(s)
+    return np.stack([R[:, :, i] @ np.diag(S[:, i] ** 2) @ R[:, :, i].T for i in range(s.shape[1])], axis=-1)
+
+
+# %%
+q, s = 3 * rng.normal(size=(4, N)), rng.normal(0, 0.7, (3, N))
+shape, saved = covariance_forward(q, s)
+np.testing.assert_allclose(shape.rotation, rotation_text(q), atol=1e-14)
+np.testing.assert_allclose(shape.scale, np.exp(s), rtol=1e-14)
+np.testing.assert_allclose(covariance_matrix(shape), covariance_text(shape.rotation, s), rtol=1e-11, atol=1e-13)
+
+# %% [markdown]
+# The length of the raw quaternion does not matter, not even when its square would leave the range of numbers; $q$ and $-q$ are
+# the same rotation; and the zero quaternion, which the FDM can reach by addition, is the identity.
+
+# %%
+for factor in (1e-300, 1e-30, -1.0, 1e300):
+    np.testing.assert_allclose(
+        covariance_forward(q / np.abs(q).max() * factor, s)[0].rotation, shape.rotation, atol=1e-14
+    )
+assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(3))
+
+# %% [markdown]
+# ## The reverse pass
+#
+# From $g_\Sigma$, all nine entries taken as independent. $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
+# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$: each entry of $M$ is met twice, once in the row and once in the column.
+#
+# $$
+# g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
+# $$
+#
+# The entries of $R$ are quadratic in the unit quaternion: differentiate each and collect, with $G=g_R$. Last comes the
+# normalisation. A step of $\tilde q$ along itself changes nothing, so that part of $g_q$ is removed; a longer $\tilde q$ turns less for the
+# same step, so the rest is divided by its length.
+#
+# $$
+# \begin{aligned}
+# g_w&=2\bigl[x(G_{21}-G_{12})+y(G_{02}-G_{20})+z(G_{10}-G_{01})\bigr]\\
+# g_x&=2\bigl[-2x(G_{11}+G_{22})+y(G_{01}+G_{10})+z(G_{02}+G_{20})+w(G_{21}-G_{12})\bigr]\\
+# g_y&=2\bigl[x(G_{01}+G_{10})-2y(G_{00}+G_{22})+z(G_{12}+G_{21})+w(G_{02}-G_{20})\bigr]\\
+# g_z&=2\bigl[x(G_{02}+G_{20})+y(G_{12}+G_{21})-2z(G_{00}+G_{11})+w(G_{10}-G_{01})\bigr]\\
+# g_{\tilde q}&=\frac{g_q-(q\cdot g_q)\,q}{\|\tilde q\|}
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def from_sigma_text(g_Sigma, R, S):
+    """g_R and g_S of one Gaussian."""
+    M = R @ np.diag(S)
+    g_M = (g_Sigma + g_Sigma.T) @ M
+    g_S = np.array([sum(R[j, k] * g_M[j, k] for j in range(3)) for k in range(3)])
+    return g_M * S, g_S
+
+
+def quaternion_reverse_text(G, q_tilde):
+    norm = np.sqrt((q_tilde**2).sum())
+    w, x, y, z = q_tilde / norm
+    g_w = 2 * (x * (G[2, 1] - G[1, 2]) + y * (G[0, 2] - G[2, 0]) + z * (G[1, 0] - G[0, 1]))
+    g_x = 2 * (
+        -2 * x * (G[1, 1] + G[2, 2]) + y * (G[0, 1] + G[1, 0]) + z * (G[0, 2] + G[2, 0]) + w * (G[2, 1] - G[1, 2])
+    )
+    g_y = 2 * (
+        x * (G[0, 1] + G[1, 0]) - 2 * y * (G[0, 0] + G[2, 2]) + z * (G[1, 2] + G[2, 1]) + w * (G[0, 2] - G[2, 0])
+    )
+    g_z = 2 * (
+        x * (G[0, 2] + G[2, 0]) + y * (G[1, 2] + G[2, 1]) - 2 * z * (G[0, 0] + G[1, 1]) + w * (G[1, 0] - G[0, 1])
+    )
+    g_q = np.array([g_w, g_x, g_y, g_z])
+    q = q_tilde / norm
+    return (g_q - (q @ g_q) * q) / norm
+
+
+# %%
+g_Sigma = rng.normal(size=(3, 3, N))
+pairs = [from_sigma_text(g_Sigma[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)]
+g_R, g_S = (np.stack(parts, axis=-1) for parts in zip(*pairs))
+grads = covariance_reverse(Shape(g_R, g_S), saved)
+for i in range(N):
+    np.testing.assert_allclose(
+        grads.quaternion[:, i], quaternion_reverse_text(g_R[:, :, i], q[:, i]), rtol=1e-9, atol=1e-12
+    )
+np.testing.assert_allclose(grads.log_scale, np.exp(s) * g_S, rtol=1e-12)
+
+along = np.abs((q * grads.quaternion).sum(axis=0)) / np.linalg.norm(grads.quaternion, axis=0)
+assert along.max() < 1e-12, "a gradient along the quaternion would change nothing"
+np.testing.assert_allclose(
+    covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).quaternion, grads.quaternion / 5
+)
+
+# %% [markdown]
+# ## A picture: a shape found by its gradient
+#
+# Minimise $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass. $g_\Sigma=2(\Sigma-\Sigma^\star)$.
+
+# %%
+q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
+target = covariance_matrix(
+    covariance_forward(np.array([[0.9], [0.3], [-0.2], [0.6]]), np.log([[1.4], [0.7], [0.2]]))[0]
+)[:, :, 0]
+path, losses = [], []
+for _ in range(800):
+    shape_now, saved_now = covariance_forward(q_now, s_now)
+    difference = covariance_matrix(shape_now)[:, :, 0] - target
+    losses.append((difference**2).sum())
+    path.append(covariance_matrix(shape_now)[:, :, 0])
+    back = from_sigma_text(2 * difference, shape_now.rotation[:, :, 0], shape_now.scale[:, 0])
+    step = covariance_reverse(Shape(*(part[..., None] for part in back)), saved_now)
+    q_now, s_now = q_now - 0.05 * step.quaternion, s_now - 0.05 * step.log_scale
+assert losses[-1] < 1e-3 * losses[0]
+
+circle = np.stack([np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))])
+figure = plt.figure(figsize=(13, 3.8), layout="constrained")
+for column, (a, b) in enumerate(((0, 1), (0, 2))):
+    panel = figure.add_subplot(1, 3, column + 1)
+    for k in (0, 4, 8, 16, 32, 64, 128, 799):
+        factor = np.linalg.cholesky(path[k][np.ix_([a, b], [a, b])])
+        panel.plot(*(factor @ circle), color=plt.cm.viridis(np.log1p(k) / 6), lw=1.2)
+    panel.plot(*(np.linalg.cholesky(target[np.ix_([a, b], [a, b])]) @ circle), "r--", lw=1.5)
+    panel.set(title=f"outline in {'xyz'[a]}{'xyz'[b]}: start dark, target red", aspect="equal")
+panel = figure.add_subplot(1, 3, 3, projection="3d")
+u, v = np.mgrid[0 : 2 * np.pi : 40j, 0 : np.pi : 20j]
+ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)])
+final, _ = covariance_forward(q_now, s_now)
+x, y, z = np.einsum("jk,k,kuv->juv", final.rotation[:, :, 0], final.scale[:, 0], ball)
+panel.plot_surface(x, y, z, cmap="viridis", alpha=0.9, lw=0)
+for k in range(3):
+    axis = final.rotation[:, k, 0] * final.scale[k, 0] * 1.3
+    panel.plot(*np.stack([-axis, axis], axis=1), color="k", lw=1)
+panel.set(title=f"the fitted shape, loss {losses[-1]:.0e}", aspect="equal")
+
+# %% [markdown]
+# ## The gradient check
+#
+# `check_function` takes any forward and reverse. First the way through $\Sigma$ as derived above, then the registered pair.
+
+
+# %%
+def sigma_forward(inputs):
+    return covariance_matrix(covariance_forward(inputs["quaternion"], inputs["log_scale"])[0])
+
+
+def sigma_reverse(inputs, g):
+    shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
+    parts = [from_sigma_text(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)]
+    return covariance_reverse(Shape(*(np.stack(p, axis=-1) for p in zip(*parts))), saved)._asdict()
+
+
+with one_thread():
+    reports = [
+        check_function(sigma_forward, sigma_reverse, {"quaternion": q, "log_scale": s}, label=("Sigma", "B2", "")),
+        check_pair(all_pairs()["covariance"], pair_stream("covariance", 0)),
+    ]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## Exercise
+#
+# Swap the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place of $(s_1,s_2,s_3)$. Which quaternion gives the same
+# $\Sigma$ as before? So how many parameter sets describe one ellipsoid?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1: the quaternion product q (1, 1, 1, 1)/2. There are
+# 24 proper rotations of a box onto itself up to permuting its axes; each has two quaternions, so 48 sets (times all lengths).
+w, x, y, z = q[:, 0]
+p = np.array([0.5, 0.5, 0.5, 0.5])
+product = np.array(
+    [
+        w * p[0] - x * p[1] - y * p[2] - z * p[3],
+        w * p[1] + x * p[0] + y * p[3] - z * p[2],
+        w * p[2] - x * p[3] + y * p[0] + z * p[1],
+        w * p[3] + x * p[2] - y * p[1] + z * p[0],
+    ]
+)
+same = covariance_matrix(covariance_forward(product[:, None], s[[1, 2, 0], :1])[0])[:, :, 0]
+np.testing.assert_allclose(same, covariance_matrix(shape)[:, :, 0], atol=1e-12)
