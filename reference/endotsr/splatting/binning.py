@@ -10,17 +10,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.projection import Projected
 from endotsr.splatting.settings import RasterSettings
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 
-BLOCK = 512
 CHUNKS = 16  # fixed, so that the lists do not depend on the number of threads
 LEGACY_TILE = 16
 _RADIX_BITS = 11
@@ -38,7 +37,9 @@ class TileLists(NamedTuple):
     slots: IntArray  # (pairs,) position of the pair in `ranks`, in tile order
 
 
-def _boxes(mean2d, covariance2d, determinant, log_opacity, visible, support, log_cutoff, width, height, box):
+def _boxes(
+    first, stop, mean2d, covariance2d, determinant, log_opacity, visible, support, log_cutoff, width, height, box
+):
     """Inclusive pixel box x0, x1, y0, y1 of each Gaussian; clears `visible` when the box is empty.
 
     The ellipse box is the exact extent of alpha >= cutoff plus a margin far above rounding: lossless.
@@ -46,42 +47,40 @@ def _boxes(mean2d, covariance2d, determinant, log_opacity, visible, support, log
     real = mean2d.dtype.type
     half, one, two, three, zero, tenth = real(0.5), real(1), real(2), real(3), real(0), real(0.1)
     margin, right, bottom = real(1e-3), real(width - 1), real(height - 1)
-    n = mean2d.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        for i in range(block * BLOCK, min(n, block * BLOCK + BLOCK)):
-            if not visible[i]:
-                continue
-            x, y = mean2d[0, i], mean2d[1, i]
-            a, c = covariance2d[0, i], covariance2d[2, i]
-            if support == _EVERYWHERE:
-                box[i, 0], box[i, 1], box[i, 2], box[i, 3] = 0, width - 1, 0, height - 1
-                continue
-            if support == _ELLIPSE:
-                reach = two * (log_opacity[i] - log_cutoff)
-                if not reach >= zero:  # too faint, or not a number
-                    visible[i] = False
-                    continue
-                ex, ey = math.sqrt(reach * a), math.sqrt(reach * c)
-                ex += (ex + abs(x)) * real(1e-5) + margin
-                ey += (ey + abs(y)) * real(1e-5) + margin
-                # clip in floating point before the conversion to int: a huge splat must not overflow
-                x0, x1 = math.ceil(max(x - ex - half, zero)), math.floor(min(x + ex - half, right))
-                y0, y1 = math.ceil(max(y - ey - half, zero)), math.floor(min(y + ey - half, bottom))
-            else:
-                middle = half * (a + c)
-                radius = math.ceil(three * math.sqrt(middle + math.sqrt(max(tenth, middle * middle - determinant[i]))))
-                tile = real(LEGACY_TILE)
-                limit_x, limit_y = right + tile, bottom + tile
-                # the released code truncates toward zero, in integer-pixel coordinates (mean - 1/2)
-                x0 = tile * math.floor(min(max((x - half - radius) / tile, zero), limit_x))
-                x1 = tile * math.floor(min(max((x - half + radius + tile - one) / tile, zero), limit_x)) - one
-                y0 = tile * math.floor(min(max((y - half - radius) / tile, zero), limit_y))
-                y1 = tile * math.floor(min(max((y - half + radius + tile - one) / tile, zero), limit_y)) - one
-                x1, y1 = min(x1, right), min(y1, bottom)
-            if x0 > x1 or y0 > y1:
+    for i in range(first, stop):
+        if not visible[i]:
+            continue
+        x, y = mean2d[0, i], mean2d[1, i]
+        a, c = covariance2d[0, i], covariance2d[2, i]
+        if support == _EVERYWHERE:
+            box[i, 0], box[i, 1], box[i, 2], box[i, 3] = 0, width - 1, 0, height - 1
+            continue
+        if support == _ELLIPSE:
+            reach = two * (log_opacity[i] - log_cutoff)
+            if not reach >= zero:  # too faint, or not a number
                 visible[i] = False
                 continue
-            box[i, 0], box[i, 1], box[i, 2], box[i, 3] = int(x0), int(x1), int(y0), int(y1)
+            ex, ey = math.sqrt(reach * a), math.sqrt(reach * c)
+            ex += (ex + abs(x)) * real(1e-5) + margin
+            ey += (ey + abs(y)) * real(1e-5) + margin
+            # clip in floating point before the conversion to int: a huge splat must not overflow
+            x0, x1 = math.ceil(max(x - ex - half, zero)), math.floor(min(x + ex - half, right))
+            y0, y1 = math.ceil(max(y - ey - half, zero)), math.floor(min(y + ey - half, bottom))
+        else:
+            middle = half * (a + c)
+            radius = math.ceil(three * math.sqrt(middle + math.sqrt(max(tenth, middle * middle - determinant[i]))))
+            tile = real(LEGACY_TILE)
+            limit_x, limit_y = right + tile, bottom + tile
+            # the released code truncates toward zero, in integer-pixel coordinates (mean - 1/2)
+            x0 = tile * math.floor(min(max((x - half - radius) / tile, zero), limit_x))
+            x1 = tile * math.floor(min(max((x - half + radius + tile - one) / tile, zero), limit_x)) - one
+            y0 = tile * math.floor(min(max((y - half - radius) / tile, zero), limit_y))
+            y1 = tile * math.floor(min(max((y - half + radius + tile - one) / tile, zero), limit_y)) - one
+            x1, y1 = min(x1, right), min(y1, bottom)
+        if x0 > x1 or y0 > y1:
+            visible[i] = False
+            continue
+        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = int(x0), int(x1), int(y0), int(y1)
 
 
 def _radix_order(key, visible):
@@ -118,13 +117,13 @@ def _radix_order(key, visible):
     return index
 
 
-def _bin(box, order, tile_width, tile_height, tiles_x, tiles_y):
-    """Counting sort of (tile, Gaussian) pairs in CHUNKS independent chunks of the depth order."""
+# The counting sort of (tile, Gaussian) pairs runs over CHUNKS independent chunks of the depth order.
+
+
+def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, counts, pair_starts):
+    """Pairs of each (chunk, tile), and of each Gaussian at the next place of `pair_starts`."""
     n = order.size
-    tiles = tiles_x * tiles_y
-    counts = np.zeros((CHUNKS, tiles), np.int64)
-    pair_starts = np.zeros(n + 1, np.int64)
-    for chunk in prange(CHUNKS):
+    for chunk in range(first, last):
         mine = counts[chunk]
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             i = order[k]
@@ -134,19 +133,26 @@ def _bin(box, order, tile_width, tile_height, tiles_x, tiles_y):
             for ty in range(ty0, ty1 + 1):
                 for tx in range(tx0, tx1 + 1):
                     mine[ty * tiles_x + tx] += 1
-    starts = np.empty(tiles + 1, np.int64)
+
+
+def _tile_starts(counts, starts, pair_starts):
+    """Running sums: where each tile begins, where each (chunk, tile) does (in `counts`), where each Gaussian does."""
     total = 0
-    for t in range(tiles):
+    for t in range(starts.size - 1):
         starts[t] = total
         for chunk in range(CHUNKS):
             here = counts[chunk, t]
             counts[chunk, t] = total
             total += here
-    starts[tiles] = total
-    for k in range(n):
+    starts[starts.size - 1] = total
+    for k in range(pair_starts.size - 1):
         pair_starts[k + 1] += pair_starts[k]
-    ranks, slots = np.empty(total, np.int32), np.empty(total, np.int32)
-    for chunk in prange(CHUNKS):
+
+
+def _fill_lists(first, last, box, order, tile_width, tile_height, tiles_x, counts, pair_starts, ranks, slots):
+    """Every pair to its place; `counts` runs along."""
+    n = order.size
+    for chunk in range(first, last):
         position = counts[chunk]
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
             i = order[k]
@@ -158,12 +164,13 @@ def _bin(box, order, tile_width, tile_height, tiles_x, tiles_y):
                     slots[at] = position[t]
                     position[t] += 1
                     at += 1
-    return starts, ranks, pair_starts, slots
 
 
-_boxes_kernel = jit(_boxes, parallel=True)
+_boxes_kernel = jit(_boxes)
 _radix_kernel = jit(_radix_order)
-_bin_kernel = jit(_bin, parallel=True)
+_count_kernel = jit(_count_pairs)
+_starts_kernel = jit(_tile_starts)
+_fill_kernel = jit(_fill_lists)
 
 
 def screen_boxes(
@@ -178,7 +185,8 @@ def screen_boxes(
     box = np.zeros((projected.depth.size, 4), np.int32)
     visible = projected.visible.copy()
     log_cutoff = projected.depth.dtype.type(math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0)
-    _boxes_kernel(
+    share(
+        _boxes_kernel, visible.size,
         projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, visible,
         _SUPPORT_CODE[support], log_cutoff, width, height, box,
     )  # fmt: skip
@@ -198,4 +206,11 @@ def tile_lists(
 ) -> TileLists:
     """Depth-ordered lists of the Gaussians whose box touches each tile."""
     tiles_x, tiles_y = -(-width // tile_width), -(-height // tile_height)
-    return TileLists(*_bin_kernel(box, order, tile_width, tile_height, tiles_x, tiles_y))
+    n = order.size
+    counts, pair_starts = np.zeros((CHUNKS, tiles_x * tiles_y), np.int64), np.zeros(n + 1, np.int64)
+    share(_count_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, counts, pair_starts)
+    starts = np.empty(tiles_x * tiles_y + 1, np.int64)
+    _starts_kernel(counts, starts, pair_starts)
+    ranks, slots = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int32)
+    share(_fill_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, counts, pair_starts, ranks, slots)
+    return TileLists(starts, ranks, pair_starts, slots)

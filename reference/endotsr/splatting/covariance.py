@@ -8,16 +8,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from endotsr.jit import jit, jit_inline
+from endotsr.jit import jit
+from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
 SHORTEST = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
-BLOCK = 256  # Gaussians per parallel block: a few arrays of this length stay in the first-level cache
 
 
 class Shape(NamedTuple):
@@ -59,13 +58,13 @@ def _unit_quaternion(w, x, y, z):
     return w / n, x / n, y / n, z / n, (one / n) / max(largest, type(zero)(SHORTEST))
 
 
-unit_quaternion = jit_inline(_unit_quaternion)
+unit_quaternion = jit(_unit_quaternion)
 
 
-def _covariance_forward(quaternion, log_scale, rotation, scale):
+def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
     real = quaternion.dtype.type
     one, two, limit = real(1), real(2), real(LOG_SCALE_LIMIT)
-    for i in range(quaternion.shape[1]):
+    for i in range(first, stop):
         w, x, y, z, _ = unit_quaternion(quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i])
         rotation[0, 0, i] = one - two * (y * y + z * z)
         rotation[0, 1, i] = two * (x * y - w * z)
@@ -80,10 +79,10 @@ def _covariance_forward(quaternion, log_scale, rotation, scale):
             scale[k, i] = math.exp(min(max(log_scale[k, i], -limit), limit))
 
 
-def _covariance_reverse(quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
+def _covariance_reverse(first, stop, quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
     real = quaternion.dtype.type
     two, limit = real(2), real(LOG_SCALE_LIMIT)
-    for i in range(quaternion.shape[1]):
+    for i in range(first, stop):
         w, x, y, z, inverse_norm = unit_quaternion(
             quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i]
         )
@@ -110,31 +109,6 @@ _forward_kernel = jit(_covariance_forward)
 _reverse_kernel = jit(_covariance_reverse)
 
 
-def _forward_blocks(quaternion, log_scale, rotation, scale):
-    n = quaternion.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        _forward_kernel(quaternion[:, a:e], log_scale[:, a:e], rotation[:, :, a:e], scale[:, a:e])
-
-
-def _reverse_blocks(quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
-    n = quaternion.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        _reverse_kernel(
-            quaternion[:, a:e],
-            log_scale[:, a:e],
-            d_rotation[:, :, a:e],
-            d_scale[:, a:e],
-            d_quaternion[:, a:e],
-            d_log_scale[:, a:e],
-        )
-
-
-_forward_parallel = jit(_forward_blocks, parallel=True)
-_reverse_parallel = jit(_reverse_blocks, parallel=True)
-
-
 def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[Shape, CovarianceSaved]:
     """Factored covariance of N Gaussians (specification B2).
 
@@ -150,7 +124,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
     n = quaternion.shape[1]
     rotation = np.empty((3, 3, n), quaternion.dtype)
     scale = np.empty((3, n), quaternion.dtype)
-    _forward_parallel(quaternion, log_scale, rotation, scale)
+    share(_forward_kernel, n, quaternion, log_scale, rotation, scale)
     return Shape(rotation, scale), CovarianceSaved(quaternion, log_scale)
 
 
@@ -158,7 +132,8 @@ def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrad
     """Gradients by quaternion and log-scale from those by rotation (all nine entries independent) and scale."""
     d_quaternion = np.empty_like(saved.quaternion)
     d_log_scale = np.empty_like(saved.log_scale)
-    _reverse_parallel(saved.quaternion, saved.log_scale, d_shape.rotation, d_shape.scale, d_quaternion, d_log_scale)
+    upstream = (d_shape.rotation, d_shape.scale)
+    share(_reverse_kernel, d_log_scale.shape[1], *saved, *upstream, d_quaternion, d_log_scale)
     return CovarianceGrads(d_quaternion, d_log_scale)
 
 

@@ -10,17 +10,17 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.covariance import Shape
 from endotsr.splatting.settings import RasterSettings
 
 FloatArray = NDArray[np.floating]
 
-BLOCK = 256
+BLOCK = 256  # Gaussians whose pose gradients are added up together
 # px. A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
 # A centre farther out is not drawn.
 AXIS_LIMIT = {np.dtype(np.float32): 1e8, np.dtype(np.float64): 1e60}
@@ -76,13 +76,15 @@ def _constants(camera: Camera, settings: RasterSettings, dtype) -> FloatArray:
     )
 
 
-def _project_block(position, rotation, scale, constants, pose, mean2d, covariance2d, determinant, depth, visible):
+def _project(
+    first, stop, position, rotation, scale, constants, pose, mean2d, covariance2d, determinant, depth, visible
+):
     fx, fy, cx, cy, low_pass, near = constants[0], constants[1], constants[2], constants[3], constants[4], constants[5]
     limit_x, limit_y, axis_limit = constants[6], constants[7], constants[9]
     real = position.dtype.type
     one, zero = real(1), real(0)
     t0, t1, s = np.empty(3, position.dtype), np.empty(3, position.dtype), np.empty(3, position.dtype)
-    for i in range(position.shape[1]):
+    for i in range(first, stop):
         px, py, pz = position[0, i], position[1, i], position[2, i]
         x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
         y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
@@ -136,18 +138,18 @@ def _project_block(position, rotation, scale, constants, pose, mean2d, covarianc
         covariance2d[0, i], covariance2d[1, i], covariance2d[2, i] = a, b, c
 
 
-def _project_reverse_block(
-    position, rotation, scale, constants, pose, visible, d_mean2d, d_covariance2d, d_depth,
-    d_position, d_rotation, d_scale, d_pose,
+def _project_reverse(
+    first, last, position, rotation, scale, constants, pose, visible, d_mean2d, d_covariance2d, d_depth,
+    d_position, d_rotation, d_scale, d_poses,
 ):  # fmt: skip
-    """One block; `d_pose` is (3, 4) and is added to when it has rows, skipped when it has none."""
+    """`d_poses` holds one (3, 4) sum per block, folded in block order by the caller; or (0, 3, 4) for none."""
     fx, fy = constants[0], constants[1]
     limit_x, limit_y, clamp_factor, axis_limit = constants[6], constants[7], constants[8], constants[9]
     real = position.dtype.type
     one, two, zero = real(1), real(2), real(0)
     jw = np.empty((2, 3), position.dtype)
     d_jw = np.empty((2, 3), position.dtype)
-    for i in range(position.shape[1]):
+    for i in range(first * BLOCK, min(position.shape[1], last * BLOCK)):
         for k in range(3):
             d_position[k, i] = d_scale[k, i] = zero
             d_rotation[k, 0, i] = d_rotation[k, 1, i] = d_rotation[k, 2, i] = zero
@@ -208,7 +210,8 @@ def _project_reverse_block(
         d_z -= d_u * raw_x + d_v * raw_y
         for k in range(3):
             d_position[k, i] = pose[0, k] * d_x + pose[1, k] * d_y + pose[2, k] * d_z
-        if d_pose.shape[0] > 0:
+        if d_poses.shape[1] > 0:
+            d_pose = d_poses[i // BLOCK]
             for k in range(3):
                 p = position[k, i]
                 d_pose[0, k] += j00 * d_jw[0, k] + d_x * p
@@ -219,37 +222,8 @@ def _project_reverse_block(
             d_pose[2, 3] += d_z
 
 
-_project_kernel = jit(_project_block)
-_project_reverse_kernel = jit(_project_reverse_block)
-
-
-def _project_blocks(position, rotation, scale, constants, pose, mean2d, covariance2d, determinant, depth, visible):
-    n = position.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        _project_kernel(
-            position[:, a:e], rotation[:, :, a:e], scale[:, a:e], constants, pose,
-            mean2d[:, a:e], covariance2d[:, a:e], determinant[a:e], depth[a:e], visible[a:e],
-        )  # fmt: skip
-
-
-def _project_reverse_blocks(
-    position, rotation, scale, constants, pose, visible, d_mean2d, d_covariance2d, d_depth,
-    d_position, d_rotation, d_scale, d_poses,
-):  # fmt: skip
-    """`d_poses` holds one (3, 4) sum per block, folded in block order by the caller; or (blocks, 0, 4) for none."""
-    n = position.shape[1]
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
-        _project_reverse_kernel(
-            position[:, a:e], rotation[:, :, a:e], scale[:, a:e], constants, pose, visible[a:e],
-            d_mean2d[:, a:e], d_covariance2d[:, a:e], d_depth[a:e],
-            d_position[:, a:e], d_rotation[:, :, a:e], d_scale[:, a:e], d_poses[block],
-        )  # fmt: skip
-
-
-_project_parallel = jit(_project_blocks, parallel=True)
-_project_reverse_parallel = jit(_project_reverse_blocks, parallel=True)
+_project_kernel = jit(_project)
+_project_reverse_kernel = jit(_project_reverse)
 
 
 def projection_forward(
@@ -264,8 +238,8 @@ def projection_forward(
     returns   Projected; Gaussians with z <= near are invisible and all their entries are zero
 
     Reverse: `projection_reverse`, through the mean, the Jacobian, the rotation and the pose.
-    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient; a centre farther
-             out than that, and a Gaussian with a number that is not finite, are invisible.
+    Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient; a centre
+             farther out than that, and a Gaussian with a number that is not finite, are invisible.
     Oracle:  tests/oracle/splatting_oracle.py; determinant against mpmath.
     """
     dtype = position.dtype
@@ -275,7 +249,7 @@ def projection_forward(
     out = Projected(
         np.empty((2, n), dtype), np.empty((3, n), dtype), np.empty(n, dtype), np.empty(n, dtype), np.empty(n, np.bool_)
     )
-    _project_parallel(position, shape.rotation, shape.scale, constants, pose, *out)
+    share(_project_kernel, n, position, shape.rotation, shape.scale, constants, pose, *out)
     return out, ProjectionSaved(position, shape, camera, constants, pose, out.visible)
 
 
@@ -298,7 +272,8 @@ def projection_reverse(
     d_position, d_rotation = np.empty_like(saved.position), np.empty((3, 3, n), dtype)
     d_scale = np.empty((3, n), dtype)
     d_poses = np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)
-    _project_reverse_parallel(
+    share(
+        _project_reverse_kernel, d_poses.shape[0],
         saved.position, saved.shape.rotation, saved.shape.scale, saved.constants, saved.pose, saved.visible,
         d_mean2d, d_covariance2d, d_depth, d_position, d_rotation, d_scale, d_poses,
     )  # fmt: skip

@@ -8,17 +8,15 @@ per Gaussian stands in one or two cache lines; its gradient record has 10.
 import math
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from endotsr.jit import jit
+from endotsr.sharing import share
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.projection import Projected
 
 FloatArray = NDArray[np.floating]
-
-BLOCK = 256
 
 # columns of a record
 U, V, PRECISION, SLOPE, INVERSE_C, LOG2_OPACITY, RED, GREEN, BLUE, DEPTH, HALF_HEIGHT, OPACITY = range(12)
@@ -29,11 +27,11 @@ SUM_S, SUM_SE, SUM_SY, SUM_SEE, SUM_SEY, SUM_SYY, SUM_RED, SUM_GREEN, SUM_BLUE, 
 GRADIENT = 10
 
 
-def _log_sigmoid(logit, out):
+def _log_sigmoid(first, stop, logit, out):
     """log(1 / (1 + exp(-x))) without overflow at either end."""
     real = logit.dtype.type
     zero, one = real(0), real(1)
-    for i in range(logit.size):
+    for i in range(first, stop):
         x = logit[i]
         out[i] = min(x, zero) - math.log(one + math.exp(-abs(x)))
 
@@ -44,29 +42,27 @@ _log_sigmoid_kernel = jit(_log_sigmoid)
 def log_opacity(opacity_logit: FloatArray) -> FloatArray:
     """Natural log of the opacity sigmoid(logit), (N,), finite for every finite logit."""
     out = np.empty_like(opacity_logit)
-    _log_sigmoid_kernel(opacity_logit, out)
+    share(_log_sigmoid_kernel, out.size, opacity_logit, out)
     return out
 
 
-def _pack(order, mean2d, covariance2d, determinant, log_opacity, colour, depth, log_cutoff, out):
+def _pack(first, stop, order, mean2d, covariance2d, determinant, log_opacity, colour, depth, log_cutoff, out):
     real = mean2d.dtype.type
     one, zero, two, log2_e = real(1), real(0), real(2), real(LOG2_E)
-    n = order.size
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        for k in range(block * BLOCK, min(n, block * BLOCK + BLOCK)):
-            i = order[k]
-            b, c = covariance2d[1, i], covariance2d[2, i]
-            record = out[k]
-            record[U], record[V] = mean2d[0, i], mean2d[1, i]
-            record[PRECISION], record[SLOPE], record[INVERSE_C] = c / determinant[i], b / c, one / c
-            record[LOG2_OPACITY] = log_opacity[i] * log2_e
-            record[RED], record[GREEN], record[BLUE] = colour[0, i], colour[1, i], colour[2, i]
-            record[DEPTH] = depth[i]
-            record[HALF_HEIGHT] = math.sqrt(max(two * (log_opacity[i] - log_cutoff) * c, zero))
-            record[OPACITY] = math.exp(log_opacity[i])
+    for k in range(first, stop):
+        i = order[k]
+        b, c = covariance2d[1, i], covariance2d[2, i]
+        record = out[k]
+        record[U], record[V] = mean2d[0, i], mean2d[1, i]
+        record[PRECISION], record[SLOPE], record[INVERSE_C] = c / determinant[i], b / c, one / c
+        record[LOG2_OPACITY] = log_opacity[i] * log2_e
+        record[RED], record[GREEN], record[BLUE] = colour[0, i], colour[1, i], colour[2, i]
+        record[DEPTH] = depth[i]
+        record[HALF_HEIGHT] = math.sqrt(max(two * (log_opacity[i] - log_cutoff) * c, zero))
+        record[OPACITY] = math.exp(log_opacity[i])
 
 
-_pack_kernel = jit(_pack, parallel=True)
+_pack_kernel = jit(_pack)
 
 
 def pack_records(
@@ -79,7 +75,8 @@ def pack_records(
     """Records (n, 12) of the Gaussians named by `order`, nearest first; n <= N."""
     dtype = projected.depth.dtype
     out = np.empty((order.size, RECORD), dtype)
-    _pack_kernel(
+    share(
+        _pack_kernel, order.size,
         order, projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, colour,
         projected.depth, dtype.type(log_cutoff), out,
     )  # fmt: skip
@@ -87,40 +84,39 @@ def pack_records(
 
 
 def _gather(
+    first, stop,
     order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth,
     d_mean2d, d_covariance2d, d_logit, d_colour, d_depth,
 ):  # fmt: skip
     """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
     real = records.dtype.type
     half, one, two, zero = real(0.5), real(1), real(2), real(0)
-    n = order.size
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        total = np.empty(GRADIENT, records.dtype)
-        for k in range(block * BLOCK, min(n, block * BLOCK + BLOCK)):
+    total = np.empty(GRADIENT, records.dtype)
+    for k in range(first, stop):
+        for j in range(GRADIENT):
+            total[j] = zero
+        for p in range(pair_starts[k], pair_starts[k + 1]):
+            row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
-                total[j] = zero
-            for p in range(pair_starts[k], pair_starts[k + 1]):
-                row = pair_gradients[slots[p]]
-                for j in range(GRADIENT):
-                    total[j] += row[j]
-            i = order[k]
-            a, m, r = records[k, PRECISION], records[k, SLOPE], records[k, INVERSE_C]
-            d_mean2d[0, i] = a * total[SUM_SE]
-            d_mean2d[1, i] = r * total[SUM_SY] - a * m * total[SUM_SE]
-            d_a, d_m, d_r = -half * total[SUM_SEE], a * total[SUM_SEY], -half * total[SUM_SYY]
-            factor = one
-            if conic_epsilon > zero:
-                square = determinant[i] * determinant[i]
-                factor = square / (square + conic_epsilon)
-            d_covariance2d[0, i] = factor * (-a * a * d_a)
-            d_covariance2d[1, i] = factor * (two * a * a * m * d_a + r * d_m)
-            d_covariance2d[2, i] = factor * (-a * a * m * m * d_a - m * r * d_m - r * r * d_r)
-            d_logit[i] = total[SUM_S] / (one + math.exp(opacity_logit[i]))  # sum of s, times 1 - opacity
-            d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
-            d_depth[i] = total[SUM_DEPTH] if keep_depth else zero
+                total[j] += row[j]
+        i = order[k]
+        a, m, r = records[k, PRECISION], records[k, SLOPE], records[k, INVERSE_C]
+        d_mean2d[0, i] = a * total[SUM_SE]
+        d_mean2d[1, i] = r * total[SUM_SY] - a * m * total[SUM_SE]
+        d_a, d_m, d_r = -half * total[SUM_SEE], a * total[SUM_SEY], -half * total[SUM_SYY]
+        factor = one
+        if conic_epsilon > zero:
+            square = determinant[i] * determinant[i]
+            factor = square / (square + conic_epsilon)
+        d_covariance2d[0, i] = factor * (-a * a * d_a)
+        d_covariance2d[1, i] = factor * (two * a * a * m * d_a + r * d_m)
+        d_covariance2d[2, i] = factor * (-a * a * m * m * d_a - m * r * d_m - r * r * d_r)
+        d_logit[i] = total[SUM_S] / (one + math.exp(opacity_logit[i]))  # sum of s, times 1 - opacity
+        d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
+        d_depth[i] = total[SUM_DEPTH] if keep_depth else zero
 
 
-_gather_kernel = jit(_gather, parallel=True)
+_gather_kernel = jit(_gather)
 
 
 def gather_gradients(
@@ -140,7 +136,8 @@ def gather_gradients(
         np.zeros((2, n), dtype), np.zeros((3, n), dtype), np.zeros(n, dtype), np.zeros((3, n), dtype),
         np.zeros(n, dtype),
     )  # fmt: skip
-    _gather_kernel(
+    share(
+        _gather_kernel, order.size,
         order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
         dtype.type(conic_epsilon), keep_depth, *out,
     )  # fmt: skip
