@@ -22,7 +22,7 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.special import sph_harm_y
+from scipy.special import factorial, lpmv
 
 from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
@@ -89,8 +89,8 @@ for degree in range(4):
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
-# **An independent source.** The same sixteen functions from SciPy's complex harmonics. The sign $(-1)^m$ of the quantum
-# mechanics convention is in both.
+# **An independent source.** The same sixteen functions from SciPy's associated Legendre functions $P_l^m$. Its sign $(-1)^m$
+# (Condon and Shortley) is that of the table.
 
 # %%
 direction = rng.normal(size=(3, 50))
@@ -99,8 +99,9 @@ polar, azimuth = np.arccos(direction[2]), np.arctan2(direction[1], direction[0])
 k = 0
 for band in range(4):
     for m in range(-band, band + 1):
-        value = sph_harm_y(band, abs(m), polar, azimuth)
-        real = value.real if m == 0 else np.sqrt(2) * (value.real if m > 0 else value.imag)
+        norm = np.sqrt((2 * band + 1) / (4 * np.pi) * factorial(band - abs(m)) / factorial(band + abs(m)))
+        wave = 1 if m == 0 else np.sqrt(2) * (np.cos(m * azimuth) if m > 0 else np.sin(-m * azimuth))
+        real = norm * wave * lpmv(abs(m), band, np.cos(polar))
         np.testing.assert_allclose(Y_text(*direction)[k], real, atol=1e-13)
         k += 1
 

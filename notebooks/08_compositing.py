@@ -1,0 +1,343 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 8. Compositing, and its reverse pass line by line
+#
+# At a pixel the Gaussians stand behind each other, like sheets of coloured glass. Front to back, each takes its share of the
+# light that is left. This is the heart of the renderer, and its reverse pass is the one most often got wrong: we derive it
+# line by line.
+#
+# Equations {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.compositing import (
+    TILE_HEIGHT,
+    TILE_WIDTH,
+    background_gradient,
+    composite_forward,
+    composite_reverse,
+)
+from endotsr.splatting.projection import Projected
+from endotsr.splatting.records import gather_gradients, log_opacity, pack_records
+from endotsr.splatting.render import Scene, render_forward
+from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+
+rng = np.random.default_rng(8)
+WIDTH, HEIGHT, N = 18, 14, 5
+a, c = rng.uniform(8, 60, N), rng.uniform(8, 60, N)
+scene = {
+    "mean2d": np.stack([rng.uniform(3, 15, N), rng.uniform(3, 11, N)]),
+    "covariance2d": np.stack([a, rng.uniform(-0.6, 0.6, N) * np.sqrt(a * c), c]),
+    "logit": np.array([0.3, -1.0, 7.0, 1.5, -0.5]),  # the third is opaque enough to meet the clamp
+    "colour": rng.uniform(0.1, 1, (3, N)),
+    "depth": np.array([4.0, 3.0, 6.0, 5.0, 3.5]),  # not in the order of the index
+}
+background = np.array([0.1, 0.2, 0.3])
+
+
+def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background):
+    """The stages of the package between projection and image."""
+    a, b, c = scene["covariance2d"]
+    projected = Projected(scene["mean2d"], scene["covariance2d"], a * c - b * b, scene["depth"], np.ones(a.size, bool))
+    log_o = log_opacity(scene["logit"])
+    box, visible = screen_boxes(projected, log_o, settings, width, height)
+    order = depth_order(scene["depth"], visible)
+    log_cutoff = np.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0
+    records = pack_records(order, projected, log_o, scene["colour"], log_cutoff)
+    lists = tile_lists(box, order, TILE_WIDTH, TILE_HEIGHT, width, height)
+    out, saved = composite_forward(records, lists, settings, background, width, height)
+    return out, (order, projected, saved, settings)
+
+
+# %% [markdown]
+# ## Forward: the footprint
+#
+# The ellipse of a Gaussian on the screen gives it an opacity at each pixel, at most $\alpha_{\max}$:
+#
+# $$
+# \begin{aligned}
+# \eta&=d_x-m\,d_y,\\
+# q&=r\,d_y^2+A\,\eta^2=\frac{d_y^2}{c}+\frac{c}{\det}\Bigl(d_x-\frac bc\,d_y\Bigr)^2,\\
+# \alpha&=\min\bigl(\alpha_{\max},\ o\,e^{-q/2}\bigr).
+# \end{aligned}
+# $$
+#
+# $o=1/(1+e^{-\mathrm{logit}})$. $q$ is the squared Mahalanobis distance, written as a sum of two squares: never negative, and
+# accurate for needles.
+#
+# ## Forward: the blend
+#
+# The contributors of a pixel, front to back, are numbered $0,1,\dots,n-1$:
+#
+# $$
+# \begin{aligned}
+# T_0&=1,\qquad T_{k+1}=T_k(1-\alpha_k),\\
+# \hat I&=\sum_{k<n}\alpha_kT_k\,rgb_k+T_n\,\mathbf{bg},\\
+# \hat D&=\sum_{k<n}\alpha_kT_k\,z_k,\qquad
+# \hat O=\sum_{k<n}\alpha_kT_k .
+# \end{aligned}
+# $$
+#
+# A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ is no contributor. Before Gaussian $k$ is blended, if
+# $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel ends.
+
+
+# %% tags=["transcription"]
+def footprint_text(i, column, row, scene):
+    """q, eta and their parts of Gaussian i at a pixel."""
+    (u, v), (a, b, c) = scene["mean2d"][:, i], scene["covariance2d"][:, i]
+    det = a * c - b**2
+    d_x, d_y = column + 1 / 2 - u, row + 1 / 2 - v
+    m, r, A = b / c, 1 / c, c / det
+    eta = d_x - m * d_y
+    q = r * d_y**2 + A * eta**2
+    return q, eta, d_y, m, r, A
+
+
+def pixel_text(column, row, scene, settings):
+    """Contributors of one pixel, front to back: (index, alpha, T), and the final T."""
+    T, contributors = 1.0, []
+    for i in sorted(range(len(scene["depth"])), key=lambda i: (scene["depth"][i], i)):
+        o = 1 / (1 + np.exp(-scene["logit"][i]))
+        q = footprint_text(i, column, row, scene)[0]
+        alpha = min(settings.alpha_max, o * np.exp(-q / 2))
+        if alpha < settings.alpha_cutoff:
+            continue
+        if T * (1 - alpha) < settings.transmittance_stop:
+            break
+        contributors.append((i, alpha, T))
+        T = T * (1 - alpha)
+    return contributors, T
+
+
+def images_text(scene, settings):
+    colour, depth, opacity = np.zeros((3, HEIGHT, WIDTH)), np.zeros((HEIGHT, WIDTH)), np.zeros((HEIGHT, WIDTH))
+    for row in range(HEIGHT):
+        for column in range(WIDTH):
+            contributors, T_n = pixel_text(column, row, scene, settings)
+            colour[:, row, column] = (
+                sum(alpha * T * scene["colour"][:, i] for i, alpha, T in contributors) + T_n * background
+            )
+            depth[row, column] = sum(alpha * T * scene["depth"][i] for i, alpha, T in contributors)
+            opacity[row, column] = sum(alpha * T for i, alpha, T in contributors)
+    return colour, depth, opacity
+
+
+# %%
+for settings in (PAPER, EXACT):
+    out, _ = composite(scene, settings)
+    for found, text in zip(out, images_text(scene, settings)):
+        np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-13)
+
+# %% [markdown]
+# ## A picture: one ray, and the support of a splat under each preset
+#
+# Left: what one pixel sees. Height of the bar: what is left of the light, $T_k$; filled: the share that the Gaussian takes.
+# Right: one faint Gaussian under the three presets. `exact` reaches everywhere. `paper` ends on the ellipse at which $\alpha$ has
+# fallen to 1/255. `legacy` takes the tiles within three standard deviations: with 16-pixel tiles its border is square and cuts
+# visible values.
+
+# %%
+figure, axes = plt.subplots(1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1])
+contributors, T_n = pixel_text(9, 7, scene, PAPER)
+for k, (i, alpha, T) in enumerate(contributors):
+    axes[0].bar(k, T, color="0.9", edgecolor="0.6")
+    axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
+    axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=8)
+axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
+axes[0].set(title="pixel (9, 7): $T_k$, and the share $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
+axes[0].set_xticklabels([f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"])
+camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 33.0, 30.0, 72, 64)
+splat = Scene(
+    np.array([[0.0], [0.0], [1.0]]),
+    np.array([[0.92], [0.0], [0.0], [0.38]]),
+    np.log([[0.16], [0.07], [0.07]]),
+    np.array([3.0]),
+    np.zeros((1, 3, 1)),
+)
+reached = {}
+for panel, (name, settings) in zip(axes[1:], (("exact", EXACT), ("paper", PAPER), ("legacy", LEGACY))):
+    opacity = render_forward(splat, camera, settings, degree=0, path="definition")[0].opacity
+    reached[name] = opacity
+    shown = panel.imshow(
+        np.where(opacity > 0, np.log10(np.maximum(opacity, 1e-12)), np.nan), vmin=-6, vmax=0, cmap="magma"
+    )
+    panel.contour(opacity, levels=[1 / 255], colors="w", linewidths=0.7)
+    panel.set(title=f"{name}: {np.count_nonzero(opacity)} pixels", xticks=[], yticks=[])
+figure.colorbar(shown, ax=axes[1:], label="$\\log_{10}\\alpha$; white line 1/255", shrink=0.8)
+assert np.array_equal(reached["paper"] > 0, np.minimum(reached["exact"], 0.99) >= 1 / 255), "the ellipse loses nothing"
+assert np.count_nonzero(reached["exact"]) == 72 * 64
+
+# %% [markdown]
+# ## The reverse pass, line by line
+#
+# A loss sends $g_{\hat I},g_{\hat D},g_{\hat O}$ to each pixel. We want the gradients of every $\alpha_k$, colour and depth.
+#
+# **Line 1. What is behind.** Let $R_k$ be the colour that one would see if the Gaussians $0,\dots,k-1$ were taken away. Then
+# $\hat I=R_0$, and Gaussian $k$ covers the share $\alpha_k$ of what is behind it: $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
+#
+# **Line 2. How much of it arrives.** Unrolling line 1 from the front, $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So
+# $\partial\hat I/\partial R_k=T_k$: whatever happens behind is seen through the transmittance in front.
+#
+# **Line 3. One opacity.** $\alpha_k$ is not in $T_k$ (only the ones in front are), and not in $R_{k+1}$ (only the ones
+# behind are). So $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. In words: more opacity shows more
+# of the own colour and less of what is behind.
+#
+# **Line 4. Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and nothing as background: $Z_k$ and $Q_k$.
+#
+# **Line 5. Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
+#
+# Nothing is divided by $1-\alpha_k$, and so $\alpha_k=1$ is no special case:
+#
+# $$
+# \begin{aligned}
+# R_n&=\mathbf{bg},\quad Z_n=0,\quad Q_n=0,\\
+# R_k&=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1},\\
+# Z_k&=\alpha_kz_k+(1-\alpha_k)Z_{k+1},\qquad Q_k=\alpha_k+(1-\alpha_k)Q_{k+1},\\
+# g_{\alpha_k}&=T_k\bigl[(rgb_k-R_{k+1})\cdot g_{\hat I}+(z_k-Z_{k+1})\,g_{\hat D}+(1-Q_{k+1})\,g_{\hat O}\bigr],\\
+# g_{rgb_k}&\mathrel{+}=\alpha_kT_k\,g_{\hat I},\qquad g_{z_k}^{\mathrm{img}}\mathrel{+}=\alpha_kT_k\,g_{\hat D},\\
+# g_{\mathbf{bg}}&\mathrel{+}=T_n\,g_{\hat I} .
+# \end{aligned}
+# $$
+#
+# **Line 6. From $\alpha$ to the footprint.** Where the clamp holds, all that follows is 0. Else $\alpha=o\,e^{-q/2}$:
+# $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
+#
+# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$, $\mathrm d d_y=-\mathrm dv$:
+#
+# $$
+# \begin{aligned}
+# g_{\mathrm{logit}}&\mathrel{+}=\alpha\,(1-o)\,g_\alpha,\qquad g_q=-\tfrac12\,\alpha\,g_\alpha,\\
+# g_A&\mathrel{+}=\eta^2g_q,\qquad g_m\mathrel{+}=-2A\,\eta\,d_y\,g_q,\qquad g_r\mathrel{+}=d_y^2\,g_q,\\
+# g_u&\mathrel{+}=-2A\,\eta\,g_q,\qquad g_v\mathrel{+}=-2\,(r\,d_y-A\,m\,\eta)\,g_q .
+# \end{aligned}
+# $$
+#
+# **Line 8. Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
+# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$; $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
+#
+# $$
+# g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .
+# $$
+
+
+# %% tags=["transcription"]
+def reverse_text(g_I, g_D, g_O, scene, settings):
+    n = len(scene["depth"])
+    g = {name: np.zeros_like(scene[name]) for name in scene} | {"background": np.zeros(3)}
+    g_A, g_m, g_r = np.zeros(n), np.zeros(n), np.zeros(n)
+    for row in range(HEIGHT):
+        for column in range(WIDTH):
+            g_I_p, g_D_p, g_O_p = g_I[:, row, column], g_D[row, column], g_O[row, column]
+            contributors, T_n = pixel_text(column, row, scene, settings)
+            R, Z, Q = background, 0.0, 0.0  # lines 1 and 4: what is behind the last one
+            g["background"] += T_n * g_I_p
+            for i, alpha, T in reversed(contributors):
+                rgb, z = scene["colour"][:, i], scene["depth"][i]
+                g_alpha = T * ((rgb - R) @ g_I_p + (z - Z) * g_D_p + (1 - Q) * g_O_p)  # line 3
+                g["colour"][:, i] += alpha * T * g_I_p  # line 5
+                g["depth"][i] += alpha * T * g_D_p
+                R, Z, Q = alpha * rgb + (1 - alpha) * R, alpha * z + (1 - alpha) * Z, alpha + (1 - alpha) * Q
+                o = 1 / (1 + np.exp(-scene["logit"][i]))
+                q, eta, d_y, m, r, A = footprint_text(i, column, row, scene)
+                if o * np.exp(-q / 2) > settings.alpha_max:
+                    continue  # line 6: the clamp holds
+                g["logit"][i] += alpha * (1 - o) * g_alpha
+                g_q = -1 / 2 * alpha * g_alpha
+                g_A[i] += eta**2 * g_q  # line 7
+                g_m[i] += -2 * A * eta * d_y * g_q
+                g_r[i] += d_y**2 * g_q
+                g["mean2d"][0, i] += -2 * A * eta * g_q
+                g["mean2d"][1, i] += -2 * (r * d_y - A * m * eta) * g_q
+    a, b, c = scene["covariance2d"]
+    m, r, A = b / c, 1 / c, c / (a * c - b**2)
+    g["covariance2d"][0] = -(A**2) * g_A  # line 8
+    g["covariance2d"][1] = 2 * A**2 * m * g_A + r * g_m
+    g["covariance2d"][2] = -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r
+    return g
+
+
+# %%
+g_I, g_D, g_O = rng.normal(size=(3, HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH))
+
+
+def kernel_reverse(scene, settings, g_I, g_D, g_O, **size):
+    out, (order, projected, saved, _) = composite(scene, settings, **size)
+    pairs = composite_reverse(g_I, g_D, g_O, saved)
+    grads = gather_gradients(
+        order,
+        saved.records,
+        saved.lists,
+        pairs,
+        projected.determinant,
+        scene["logit"],
+        conic_epsilon=0.0,
+        keep_depth=True,
+    )
+    names = ("mean2d", "covariance2d", "logit", "colour", "depth")
+    return dict(zip(names, grads)) | {"background": background_gradient(g_I, out.transmittance)}
+
+
+for settings in (PAPER, EXACT):
+    found, text = kernel_reverse(scene, settings, g_I, g_D, g_O), reverse_text(g_I, g_D, g_O, scene, settings)
+    for name in text:
+        np.testing.assert_allclose(found[name], text[name], rtol=1e-9, atol=1e-11, err_msg=name)
+
+# %% [markdown]
+# ## The gradient check
+#
+# The difference is taken only between ends that make the same decisions (order, contributors, clamp). `composite_rows` is the fast
+# path that training uses: it walks front to back and computes the same.
+
+# %%
+with one_thread():
+    reports = [
+        check_pair(all_pairs()[name], pair_stream(name, 0))
+        for name in ("composite_exact", "composite_paper", "composite_rows")
+    ]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## Exercise
+#
+# One pixel, three Gaussians with $\alpha=0.3,\ 1,\ 0.5$ front to back. Which of the three opacities and colours have a gradient? Much code
+# recovers $T_k$ in the reverse pass by dividing the final $T_n$ by $1-\alpha$. What would it find here?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The first two have gradients, the opaque one included (less opacity would show the third). The third has none. Division
+# starts from T_n = 0: 0 / (1 - 0.5) = 0, then 0 / (1 - 1) = nan, and everything in front is lost.
+wide = 1e12  # px^2: the pixel sees the centre
+one = {
+    "mean2d": np.full((2, 3), 0.5),
+    "covariance2d": np.array([[wide] * 3, [0.0] * 3, [wide] * 3]),
+    "logit": np.array([np.log(0.3 / 0.7), 800.0, 0.0]),
+    "colour": np.eye(3),
+    "depth": np.array([1.0, 2.0, 3.0]),
+}
+white = np.ones((3, 1, 1)) * np.array([1.0, 2.0, 4.0])[:, None, None]
+zero = np.zeros((1, 1))
+grads = kernel_reverse(one, EXACT, white, zero, zero, width=1, height=1)
+np.testing.assert_allclose(grads["colour"].sum(axis=0), np.array([0.3, 0.7, 0.0]) * 7)
+np.testing.assert_allclose(
+    grads["logit"], [0.3 * 0.7 * (1 - 2), 0, 0], atol=1e-14
+)  # a logit of 800 is flat: (1 - o) = 0
+with np.errstate(invalid="ignore"):
+    T_2 = np.float64(0.0) / (1 - 0.5)
+    assert np.isnan(T_2 / np.float64(1 - 1.0))
