@@ -6,9 +6,9 @@ Kernels are plain module-level functions, compiled by assignment (`blend = jit(_
 No fast-math: sums keep the order they are written in. The fast path may contract a*b+c into one fused
 multiply-add (`contract=True`), which stays bitwise reproducible on one machine.
 
-Threads come from Numba's built-in work queue: the OpenMP layer spins at every barrier, and when the machine
-has other work, each of the sixty parallel regions of an iteration then waits for a time slice (measured on two
-cores with one other busy process: 650 ms an iteration against 300 ms). NUMBA_THREADING_LAYER overrides.
+Kernels are serial; threads come from `endotsr.sharing`, which calls one kernel for several ranges at once. Numba's
+own parallel loops compile their body several times, and its OpenMP layer spins at every barrier: with one other
+busy process on two cores, an iteration took 650 ms instead of 300.
 
 Numba's disk cache notices an edit of the file that holds a kernel, but not of the files it calls into.
 The cache therefore lives in a folder named after a hash of all kernel sources: an edited kernel is never stale.
@@ -48,20 +48,18 @@ def _use_hashed_cache_folder() -> None:
 
 _use_hashed_cache_folder()
 if not os.environ.get("NUMBA_THREADING_LAYER"):
-    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]
+    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # asked for the thread count only
 
 
-def jit(function: F, *, parallel: bool = False, contract: bool = False) -> F:
+def jit(function: F, *, contract: bool = False) -> F:
     """Compile `function` on first call, for whatever dtypes it is called with.
 
-    parallel   the body uses `numba.prange`; iterations must write to disjoint cells (never `+=` into a shared one)
     contract   allow fused multiply-add; for the fast path only
     """
     compiled: Any = numba.njit(
         cache=True,
         nogil=True,
         error_model="numpy",  # 1/0 is inf as in NumPy: one meaning with the JIT on or off
-        parallel=parallel,
         fastmath={"contract"} if contract else False,
     )(function)
     return compiled  # to a type checker a kernel is the function it was made from
