@@ -149,9 +149,9 @@ for settings in (PAPER, EXACT):
 # ## A picture: one ray, and the support of a splat under each preset
 #
 # Left: what one pixel sees. Height of the bar: what is left of the light, $T_k$; filled: the share that the Gaussian takes.
-# Right: one faint Gaussian under the three presets. `exact` reaches everywhere. `paper` ends on the ellipse at which $\alpha$ has
-# fallen to 1/255. `legacy` takes the tiles within three standard deviations: with 16-pixel tiles its border is square and cuts
-# visible values.
+# Right: one Gaussian under the three presets. `exact` reaches everywhere. `paper` ends on the ellipse at which $\alpha$ has
+# fallen to 1/255. `legacy` takes the tiles within three standard deviations: here that cuts a strip at the
+# bottom, values that can be seen.
 
 # %%
 figure, axes = plt.subplots(1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1])
@@ -163,11 +163,11 @@ for k, (i, alpha, T) in enumerate(contributors):
 axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
 axes[0].set(title="pixel (9, 7): $T_k$, and the share $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
 axes[0].set_xticklabels([f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"])
-camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 33.0, 30.0, 72, 64)
+camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 37.5, 26.5, 72, 56)
 splat = Scene(
     np.array([[0.0], [0.0], [1.0]]),
-    np.array([[0.92], [0.0], [0.0], [0.38]]),
-    np.log([[0.16], [0.07], [0.07]]),
+    np.array([[0.9], [0.0], [0.0], [-0.3]]),
+    np.log([[0.117], [0.108], [0.1]]),
     np.array([3.0]),
     np.zeros((1, 3, 1)),
 )
@@ -178,11 +178,12 @@ for panel, (name, settings) in zip(axes[1:], (("exact", EXACT), ("paper", PAPER)
     shown = panel.imshow(
         np.where(opacity > 0, np.log10(np.maximum(opacity, 1e-12)), np.nan), vmin=-6, vmax=0, cmap="magma"
     )
-    panel.contour(opacity, levels=[1 / 255], colors="w", linewidths=0.7)
+    panel.contour(reached["exact"], levels=[1 / 255], colors="tab:green", linewidths=1)
     panel.set(title=f"{name}: {np.count_nonzero(opacity)} pixels", xticks=[], yticks=[])
-figure.colorbar(shown, ax=axes[1:], label="$\\log_{10}\\alpha$; white line 1/255", shrink=0.8)
+figure.colorbar(shown, ax=axes[1:], label="$\\log_{10}\\alpha$; green line 1/255", shrink=0.8)
 assert np.array_equal(reached["paper"] > 0, np.minimum(reached["exact"], 0.99) >= 1 / 255), "the ellipse loses nothing"
-assert np.count_nonzero(reached["exact"]) == 72 * 64
+assert np.count_nonzero(reached["exact"]) == 72 * 56
+assert np.count_nonzero(reached["legacy"]) < np.count_nonzero(reached["paper"])
 
 # %% [markdown]
 # ## The reverse pass, line by line

@@ -1,0 +1,296 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 9. The mask-propagating Laplacian pyramid (component L)
+#
+# Fine detail is compared in the bands of a pyramid. The difficulty is the instrument: a filter that reads one pixel of it has
+# read a wrong value. Component L counts a band value only if **no excluded pixel has any weight in it**.
+#
+# Equation {eq}`eq-5` of {doc}`/specification/05_laplacian`.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.equations.laplacian import laplacian_levels, laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.simulator import SimulatorSettings, simulate
+
+rng = np.random.default_rng(9)
+
+# %% [markdown]
+# ## Down and up
+#
+# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The border is reflected
+# without repeating the edge sample:
+#
+# $$
+# (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
+# $$
+#
+# Up-sampling $\mathsf U$ is linear per axis, by one of two rules:
+#
+# $$
+# \begin{aligned}
+# \texttt{co_sited:}\quad & (\mathsf U g)[2k] = g[k],\\
+# & (\mathsf U g)[2k+1] = \tfrac12 g[k] + \tfrac12 g[\min(k+1,n_c-1)],\\
+# \texttt{half_pixel:}\quad & (\mathsf U g)[2k] = \tfrac14 g[\max(k-1,0)] + \tfrac34 g[k],\\
+# & (\mathsf U g)[2k+1] = \tfrac34 g[k] + \tfrac14 g[\min(k+1,n_c-1)] .
+# \end{aligned}
+# $$
+#
+# Both are linear and act on each axis alone. So each is a small matrix per axis; we write the matrices down from the text.
+
+# %% tags=["transcription"]
+b = np.array([1, 4, 6, 4, 1]) / 16
+
+
+def refl(k, n):
+    if n == 1:
+        return 0
+    k = k % (2 * (n - 1))
+    return k if k < n else 2 * (n - 1) - k
+
+
+def D_matrix(n):
+    D = np.zeros((-(-n // 2), n))
+    for y in range(D.shape[0]):
+        for r in range(-2, 3):
+            D[y, refl(2 * y + r, n)] += b[r + 2]
+    return D
+
+
+def U_matrix(n, rule):
+    n_c = -(-n // 2)
+    U = np.zeros((n, n_c))
+    for k in range(n_c):
+        if rule == "co_sited":
+            even, odd = [(k, 1)], [(k, 1 / 2), (min(k + 1, n_c - 1), 1 / 2)]
+        else:
+            even, odd = [(max(k - 1, 0), 1 / 4), (k, 3 / 4)], [(k, 3 / 4), (min(k + 1, n_c - 1), 1 / 4)]
+        for row, parents in ((2 * k, even), (2 * k + 1, odd)):
+            for q, weight in parents:
+                if row < n:
+                    U[row, q] += weight
+    return U
+
+
+def down(G):
+    return D_matrix(G.shape[1]) @ G @ D_matrix(G.shape[2]).T
+
+
+def up(g, fine, rule):
+    return U_matrix(fine.shape[1], rule) @ g @ U_matrix(fine.shape[2], rule).T
+
+
+def bands_text(image, rule):
+    G, P = [image], []
+    for j in (1, 2, 3):
+        G.append(down(G[j - 1]))
+        P.append(G[j - 1] - up(G[j], G[j - 1], rule))
+    return P, G
+
+
+# %%
+for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
+    image = rng.uniform(size=shape)
+    for rule in ("co_sited", "half_pixel"):
+        P, G = bands_text(image, rule)
+        found = laplacian_levels(image, 3, rule)
+        for text, band in zip([*P, G[3]], [*found.bands, found.coarse]):
+            np.testing.assert_allclose(band, text, atol=1e-14)
+        rebuilt = P[0] + up(P[1] + up(P[2] + up(G[3], G[2], rule), G[1], rule), G[0], rule)
+        np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
+
+# %% [markdown]
+# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with `half_pixel`.
+
+# %%
+ramp = np.broadcast_to(np.arange(96.0), (1, 96, 96)).copy()
+for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
+    for band, value in zip(laplacian_levels(ramp, 3, rule).bands, values):
+        middle = band.shape[1] // 2
+        np.testing.assert_allclose(np.abs(band[0, middle, middle]), value, atol=1e-12)
+
+# %% [markdown]
+# ## Which values are valid
+#
+# A boolean support is sent through the same operations. A coarse sample is supported if all of its $5\times5$ are; a band value
+# is valid if its own fine sample is, and every coarse sample that $\mathsf U$ reads there:
+#
+# $$
+# \begin{aligned}
+# S_j[y,x] &= \bigwedge_{r,s=-2}^{2} S_{j-1}\bigl[\mathrm{refl}(2y+r),\mathrm{refl}(2x+s)\bigr],\\
+# V_j(p) &= S_{j-1}(p)\ \wedge\bigwedge_{q:\ \mathsf U_{pq}\ne0} S_j(q) .
+# \end{aligned}
+# $$
+#
+# ## The loss
+#
+# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$ the number of valid values:
+#
+# $$
+# \begin{aligned}
+# \mathcal L_{\mathrm{lap}} &= \frac13\sum_{j=1}^{3}\mathcal L_j,\\
+# \mathcal L_j &= \begin{cases}\dfrac{1}{3\,n_j}\displaystyle\sum_{c=1}^{3}\ \sum_{p:\,V_j(p)}\bigl|\,P_j(\hat I)_{c,p} - P_j(I)_{c,p}\bigr| & n_j>0\\[1ex] 0 & n_j=0 .\end{cases}
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def support_text(M, rule):
+    S, V = [M], []
+    for j in (1, 2, 3):
+        h, w = S[j - 1].shape
+        coarse = np.ones((-(-h // 2), -(-w // 2)), bool)
+        for y in range(coarse.shape[0]):
+            for x in range(coarse.shape[1]):
+                coarse[y, x] = all(
+                    S[j - 1][refl(2 * y + r, h), refl(2 * x + s, w)] for r in range(-2, 3) for s in range(-2, 3)
+                )
+        U_rows, U_columns = U_matrix(h, rule) != 0, U_matrix(w, rule) != 0
+        V.append(
+            S[j - 1] & np.array([[coarse[np.ix_(rows, columns)].all() for columns in U_columns] for rows in U_rows])
+        )
+        S.append(coarse)
+    return V
+
+
+def loss_text(rendered, observed, V, rule):
+    P, _ = bands_text(rendered, rule)
+    P_observed, _ = bands_text(observed, rule)
+    L = []
+    for j in range(3):
+        n_j = V[j].sum()
+        L.append(np.abs(P[j] - P_observed[j])[:, V[j]].sum() / (3 * n_j) if n_j > 0 else 0.0)
+    return sum(L) / 3
+
+
+# %%
+sequence = simulate(SimulatorSettings(width=96, height=72, frames=8)).sequence
+frame = sequence.frame(5, np.float64)
+observed, mask = frame.image, frame.mask
+rendered = observed + rng.normal(0, 0.05, observed.shape)
+for rule in ("co_sited", "half_pixel"):
+    masks = support_masks(mask, 3, rule)
+    V = support_text(mask, rule)
+    assert all(np.array_equal(found, text) for found, text in zip(masks.bands, V))
+    loss, saved = laplacian_loss_forward(rendered, observed, masks, rule)
+    np.testing.assert_allclose(loss, loss_text(rendered, observed, V, rule), rtol=1e-12)
+
+# %% [markdown]
+# **Nothing under the instrument is read.** Put NaN there, in the render and in the observation:
+
+# %%
+masks = support_masks(mask)
+loss, saved = laplacian_loss_forward(rendered, observed, masks)
+spoiled = [np.where(mask, image, np.nan) for image in (rendered, observed)]
+loss_spoiled, saved_spoiled = laplacian_loss_forward(*spoiled, masks)
+assert loss_spoiled == loss
+assert np.array_equal(laplacian_loss_reverse(1.0, saved_spoiled), laplacian_loss_reverse(1.0, saved))
+
+# %% [markdown]
+# ## A picture: valid masks per level, and what masking first would do
+#
+# Above: what counts at each level (grey: tissue whose value is not used, because its footprint touches the instrument). Below:
+# the bands of the observed image if it is multiplied by the mask first and then filtered. The edge of the instrument is the
+# brightest "detail" of the picture; a render would be asked to reproduce it.
+
+# %%
+figure, axes = plt.subplots(2, 4, figsize=(13, 5.4), layout="constrained")
+axes[0, 0].imshow(observed.transpose(1, 2, 0))
+axes[0, 0].set_title("observed frame")
+axes[1, 0].imshow(np.where(mask, observed, 0).transpose(1, 2, 0))
+axes[1, 0].set_title(f"tissue: {mask.mean():.0%}")
+naive = laplacian_levels(np.where(mask, observed, 0.0)).bands
+for j, valid in enumerate(masks.bands):
+    tissue = mask[:: 2**j, :: 2**j]
+    picture = np.where(valid, 1.0, np.where(tissue, 0.6, 0.0))
+    axes[0, j + 1].imshow(picture, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
+    axes[0, j + 1].set_title(f"$V_{j + 1}$: {valid.mean():.0%} of {valid.shape[1]}x{valid.shape[0]}")
+    axes[1, j + 1].imshow(np.abs(naive[j]).mean(axis=0), cmap="magma", vmin=0, vmax=0.2, interpolation="nearest")
+    axes[1, j + 1].set_title(f"$|P_{j + 1}|$, masked first")
+    false = np.abs(naive[j]).mean(axis=0)
+    assert false[~valid].max() > false[valid].max(), "the false edge is stronger than all true detail"
+for panel in axes.flat:
+    panel.set(xticks=[], yticks=[])
+
+# %% [markdown]
+# ## The reverse pass
+#
+# $|\cdot|$ gives the sign $\sigma_j$, divided by the count; three levels and three channels give the 9. The rest is linear, and the reverse of
+# a linear map is its transpose. Each $G_j$ is used twice: as the fine image of band $j+1$, and expanded in band $j$ (with a minus). And it
+# was the source of $G_{j+1}$:
+#
+# $$
+# \begin{aligned}
+# g_{P_j} &= \frac{g_{\mathcal L}}{9\,n_j}\,\sigma_j\ \text{ on } V_j,\ 0 \text{ elsewhere},\\
+# g_{G_3} &= -\mathsf U^\top g_{P_3},\\
+# g_{G_j} &= g_{P_{j+1}} - \mathsf U^\top g_{P_j} + \mathsf D^\top g_{G_{j+1}}\qquad (j=2,1),\\
+# g_{\hat I} &= g_{P_1} + \mathsf D^\top g_{G_1}.
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def reverse_text(g_L, rendered, observed, V, rule):
+    P, G = bands_text(rendered, rule)
+    P_observed, _ = bands_text(observed, rule)
+    down_T = lambda g, fine: D_matrix(fine.shape[1]).T @ g @ D_matrix(fine.shape[2])
+    up_T = lambda g: U_matrix(g.shape[1], rule).T @ g @ U_matrix(g.shape[2], rule)
+    g_P = []
+    for j in range(3):
+        sigma = np.sign(P[j] - P_observed[j])
+        g_P.append(np.where(V[j], g_L / (9 * max(V[j].sum(), 1)) * sigma, 0))
+    g_G3 = -up_T(g_P[2])
+    g_G2 = g_P[2] - up_T(g_P[1]) + down_T(g_G3, G[2])
+    g_G1 = g_P[1] - up_T(g_P[0]) + down_T(g_G2, G[1])
+    return g_P[0] + down_T(g_G1, G[0])
+
+
+# %%
+for rule in ("co_sited", "half_pixel"):
+    masks = support_masks(mask, 3, rule)
+    _, saved = laplacian_loss_forward(rendered, observed, masks, rule)
+    found = laplacian_loss_reverse(0.83, saved)
+    np.testing.assert_allclose(found, reverse_text(0.83, rendered, observed, masks.bands, rule), rtol=1e-9, atol=1e-16)
+    assert not np.any(found[:, ~mask])
+
+# %% [markdown]
+# ## The gradient check
+
+# %%
+with one_thread():
+    reports = [
+        check_pair(all_pairs()[f"laplacian_loss_{rule}"], pair_stream(f"laplacian_loss_{rule}", 0))
+        for rule in ("co_sited", "half_pixel")
+    ]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## Exercise
+#
+# One single pixel in the middle of a large image is excluded. How many values of each band does it cost (`co_sited`)? Does it matter
+# whether the pixel has even or odd coordinates?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned round: an even pixel is read by more
+# coarse samples than an odd one, so it costs more values.
+costs = {}
+for at in (64, 65):
+    hole = np.ones((129, 129), bool)
+    hole[at, at] = False
+    costs[at] = [int(np.count_nonzero(~valid)) for valid in support_masks(hole).bands]
+print("even pixel:", costs[64], " odd pixel:", costs[65])
+assert costs[64][0] == 7**2 and costs[65][0] == 5**2
