@@ -1,0 +1,177 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 11. How strong should the detail loss be? The calibration
+#
+# A weight that is right for one sequence is wrong for the next. The paper therefore sets $\lambda_{\mathrm{lap}}$ by its force: at
+# full weight, the detail loss pushes each rendered image with a fixed fraction $r$ of the force of the photometric loss.
+#
+# Equation {eq}`eq-7` of {doc}`/specification/07_calibration`.
+
+# %%
+import matplotlib.pyplot as plt
+import msgspec
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.config import PAPER
+from endotsr.equations.calibration import calibrate, calibration_views, rms
+from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse
+from endotsr.errors import CalibrationError
+from endotsr.fitting.objective import frame_targets, photometric_loss
+from endotsr.simulator import SimulatorSettings, simulate
+
+sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
+
+# %% [markdown]
+# ## The equation
+#
+# The views are spread over the training frames: positions $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered
+# by the base model. Here a blurred frame stands in for the base render: that is what a base render looks like.
+#
+# $$
+# \begin{aligned}
+# g_{\bullet}(v) &= \sqrt{\frac{1}{3HW}\sum_{c,p}\left(\frac{\partial\mathcal L_{\bullet}}{\partial\hat I_{v,c,p}}\right)^{2}},\qquad
+# \bullet\in\{\mathrm{rgb},\mathrm{lap}\},\\
+# \lambda_{\mathrm{lap}} &= \frac{r}{\operatorname*{median}_{v}\ g_{\mathrm{lap}}(v)/g_{\mathrm{rgb}}(v)} .
+# \end{aligned}
+# $$
+#
+# $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$; $\mathcal L_{\mathrm{lap}}$ has weight 1.
+
+
+# %% tags=["transcription"]
+def g_text(gradient):
+    """RMS over all pixels and channels."""
+    _, H, W = gradient.shape
+    return np.sqrt((gradient**2).sum() / (3 * H * W))
+
+
+def lambda_text(views, r):
+    """views: (gradient of the photometric term, gradient of the Laplacian loss) by the render."""
+    ratios = sorted(g_text(g_lap) / g_text(g_rgb) for g_rgb, g_lap in views)
+    middle = len(ratios) // 2
+    median = ratios[middle] if len(ratios) % 2 else (ratios[middle - 1] + ratios[middle]) / 2
+    return r / median
+
+
+# %%
+w, r = PAPER.loss.ssim_weight, PAPER.loss.gradient_ratio
+chosen = sequence.train_index[calibration_views(len(sequence.train_index), PAPER.loss.calibration_views)]
+assert len(chosen) == 16 and not set(chosen) & set(sequence.test_index)
+
+
+def gradients(index, blur, w, stretch=1.0):
+    """Both gradients of one view, with a blurred frame in place of the base render."""
+    frame = sequence.frame(int(index), np.float64)
+    render = frame.image + stretch * (gaussian_filter(frame.image, (0, blur, blur)) - frame.image)
+    targets = frame_targets(frame, PAPER)
+    _, saved = laplacian_loss_forward(render, targets.image, targets.supports)
+    return photometric_loss(render, targets, w).d_colour, laplacian_loss_reverse(1.0, saved)
+
+
+views = [gradients(index, 1.5, w) for index in chosen]
+sizes = [(sequence.names[index], rms(rgb), rms(lap)) for index, (rgb, lap) in zip(chosen, views)]
+calibration = calibrate(sizes, r)
+print("\n".join(calibration.table.splitlines()[:4]), "\n...")
+np.testing.assert_allclose(calibration.lambda_lap, lambda_text(views, r), rtol=1e-13)
+np.testing.assert_allclose(calibrate(sizes[:15], r).lambda_lap, lambda_text(views[:15], r), rtol=1e-13)
+
+# %% [markdown]
+# After calibration the detail loss has the force it was promised, in the median view:
+
+# %%
+force = [calibration.lambda_lap * lap / rgb for _, rgb, lap in sizes]
+np.testing.assert_allclose(np.median(force), r, rtol=1e-13)
+np.testing.assert_allclose(calibrate(sizes, 2 * r).lambda_lap, 2 * calibration.lambda_lap, rtol=1e-14)
+
+# %% [markdown]
+# ## A picture: two forces on the same image
+#
+# Left and middle: where the two losses pull (size of the gradient). The pull of L1 is the same everywhere and changes only its
+# sign; SSIM adds strength, and varies. The Laplacian pulls in fine grain, and not at all beside the instrument, where
+# no band value is valid. (Its scale is a quarter of the other one, as its force is.) Right: what $\lambda_{\mathrm{lap}}$ becomes for other weights $w$ of SSIM. The published 0.83 belongs to a small $w$.
+
+# %%
+weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])
+found = {}
+for blur in (1.0, 1.5, 2.5):
+    found[blur] = []
+    for weight in weights:
+        some = [gradients(index, blur, weight) for index in chosen[::4]]
+        found[blur].append(calibrate([("", rms(a), rms(b)) for a, b in some], r).lambda_lap)
+figure, axes = plt.subplots(1, 4, figsize=(14, 3.2), layout="constrained")
+frame = sequence.frame(int(chosen[8]), np.float64)
+axes[0].imshow(gaussian_filter(frame.image, (0, 1.5, 1.5)).transpose(1, 2, 0))
+axes[0].set_title("stand-in for the base render")
+rgb, lap = views[8]
+top = np.quantile(np.abs(rgb), 0.99)
+for panel, values, title in (
+    (axes[1], rgb, "$|g|$ photometric"),
+    (axes[2], calibration.lambda_lap * lap / r, "$|g|/r$ detail, calibrated"),
+):
+    panel.imshow(np.abs(values).mean(axis=0), cmap="magma", vmin=0, vmax=top)
+    panel.set_title(title)
+for panel in axes[:3]:
+    panel.set(xticks=[], yticks=[])
+for blur, values in found.items():
+    assert np.all(np.diff(values) > 0), "more SSIM, more force to match"
+    axes[3].plot(weights, values, "o-", label=f"blur {blur} px")
+axes[3].axhline(0.83, color="k", ls=":", label="published 0.83")
+axes[3].set(xlabel="$w$", ylabel="$\\lambda_{\\rm lap}$", title="the calibrated weight")
+axes[3].legend(fontsize=8)
+
+# %% [markdown]
+# ## The reverse pass
+#
+# There is none: $\lambda_{\mathrm{lap}}$ is a constant of training. What the calibration measures **are** reverse passes, those of
+# {doc}`09_laplacian_pyramid` and {doc}`10_base_losses`, so these must be right:
+
+# %%
+with one_thread():
+    names = ("masked_l1", "masked_ssim", "laplacian_loss_co_sited")
+    reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in names]
+print(table(reports))
+assert all(report.passed for report in reports)
+
+# %% [markdown]
+# ## When it cannot work
+#
+# A view with $g_{\mathrm{rgb}}=0$ or a value that is not finite is dropped and named. If no view is left, or the median is 0, there is an
+# error with the table of all views, never an infinite weight.
+
+# %%
+assert calibrate([*sizes, ("perfect", 0.0, 0.0), ("broken", np.nan, 1.0)], r).lambda_lap == calibration.lambda_lap
+for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
+    try:
+        calibrate(hopeless, r)
+    except CalibrationError as error:
+        print(error)
+    else:
+        raise AssertionError("a hopeless calibration must be refused")
+
+# %% [markdown]
+# ## Exercise
+#
+# Make every error of the render half as large. Does the calibrated weight change, for $w=0$? Think of what the gradient of a mean of
+# absolute values depends on.
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. Not at all. The gradient of a mean of absolute values depends on how many residuals are not zero, not on how large they
+# are; both losses are of this kind. With SSIM in the photometric term it does change.
+whole = calibrate([("", *map(rms, gradients(i, 1.5, 0.0))) for i in chosen[::4]], r).lambda_lap
+half = calibrate([("", *map(rms, gradients(i, 1.5, 0.0, stretch=0.5))) for i in chosen[::4]], r).lambda_lap
+print(whole, half)
+np.testing.assert_allclose(half, whole, rtol=1e-6)
+assert msgspec.structs.replace(PAPER.loss, lambda_lap="auto").lambda_lap == "auto"  # the setting that asks for all this
