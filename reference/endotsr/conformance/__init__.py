@@ -1,1 +1,1 @@
-"""The conformance target for ports: golden cases, their manifest and the judge."""
+"""The conformance target of ports: golden cases, the judge, wrong ports that the judge must refuse."""
