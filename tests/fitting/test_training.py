@@ -328,7 +328,7 @@ def test_hard_P6_a_state_that_is_not_finite_is_refused_at_the_start(name, value,
     if value == np.inf and name in ("fdm_width", "colour_coefficients"):
         return  # an infinite width or coefficient still gives a finite scene
     shop = workshop(sequence, settings())
-    with pytest.raises(ValueError, match="position|harmonics|residual|log_scale|quaternion"):
+    with pytest.raises(ValueError, match=r"position|harmonics|residual|log_scale|quaternion"):
         render_at(state.gaussians, shop.spectral, settings(), sequence.cameras[0], 0.25)
 
 

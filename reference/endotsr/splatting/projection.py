@@ -37,14 +37,23 @@ class Projected(NamedTuple):
 
 
 class ProjectionSaved(NamedTuple):
-    """Inputs of the forward pass."""
+    """Inputs and outputs of the forward pass."""
 
     position: FloatArray
     shape: Shape
     camera: Camera
     constants: FloatArray
     pose: FloatArray
-    visible: NDArray[np.bool_]
+    projected: Projected
+
+
+def footprint(projected: Projected) -> FloatArray:
+    """A = c/det, m = b/c, r = 1/c (3, N): the exponent is -(r dy^2 + A (dx - m dy)^2)/2; zero where not visible."""
+    seen = projected.visible
+    b, c = projected.covariance2d[1, seen], projected.covariance2d[2, seen]
+    out = np.zeros_like(projected.covariance2d)
+    out[:, seen] = c / projected.determinant[seen], b / c, 1 / c
+    return out
 
 
 class ProjectionGrads(NamedTuple):
@@ -84,7 +93,7 @@ def _project(
     real = position.dtype.type
     one, zero = real(1), real(0)
     t0, t1, s = np.empty(3, position.dtype), np.empty(3, position.dtype), np.empty(3, position.dtype)
-    for i in range(first, stop):
+    for i in range(np.uintp(first), np.uintp(stop)):  # unsigned: no index may count from the end
         px, py, pz = position[0, i], position[1, i], position[2, i]
         x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
         y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
@@ -139,17 +148,18 @@ def _project(
 
 
 def _project_reverse(
-    first, last, position, rotation, scale, constants, pose, visible, d_mean2d, d_covariance2d, d_depth,
+    first, last, position, rotation, scale, constants, pose, visible, determinant, d_mean2d, d_footprint, d_depth,
     d_position, d_rotation, d_scale, d_poses,
 ):  # fmt: skip
     """`d_poses` holds one (3, 4) sum per block, folded in block order by the caller; or (0, 3, 4) for none."""
-    fx, fy = constants[0], constants[1]
+    fx, fy, low_pass = constants[0], constants[1], constants[4]
     limit_x, limit_y, clamp_factor, axis_limit = constants[6], constants[7], constants[8], constants[9]
     real = position.dtype.type
     one, two, zero = real(1), real(2), real(0)
-    jw = np.empty((2, 3), position.dtype)
-    d_jw = np.empty((2, 3), position.dtype)
-    for i in range(first * BLOCK, min(position.shape[1], last * BLOCK)):
+    jw, d_jw = np.empty((2, 3), position.dtype), np.empty((2, 3), position.dtype)
+    t0, t1, s = np.empty(3, position.dtype), np.empty(3, position.dtype), np.empty(3, position.dtype)
+    small = np.empty(3, position.dtype)
+    for i in range(np.uintp(first * BLOCK), np.uintp(min(position.shape[1], last * BLOCK))):
         for k in range(3):
             d_position[k, i] = d_scale[k, i] = zero
             d_rotation[k, 0, i] = d_rotation[k, 1, i] = d_rotation[k, 2, i] = zero
@@ -168,27 +178,34 @@ def _project_reverse(
             jw[0, k] = j00 * pose[0, k] + j02 * pose[2, k]
             jw[1, k] = j11 * pose[1, k] + j12 * pose[2, k]
             d_jw[0, k] = d_jw[1, k] = zero
-        # symmetric 2x2 gradient of the covariance; [a, b; b, c] = (T S)(T S)^T + low_pass I
-        g_aa, g_ab, g_cc = two * d_covariance2d[0, i], d_covariance2d[1, i], two * d_covariance2d[2, i]
+        b, c = zero, low_pass
         for k in range(3):
-            r0, r1, r2 = rotation[0, k, i], rotation[1, k, i], rotation[2, k, i]
-            t0 = jw[0, 0] * r0 + jw[0, 1] * r1 + jw[0, 2] * r2
-            t1 = jw[1, 0] * r0 + jw[1, 1] * r1 + jw[1, 2] * r2
-            s = scale[k, i]
-            if s * (abs(t0) + abs(t1)) > axis_limit:
+            t0[k] = jw[0, 0] * rotation[0, k, i] + jw[0, 1] * rotation[1, k, i] + jw[0, 2] * rotation[2, k, i]
+            t1[k] = jw[1, 0] * rotation[0, k, i] + jw[1, 1] * rotation[1, k, i] + jw[1, 2] * rotation[2, k, i]
+            length = abs(t0[k]) + abs(t1[k])
+            s[k] = scale[k, i] if scale[k, i] * length <= axis_limit else axis_limit / length
+            b += (t0[k] * s[k]) * (t1[k] * s[k])
+            c += (t1[k] * s[k]) * (t1[k] * s[k])
+        m, r, precision = b / c, one / c, c / determinant[i]
+        g_a = two * precision * precision * d_footprint[0, i]
+        g_m, g_r = r * d_footprint[1, i], two * r * r * d_footprint[2, i]
+        # e = t0 - m t1 without cancellation: along a needle it is small, and it is all that the length feels
+        x01, x12, x20 = t0[0] * t1[1] - t0[1] * t1[0], t0[1] * t1[2] - t0[2] * t1[1], t0[2] * t1[0] - t0[0] * t1[2]
+        w0, w1, w2 = (t1[0] * s[0]) * s[0], (t1[1] * s[1]) * s[1], (t1[2] * s[2]) * s[2]
+        small[0] = r * (low_pass * t0[0] + w1 * x01 - w2 * x20)
+        small[1] = r * (low_pass * t0[1] + w2 * x12 - w0 * x01)
+        small[2] = r * (low_pass * t0[2] + w0 * x20 - w1 * x12)
+        for k in range(3):
+            if scale[k, i] * (abs(t0[k]) + abs(t1[k])) > axis_limit:
                 continue  # clipped axis: constant
-            d_u, d_v = (g_aa * t0 + g_ab * t1) * s, (g_ab * t0 + g_cc * t1) * s
-            d_scale[k, i] = d_u * t0 + d_v * t1
-            d_t0, d_t1 = d_u * s, d_v * s
-            d_rotation[0, k, i] = jw[0, 0] * d_t0 + jw[1, 0] * d_t1
-            d_rotation[1, k, i] = jw[0, 1] * d_t0 + jw[1, 1] * d_t1
-            d_rotation[2, k, i] = jw[0, 2] * d_t0 + jw[1, 2] * d_t1
-            d_jw[0, 0] += d_t0 * r0
-            d_jw[0, 1] += d_t0 * r1
-            d_jw[0, 2] += d_t0 * r2
-            d_jw[1, 0] += d_t1 * r0
-            d_jw[1, 1] += d_t1 * r1
-            d_jw[1, 2] += d_t1 * r2
+            e = small[k]
+            d_t0 = s[k] * s[k] * (g_m * t1[k] - g_a * e)
+            d_t1 = s[k] * s[k] * (g_a * m * e + g_m * (e - m * t1[k]) - g_r * t1[k])
+            d_scale[k, i] = s[k] * (two * g_m * t1[k] * e - g_a * e * e - g_r * t1[k] * t1[k])
+            for j in range(3):
+                d_rotation[j, k, i] = jw[0, j] * d_t0 + jw[1, j] * d_t1
+                d_jw[0, j] += d_t0 * rotation[j, k, i]
+                d_jw[1, j] += d_t1 * rotation[j, k, i]
         d_j00 = d_jw[0, 0] * pose[0, 0] + d_jw[0, 1] * pose[0, 1] + d_jw[0, 2] * pose[0, 2]
         d_j02 = d_jw[0, 0] * pose[2, 0] + d_jw[0, 1] * pose[2, 1] + d_jw[0, 2] * pose[2, 2]
         d_j11 = d_jw[1, 0] * pose[1, 0] + d_jw[1, 1] * pose[1, 1] + d_jw[1, 2] * pose[1, 2]
@@ -211,7 +228,7 @@ def _project_reverse(
         for k in range(3):
             d_position[k, i] = pose[0, k] * d_x + pose[1, k] * d_y + pose[2, k] * d_z
         if d_poses.shape[1] > 0:
-            d_pose = d_poses[i // BLOCK]
+            d_pose = d_poses[i // np.uintp(BLOCK)]
             for k in range(3):
                 p = position[k, i]
                 d_pose[0, k] += j00 * d_jw[0, k] + d_x * p
@@ -250,7 +267,7 @@ def projection_forward(
         np.empty((2, n), dtype), np.empty((3, n), dtype), np.empty(n, dtype), np.empty(n, dtype), np.empty(n, np.bool_)
     )
     share(_project_kernel, n, position, shape.rotation, shape.scale, constants, pose, *out)
-    return out, ProjectionSaved(position, shape, camera, constants, pose, out.visible)
+    return out, ProjectionSaved(position, shape, camera, constants, pose, out)
 
 
 def projection_reverse(
@@ -267,6 +284,28 @@ def projection_reverse(
     d_covariance2d  (3, N) dL/d(a, b, c), b counted once; the determinant's share is already inside (det = a c - b^2)
     d_depth         (N,)   dL/dz through the depth image
     """
+    seen = saved.projected.visible
+    precision, slope, inverse_c = footprint(saved.projected)[:, seen]
+    g_a, g_b, g_c = d_covariance2d[:, seen]
+    d_footprint = np.zeros_like(d_covariance2d)  # of a = 1/A + m^2/r, b = m/r, c = 1/r
+    d_footprint[0, seen] = -g_a / (precision * precision)
+    d_footprint[1, seen] = (2 * slope * g_a + g_b) / inverse_c
+    d_footprint[2, seen] = -(slope * slope * g_a + slope * g_b + g_c) / (inverse_c * inverse_c)
+    return projection_reverse_footprint(d_mean2d, d_footprint, d_depth, saved, pose_gradient=pose_gradient)
+
+
+def projection_reverse_footprint(
+    d_mean2d: FloatArray,
+    d_footprint: FloatArray,
+    d_depth: FloatArray,
+    saved: ProjectionSaved,
+    *,
+    pose_gradient: bool = False,
+) -> ProjectionGrads:
+    """As `projection_reverse`, from the gradients (3, N) by A, m, r of `footprint`.
+
+    The render takes this way: in gradients by a, b, c the length of a needle is lost, by (length / width)^2 roundings.
+    """
     n = saved.position.shape[1]
     dtype = saved.position.dtype
     d_position, d_rotation = np.empty_like(saved.position), np.empty((3, 3, n), dtype)
@@ -274,8 +313,9 @@ def projection_reverse(
     d_poses = np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)
     share(
         _project_reverse_kernel, d_poses.shape[0],
-        saved.position, saved.shape.rotation, saved.shape.scale, saved.constants, saved.pose, saved.visible,
-        d_mean2d, d_covariance2d, d_depth, d_position, d_rotation, d_scale, d_poses,
+        saved.position, saved.shape.rotation, saved.shape.scale, saved.constants, saved.pose,
+        saved.projected.visible, saved.projected.determinant, d_mean2d, d_footprint, d_depth,
+        d_position, d_rotation, d_scale, d_poses,
     )  # fmt: skip
     camera = None
     if pose_gradient:

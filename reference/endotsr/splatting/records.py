@@ -86,11 +86,11 @@ def pack_records(
 def _gather(
     first, stop,
     order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth,
-    d_mean2d, d_covariance2d, d_logit, d_colour, d_depth,
+    d_mean2d, d_footprint, d_logit, d_colour, d_depth,
 ):  # fmt: skip
     """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
     real = records.dtype.type
-    half, one, two, zero = real(0.5), real(1), real(2), real(0)
+    half, one, zero = real(0.5), real(1), real(0)
     total = np.empty(GRADIENT, records.dtype)
     for k in range(first, stop):
         for j in range(GRADIENT):
@@ -103,20 +103,44 @@ def _gather(
         a, m, r = records[k, PRECISION], records[k, SLOPE], records[k, INVERSE_C]
         d_mean2d[0, i] = a * total[SUM_SE]
         d_mean2d[1, i] = r * total[SUM_SY] - a * m * total[SUM_SE]
-        d_a, d_m, d_r = -half * total[SUM_SEE], a * total[SUM_SEY], -half * total[SUM_SYY]
         factor = one
         if conic_epsilon > zero:
             square = determinant[i] * determinant[i]
             factor = square / (square + conic_epsilon)
-        d_covariance2d[0, i] = factor * (-a * a * d_a)
-        d_covariance2d[1, i] = factor * (two * a * a * m * d_a + r * d_m)
-        d_covariance2d[2, i] = factor * (-a * a * m * m * d_a - m * r * d_m - r * r * d_r)
+        d_footprint[0, i] = factor * (-half * total[SUM_SEE])
+        d_footprint[1, i] = factor * (a * total[SUM_SEY])
+        d_footprint[2, i] = factor * (-half * total[SUM_SYY])
         d_logit[i] = total[SUM_S] / (one + math.exp(opacity_logit[i]))  # sum of s, times 1 - opacity
         d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
         d_depth[i] = total[SUM_DEPTH] if keep_depth else zero
 
 
 _gather_kernel = jit(_gather)
+
+
+def gather_footprint_gradients(
+    order: NDArray[np.int32],
+    records: FloatArray,
+    lists: TileLists,
+    pair_gradients: FloatArray,
+    determinant: FloatArray,
+    opacity_logit: FloatArray,
+    *,
+    conic_epsilon: float,
+    keep_depth: bool,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """As `gather_gradients`, but by A, m, r of the footprint (3, N) in place of covariance2d."""
+    n, dtype = determinant.size, records.dtype
+    out = (
+        np.zeros((2, n), dtype), np.zeros((3, n), dtype), np.zeros(n, dtype), np.zeros((3, n), dtype),
+        np.zeros(n, dtype),
+    )  # fmt: skip
+    share(
+        _gather_kernel, order.size,
+        order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
+        dtype.type(conic_epsilon), keep_depth, *out,
+    )  # fmt: skip
+    return out
 
 
 def gather_gradients(
@@ -131,14 +155,14 @@ def gather_gradients(
     keep_depth: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Gradients by mean2d (2, N), covariance2d (3, N), logit (N,), colour (3, N), depth (N,); zero where unseen."""
-    n, dtype = determinant.size, records.dtype
-    out = (
-        np.zeros((2, n), dtype), np.zeros((3, n), dtype), np.zeros(n, dtype), np.zeros((3, n), dtype),
-        np.zeros(n, dtype),
+    d_mean2d, d_footprint, d_logit, d_colour, d_depth = gather_footprint_gradients(
+        order, records, lists, pair_gradients, determinant, opacity_logit,
+        conic_epsilon=conic_epsilon, keep_depth=keep_depth,
     )  # fmt: skip
-    share(
-        _gather_kernel, order.size,
-        order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
-        dtype.type(conic_epsilon), keep_depth, *out,
-    )  # fmt: skip
-    return out
+    a, m, r = records[:, PRECISION], records[:, SLOPE], records[:, INVERSE_C]
+    d_a, d_m, d_r = d_footprint[:, order]
+    d_covariance2d = np.zeros_like(d_footprint)
+    d_covariance2d[0, order] = -a * a * d_a
+    d_covariance2d[1, order] = 2 * a * a * m * d_a + r * d_m
+    d_covariance2d[2, order] = -a * a * m * m * d_a - m * r * d_m - r * r * d_r
+    return d_mean2d, d_covariance2d, d_logit, d_colour, d_depth

@@ -16,8 +16,8 @@ from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
 from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
 from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
-from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse
-from endotsr.splatting.records import gather_gradients, log_opacity, pack_records
+from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse_footprint
+from endotsr.splatting.records import gather_footprint_gradients, log_opacity, pack_records
 from endotsr.splatting.settings import RasterSettings
 
 FloatArray = NDArray[np.floating]
@@ -162,13 +162,13 @@ def render_reverse(
         d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
         pairs = compositing.composite_reverse(d_colour, d_depth, d_opacity, composite)
     deviations = saved.settings.deviations
-    d_mean2d, d_covariance2d, d_logit, d_rgb, d_z = gather_gradients(
+    d_mean2d, d_footprint, d_logit, d_rgb, d_z = gather_footprint_gradients(
         saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
         conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
         keep_depth=not deviations.drop_depth_to_z,
     )  # fmt: skip
     harmonics = harmonics_reverse(d_rgb, saved.harmonics)
-    projection = projection_reverse(d_mean2d, d_covariance2d, d_z, saved.projection, pose_gradient=pose_gradient)
+    projection = projection_reverse_footprint(d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient)
     covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
     return RenderGrads(
         position=projection.position + harmonics.position,
