@@ -19,7 +19,8 @@ LONGEST_HEADER = 4096
 LARGEST = 1 << 28  # bytes of an array that is read
 KINDS = {"real": "f", "integer": "iu", "boolean": "b"}
 _HEADER = re.compile(
-    r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), 'shape': \(((?:\d{1,12},? ?){0,8})\),? ?\}\s*"
+    r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), "
+    r"'shape': \(((?:\d{1,12},? ?){0,8})\),? ?\}\s*"
 )
 
 
@@ -59,8 +60,8 @@ def header_of(data: bytes) -> Header:
     return Header(start + length, found[1], found[2] == "True", shape)
 
 
-def read_plain(path: Path, root: Path | None = None) -> NDArray:
-    """A little-endian, C-order array of numbers or booleans. Raises Refused; follows no link out of `root`."""
+def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> NDArray:
+    """A little-endian, C-order array of at most `largest` bytes. Raises Refused; follows no link out of `root`."""
     try:
         if root is not None and not path.resolve().is_relative_to(root.resolve()):
             raise Refused("a link that leaves the folder")
@@ -70,14 +71,14 @@ def read_plain(path: Path, root: Path | None = None) -> NDArray:
     except (OSError, ValueError, RuntimeError) as error:
         raise Refused(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from None
     try:
-        return _read_open(handle)
+        return _read_open(handle, largest)
     except OSError as error:
         raise Refused(f"cannot be read: {error.strerror}") from None
     finally:
         os.close(handle)
 
 
-def _read_open(handle: int) -> NDArray:
+def _read_open(handle: int, largest: int) -> NDArray:
     status = os.fstat(handle)
     if not stat.S_ISREG(status.st_mode):
         raise Refused("not a regular file")
@@ -91,8 +92,8 @@ def _read_open(handle: int) -> NDArray:
         if header.fortran and len(header.shape) > 1:
             raise Refused("Fortran order; allowed: C order")
         length = math.prod(header.shape) * size
-        if length > LARGEST:
-            raise Refused(f"{length} bytes; allowed: {LARGEST}")
+        if length > largest:
+            raise Refused(f"shape {header.shape} has {length} bytes; allowed: {largest}")
         if status.st_size != header.offset + length:
             raise Refused(f"{status.st_size} bytes; header and shape {header.shape} need {header.offset + length}")
         file.seek(header.offset)

@@ -1,0 +1,220 @@
+"""The judge: a folder of outputs against the golden cases. Whatever stands in the folder, it ends with a verdict."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.conformance.compare import Verdict, fingerprint, judged
+from endotsr.conformance.format import LEVELS, Case, Output, Precision
+from endotsr.conformance.npy import Refused, read_plain
+from endotsr.conformance.store import Golden
+
+NEAR = 0.02  # of the way from right to wrong: a fingerprint this close to that of a mistake is that mistake
+
+Status = Literal["passed", "refused", "missing"]
+
+
+class OutputReport(msgspec.Struct, kw_only=True):
+    """Verdict on one output."""
+
+    name: str
+    level: int
+    status: Status
+    reason: str
+    distance: float | None = None
+    index: tuple[int, ...] = ()
+    got: float | None = None
+    expected: float | None = None
+
+
+class CaseReport(msgspec.Struct, kw_only=True):
+    """Verdict on one case."""
+
+    name: str
+    title: str
+    level: int
+    status: Status
+    outputs: list[OutputReport]
+    looks_like: list[str]
+    """mistakes whose fingerprint the output has, best first"""
+    made_for: list[str]
+
+
+class Suspect(msgspec.Struct, kw_only=True):
+    """A mistake that explains refusals."""
+
+    flag: str
+    title: str
+    wrong: str
+    matches: int
+    """refused cases with its fingerprint"""
+    contradicted: int
+    """passed cases that it would have spoiled"""
+
+
+class Report(msgspec.Struct, kw_only=True):
+    """Everything the judge says."""
+
+    version: str
+    precision: str
+    asked_level: int
+    level: int
+    """highest level that is complete, -1 = none"""
+    claim: str
+    levels: dict[int, tuple[int, int]]
+    """passed and asked outputs by level"""
+    cases: list[CaseReport]
+    suspects: list[Suspect]
+    notes: list[str]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the asked level is complete."""
+        return self.level >= self.asked_level
+
+
+def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None) -> Report:
+    """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
+
+    again   a second folder of the same port: level 5 then also asks for the same bits everywhere
+    """
+    reports = [_case(golden, case, outputs, precision, level) for case in golden.cases if case.level <= level]
+    notes = []
+    if again is not None and level >= 5:
+        reports.append(_repeated(golden, outputs, again))
+    elif level >= 5:
+        notes.append("level 5: only the determinism cases; a second run (--again) compares all outputs bit by bit")
+    counts = {k: _count(reports, k) for k in LEVELS if k <= level}
+    reached = -1
+    for k, (good, asked) in counts.items():
+        if good < asked:
+            break
+        reached = k
+    claim = f"golden {golden.short_version}, level {reached}, {precision}" if reached >= 0 else "no level is complete"
+    return Report(
+        version=golden.manifest.version, precision=precision, asked_level=level, level=reached, claim=claim,
+        levels=counts, cases=reports, suspects=_suspects(golden, reports), notes=notes,
+    )  # fmt: skip
+
+
+def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
+    all_of = [o for r in reports for o in r.outputs if o.level == level]
+    return sum(o.status == "passed" for o in all_of), len(all_of)
+
+
+def _case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int) -> CaseReport:
+    folder = outputs / case.family / case.case
+    found: list[OutputReport] = []
+    looks: dict[str, float] = {}
+    arrays: dict[str, NDArray] = {}
+    for name, asked in case.outputs.items():
+        if asked.level > level:
+            continue
+        expected = golden.array(case, asked.file)
+        try:
+            got = arrays[name] = _taken(folder / f"{name}.npy", outputs, asked, precision)
+        except Refused as refusal:
+            status: Status = "missing" if str(refusal) == "missing" else "refused"
+            found.append(OutputReport(name=name, level=asked.level, status=status, reason=str(refusal)))
+            continue
+        verdict = judged(got, expected, asked.compare, precision)
+        if verdict.passed and asked.compare.kind == "identical":
+            verdict = _identical(got, arrays.get(asked.compare.to), asked.compare.to)
+        found.append(_report(name, asked, verdict))
+        if not verdict.passed:
+            _recognise(case, name, got, expected, looks)
+    return CaseReport(
+        name=case.name, title=case.title, level=case.level, status=_together(found), outputs=found,
+        looks_like=sorted(looks, key=lambda flag: looks[flag]), made_for=list(case.flags),
+    )  # fmt: skip
+
+
+def _together(found: list[OutputReport]) -> Status:
+    kinds = {o.status for o in found}
+    return "refused" if "refused" in kinds else "missing" if "missing" in kinds else "passed"
+
+
+def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArray:
+    """The output as an array of the asked shape and kind. Raises Refused."""
+    count = int(np.prod(asked.shape))
+    got = read_plain(path, root, largest=8 * max(count, 1))
+    if got.shape != asked.shape:
+        raise Refused(f"shape {got.shape}; expected {asked.shape}")
+    kinds = {"real": "f", "integer": "iu", "boolean": "bu"}[asked.dtype]
+    if got.dtype.kind not in kinds:
+        raise Refused(f"dtype {got.dtype}; expected {asked.dtype}")
+    if asked.dtype == "real" and precision == "float64" and got.dtype.itemsize < 8:
+        raise Refused(f"dtype {got.dtype}; expected float64")
+    return got
+
+
+def _identical(got: NDArray, other: NDArray | None, name: str) -> Verdict:
+    if other is not None and other.dtype == got.dtype and other.tobytes() == got.tobytes():
+        return Verdict(True, "same bits", 0.0)
+    return Verdict(False, f"bits differ from {name}", 0.0)
+
+
+def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
+    shown = {} if verdict.passed or not verdict.reason else {
+        "index": verdict.worst, "got": _plain(verdict.got), "expected": _plain(verdict.expected)
+    }  # fmt: skip
+    status: Status = "passed" if verdict.passed else "refused"
+    return OutputReport(
+        name=name, level=asked.level, status=status, reason=verdict.reason, distance=verdict.distance, **shown
+    )
+
+
+def _plain(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _recognise(case: Case, name: str, got: NDArray, expected: NDArray, looks: dict[str, float]) -> None:
+    """Mistakes of the case whose fingerprint this output has, with how far off it is."""
+    finite = bool(np.isfinite(got.astype(np.float64)).all())
+    for flag, mistake in case.mistakes.items():
+        if mistake.output != name:
+            continue
+        if mistake.fingerprint is None:
+            if not finite:
+                looks[flag] = 0.0
+            continue
+        right = fingerprint(name, expected)
+        way = abs(mistake.fingerprint - right)
+        off = abs(fingerprint(name, got) - mistake.fingerprint) if finite else np.inf
+        if off <= NEAR * way or (case.outputs[name].compare.kind == "identical" and finite):
+            looks[flag] = float(off / way) if way else 0.0
+
+
+def _suspects(golden: Golden, reports: list[CaseReport]) -> list[Suspect]:
+    status = {r.name: r.status for r in reports}
+    found = []
+    for flag, note in golden.manifest.flags.items():
+        matches = sum(flag in r.looks_like for r in reports)
+        if matches:
+            against = sum(status.get(c.name) == "passed" for c in golden.cases if flag in c.mistakes)
+            found.append(Suspect(flag=flag, title=note.title, wrong=note.wrong, matches=matches, contradicted=against))
+    return sorted(found, key=lambda s: (s.contradicted - s.matches, s.contradicted))
+
+
+def _repeated(golden: Golden, first: Path, second: Path) -> CaseReport:
+    """All outputs of two runs, bit by bit."""
+    found = []
+    for case in golden.cases:
+        for name, asked in case.outputs.items():
+            files = [folder / case.family / case.case / f"{name}.npy" for folder in (first, second)]
+            limit = 8 * max(int(np.prod(asked.shape)), 1)
+            try:
+                a, b = (read_plain(path, root, limit) for path, root in zip(files, (first, second)))
+                same = a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+                status, reason = ("passed", "same bits") if same else ("refused", "other bits in the second run")
+            except Refused as refusal:
+                status, reason = "missing", str(refusal)
+            report = OutputReport(name=f"{case.name}/{name}", level=5, status=status, reason=reason)  # type: ignore[arg-type]
+            found.append(report)
+    return CaseReport(
+        name="determinism/again", title="A second run gives the same bits", level=5, status=_together(found),
+        outputs=found, looks_like=[], made_for=["sums_in_any_order"],
+    )  # fmt: skip

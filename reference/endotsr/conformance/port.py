@@ -1,0 +1,121 @@
+"""The two file doors: requests that a port answers, and the reference as a port of itself."""
+
+import shlex
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from endotsr.conformance.cases import all_operations
+from endotsr.conformance.format import Case, Precision, Request, RequestOutput, Requests, read_struct, to_json
+from endotsr.conformance.negative import Negative, answer
+from endotsr.conformance.negative import Request as WrongRequest
+from endotsr.conformance.npy import Refused, read_plain, write_npy
+from endotsr.conformance.operation import Outputs
+from endotsr.conformance.solve import reference, stored
+from endotsr.conformance.store import Golden
+from endotsr.errors import InputError
+
+
+def write_requests(golden: Golden, folder: Path, precision: Precision, level: int) -> None:
+    """The cases without their answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
+    wanted = [case for case in golden.cases if case.level <= level]
+    for case in wanted:
+        root = folder / case.family / case.case
+        for array in case.inputs.values():
+            write_npy(root / array.file, golden.array(case, array.file))
+        outputs = {
+            name: RequestOutput(level=o.level, unit=o.unit, dtype=o.dtype, shape=o.shape)
+            for name, o in case.outputs.items()
+            if o.level <= level
+        }
+        request = Request(
+            family=case.family, case=case.case, operation=case.operation, settings=case.settings,
+            inputs={name: array.file for name, array in case.inputs.items()}, outputs=outputs,
+        )  # fmt: skip
+        root.mkdir(parents=True, exist_ok=True)
+        (root / "request.json").write_text(to_json(request), encoding="utf-8")
+    head = Requests(
+        version=golden.manifest.version, precision=precision, level=level,  # type: ignore[arg-type]
+        cases=tuple(case.name for case in wanted),
+    )  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "requests.json").write_text(to_json(head), encoding="utf-8")
+
+
+def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
+    """Call the port's command once; returns a note when it failed. No shell is involved.
+
+    Raises: InputError if the command names no {requests} or {outputs}, or cannot be started.
+    """
+    if "{requests}" not in command or "{outputs}" not in command:
+        raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+    outputs.mkdir(parents=True, exist_ok=True)
+    try:
+        split = shlex.split(command)
+        words = [w.replace("{requests}", str(requests)).replace("{outputs}", str(outputs)) for w in split]
+        done = subprocess.run(words, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        return f"the port was stopped after {seconds:g} s"
+    except (OSError, ValueError) as error:
+        raise InputError(f"--port: cannot be started: {error}") from None
+    return "" if done.returncode == 0 else f"the port ended with code {done.returncode}"
+
+
+def answer_requests(requests: Path, outputs: Path) -> int:
+    """The reference behind the door: reads a folder of requests alone, writes outputs. Returns how many cases."""
+    try:
+        head = read_struct(requests / "requests.json", Requests)
+        for name in head.cases:
+            root = requests / name
+            request = read_struct(root / "request.json", Request)
+            inputs = {key: read_plain(root / file, requests) for key, file in request.inputs.items()}
+            _write(outputs / name, _answer(request.operation, inputs, request.settings, head.precision),
+                   list(request.outputs), head.precision)  # fmt: skip
+    except (OSError, msgspec.DecodeError, Refused) as error:
+        raise InputError(f"{requests}: {error}") from None
+    return len(head.cases)
+
+
+def answer_all(golden: Golden, outputs: Path, precision: Precision) -> int:
+    """The reference's own outputs for every case."""
+    for case in golden.cases:
+        found = _answer(case.operation, _inputs(golden, case), case.settings, precision)
+        _write(outputs / case.name, found, list(case.outputs), precision)
+    return len(golden.cases)
+
+
+def answer_wrongly(golden: Golden, outputs: Path, negative: Negative) -> int:
+    """The outputs of a wrong port in float64; returns how many cases it spoils. Right answers are the expected ones."""
+    operations, spoiled = all_operations(), 0
+    for case in golden.cases:
+        operation, inputs = operations[case.operation], _inputs(golden, case)
+        right: Outputs = {name: golden.array(case, o.file) for name, o in case.outputs.items()}
+
+        def run(arrays, settings, operation=operation) -> Outputs:
+            return reference(operation, arrays, dict(settings), "float64", "definition")
+
+        wrong = answer(negative, case.operation, WrongRequest(inputs, case.settings, run, right))
+        spoiled += wrong is not None
+        for name, value in (wrong or right).items():
+            write_npy(outputs / case.name / f"{name}.npy", value)
+    return spoiled
+
+
+def _inputs(golden: Golden, case: Case) -> dict[str, np.ndarray]:
+    return {name: golden.array(case, array.file) for name, array in case.inputs.items()}
+
+
+def _answer(operation: str, inputs: dict, settings: dict[str, Any], precision: str) -> Outputs:
+    """With the fast compositing where it applies: the expected values come from the other path."""
+    return reference(all_operations()[operation], inputs, settings, precision, "rows")
+
+
+def _write(folder: Path, found: Outputs, names: list[str], precision: str) -> None:
+    for name in names:
+        if name in found:
+            value = stored(found[name])
+            real = value.dtype.kind == "f" and value.ndim > 0
+            write_npy(folder / f"{name}.npy", value.astype(precision) if real else value)
