@@ -1,0 +1,219 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 13. The simulated scene, and where the Gaussians start
+#
+# No real sequence tells its true motion, its true depth behind the instrument or its true light. The simulator does: a sheet of tissue
+# given by a formula, under an endoscope, with each effect on a switch. It also shows how the first Gaussians are made.
+#
+# Equation {eq}`eq-b12` of {doc}`/specification/b12_initialisation`.
+
+# %%
+import os
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.config import InitialisationConfig, ModelConfig
+from endotsr.scene.initialisation import Y00, gaussians_at, initialise
+from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
+from endotsr.splatting.camera import backproject
+
+SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
+settings = SimulatorSettings(width=64, height=51, frames=12) if SMALL else SimulatorSettings()
+simulated = simulate(settings)
+sequence, truth = simulated.sequence, simulated.truth
+camera = sequence.cameras[0]
+
+# %% [markdown]
+# ## The sheet
+#
+# A material point has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
+# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane waves and, for each motion $k$, a time
+# course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction $\mathbf v_k$. Which point a pixel shows is found by Newton's method,
+# to $10^{-10}$ mm.
+
+
+# %% tags=["transcription"]
+def sheet_text(surface, a, b, t):
+    h = sum(
+        A * np.sin(k_a * a + k_b * b + phase)
+        for A, (k_a, k_b), phase in zip(surface.amplitude, surface.wave.T, surface.phase)
+    )
+    X = np.stack([a, b, surface.distance + h])
+    for motion in surface.motions:
+        X = X + motion.course(t) * motion.weight(a, b)[0] * motion.direction.reshape(3, *[1] * a.ndim)
+    return X
+
+
+def breathing_text(part, t):
+    return part.amplitude * np.sin(np.pi * part.cycles * t) ** 2
+
+
+# %%
+for index in (0, 5, 11):
+    t = float(sequence.times[index])
+    a, b = truth.material_coordinates[index]
+    X = sheet_text(truth.surface, a, b, t)
+    np.testing.assert_allclose(simulated.surface_point(truth.material_coordinates[index], t), X, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(truth.depth[index], X[2], rtol=1e-12)  # the camera rests at the origin
+    u = camera.fx * X[0] / X[2] + camera.cx
+    np.testing.assert_allclose(u, np.broadcast_to(np.arange(camera.width) + 0.5, u.shape), atol=1e-6)  # pixel centres
+    np.testing.assert_allclose(truth.surface.motions[0].course(t), breathing_text(settings.breathing, t), rtol=1e-12)
+
+# %% [markdown]
+# ## Each effect is a switch
+#
+# With all effects off, all frames are equal. With one on, the difference between two frames is that effect and nothing else.
+
+# %%
+tiny = SimulatorSettings(width=64, height=51, frames=8)
+frozen = simulate(with_effects(tiny)).sequence
+assert (frozen.images == frozen.images[0]).all() and frozen.masks.all()
+
+figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
+for panel, effect in zip(axes.flat, EFFECTS):
+    single = simulate(with_effects(tiny, effect)).sequence
+    if effect in ("noise", "instrument", "highlights"):
+        picture, title = single.images[3].transpose(1, 2, 0), effect
+        panel.imshow(picture)
+    elif effect == "depth_errors":
+        panel.imshow(np.where(single.depth[3] > 0, single.depth[3], np.nan), cmap="viridis")
+        title = "depth_errors (prior)"
+    else:
+        change = single.images[3].astype(float).mean(axis=0) - single.images[0].mean(axis=0)
+        assert np.abs(change).max() > 5, effect
+        panel.imshow(change, cmap="RdBu_r", vmin=-60, vmax=60)
+        title = f"{effect}: frame 3 - frame 0"
+    panel.set_title(title, fontsize=10)
+    panel.set(xticks=[], yticks=[])
+
+# %% [markdown]
+# ## A picture: frames, true depth, true motion
+#
+# The flow is what optical flow methods look for; here it is known, behind the instrument too. The lower right panel follows
+# single points over the clip: breathing moves all of them, the beat and the pull only some.
+
+# %%
+figure, axes = plt.subplots(2, 4, figsize=(14, 5.6), layout="constrained")
+middle = sequence.count // 2
+for panel, index in zip(axes[0], np.linspace(0, sequence.count - 1, 4).astype(int)):
+    panel.imshow(sequence.images[index].transpose(1, 2, 0))
+    panel.set_title(
+        f"frame {index}, t = {sequence.times[index]:.2f}" + (" (held out)" if index in sequence.test_index else "")
+    )
+axes[1, 0].imshow(truth.depth[middle], cmap="viridis")
+axes[1, 0].set_title(f"true depth, {truth.depth[middle].min():.0f} to {truth.depth[middle].max():.0f} mm")
+axes[1, 1].imshow(np.where(sequence.depth[middle] > 0, sequence.depth[middle], np.nan), cmap="viridis")
+axes[1, 1].set_title("depth prior (none under the tool)")
+flow = simulated.true_flow(0, middle)
+axes[1, 2].imshow(np.hypot(*flow), cmap="magma")
+step = max(4, camera.width // 14)
+rows, columns = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
+axes[1, 2].quiver(
+    columns, rows, *flow[:, rows, columns], color="w", angles="xy", scale_units="xy", scale=1, width=0.006
+)
+axes[1, 2].set_title(f"true flow from frame 0, up to {np.hypot(*flow).max():.1f} px")
+times = np.linspace(0, 1, 200)
+for (a, b), label in (((-10.0, 5.0), "on the beat"), ((3.0, 2.0), "on the pull"), ((15.0, -10.0), "breathing only")):
+    heights = [-simulated.surface_point(np.array([a, b]), t)[2] for t in times]
+    axes[1, 3].plot(times, np.array(heights) - heights[0], label=label)
+axes[1, 3].set(title="lift towards the camera [mm]", xlabel="t")
+axes[1, 3].legend(fontsize=8)
+for panel in axes.flat[:-1]:
+    panel.set(xticks=[], yticks=[])
+
+# %% [markdown]
+# ## Where Gaussians start
+#
+# A pixel $(i,j)$ with depth $D$ in a training frame becomes a Gaussian at
+#
+# $$
+# \mu=W^\top\left(\begin{bmatrix}(i+\tfrac12-c_x)\,D/f_x\\(j+\tfrac12-c_y)\,D/f_y\\D\end{bmatrix}-\mathbf d\right)
+# $$
+#
+# with the colour of the pixel, $h_0=(rgb-\tfrac12)/Y_{00}$, opacity 0.1, no rotation, and three equal log-scales
+# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest other points.
+
+
+# %% tags=["transcription"]
+def lift_text(i, j, D, camera):
+    in_camera = np.array([(i + 1 / 2 - camera.cx) * D / camera.fx, (j + 1 / 2 - camera.cy) * D / camera.fy, D])
+    return camera.rotation.T @ (in_camera - camera.translation)
+
+
+def log_scale_text(positions):
+    distance = ((positions[:, :, None] - positions[:, None, :]) ** 2).sum(axis=0)
+    three = np.sort(distance, axis=1)[:, 1:4]
+    return np.log(np.sqrt(np.maximum(three.mean(axis=1), 1e-7)))
+
+
+# %%
+j, i = np.mgrid[0 : camera.height, 0 : camera.width]
+lifted = backproject(camera, i.ravel().astype(float), j.ravel().astype(float), truth.depth[0].ravel())
+np.testing.assert_allclose(
+    lifted[:, 777], lift_text(i.flat[777], j.flat[777], truth.depth[0].flat[777], camera), rtol=1e-13
+)
+# projecting and lifting are inverse to each other, and the lifted depth is the sheet itself:
+np.testing.assert_allclose(
+    lifted, simulated.surface_point(truth.material_coordinates[0].reshape(2, -1), 0.0), atol=1e-8
+)
+turned = simulate(with_effects(tiny, "camera_motion")).sequence.cameras[3]
+np.testing.assert_allclose(
+    backproject(turned, np.array([7.0]), np.array([9.0]), np.array([50.0]))[:, 0],
+    lift_text(7, 9, 50.0, turned),
+    rtol=1e-13,
+)
+
+start = initialise(
+    sequence,
+    InitialisationConfig(first_frame_points=400, other_frame_points=0),
+    ModelConfig(),
+    np.random.default_rng(0),
+    np.float64,
+)
+np.testing.assert_allclose(start.log_scale, np.tile(log_scale_text(start.position), (3, 1)), rtol=1e-9, atol=1e-12)
+np.testing.assert_allclose(1 / (1 + np.exp(-start.opacity_logit)), 0.1, rtol=1e-12)
+colour = start.harmonics[0] * Y00 + 0.5
+assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
+
+# %% [markdown]
+# ## The reverse pass
+#
+# Nothing here is differentiated. What makes the start a good one is that lifting and projecting obey the same rule of pixel
+# centres; the pair that depends on it is the projection.
+
+# %%
+with one_thread():
+    report = check_pair(all_pairs()["projection_paper"], pair_stream("projection_paper", 2))
+print(table([report]))
+assert report.passed
+
+# %% [markdown]
+# ## Exercise
+#
+# Held-out frames contribute nothing to the start. How would you find out whether that is true of a program you cannot read?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. Change the held-out frames to anything, and see whether one bit of the result moves.
+import dataclasses
+
+spoiled = dataclasses.replace(sequence, images=sequence.images.copy(), depth=sequence.depth.copy())
+spoiled.images[sequence.test_index] = 7
+spoiled.depth[sequence.test_index] = 1e6
+few = InitialisationConfig(first_frame_points=300, other_frame_points=600, motion_threshold=1.0)
+one, other = (initialise(s, few, ModelConfig(), np.random.default_rng(3)) for s in (sequence, spoiled))
+assert all(np.array_equal(x, y) for x, y in zip(one[:8], other[:8]))
+lone = gaussians_at(np.zeros((3, 1)), np.full((3, 1), 0.5), ModelConfig(), np.float64)  # a single point gets the floor
+np.testing.assert_allclose(lone.log_scale, np.log(np.sqrt(1e-7)))
