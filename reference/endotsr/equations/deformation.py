@@ -107,90 +107,54 @@ def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str
             raise ValueError(f"{name}: expected {weight.dtype} {weight.shape}, got {array.dtype} {array.shape}")
 
 
-def _add_quartic(weight, centre, width, t, out):
-    """out += weight exp(-u^2) over one piece of a row."""
+def _basis_constants(real, quartic):
+    """What tells the bases apart: 2^(scale u v), v = u slope + constant; u is cut at `far`; factor of d/d centre."""
+    if quartic:
+        return real(-LOG2_E), real(1), real(0), real(LARGEST_U), real(4)
+    return real(-0.5 * LOG2_E), real(0), real(1), real(2 * LARGEST_U), real(1)
+
+
+_basis_constants_kernel = jit(_basis_constants)
+
+
+def _add_row(weight, centre, width, t, quartic, out):
+    """out += weight x basis value, over one piece of a row; u is (t - centre)^2 / S for either basis."""
     real = out.dtype.type
-    floor, far, cut, scale = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT), real(-LOG2_E)
+    floor, cut = real(WIDTH_FLOOR), real(SMALLEST_EXPONENT)
+    scale, slope, constant, far, _ = _basis_constants_kernel(real, quartic)
     for i in range(out.size):
         distance = t - centre[i]
         ratio = distance / (width[i] * width[i] + floor)
         u = distance * ratio
         u = far if u > far else u
-        exponent = scale * (u * u)
+        exponent = scale * (u * (u * slope + constant))
         value = exp2_nonpositive(exponent)
         out[i] += weight[i] * (real(0) if exponent < cut else value)
 
 
-def _add_gaussian(weight, centre, width, t, out):
-    """out += weight exp(-u) over one piece of a row."""
-    real = out.dtype.type
-    floor, far, cut = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT)
-    scale = real(-0.5 * LOG2_E)
-    for i in range(out.size):
-        distance = t - centre[i]
-        ratio = distance / (width[i] * width[i] + floor)
-        twice = distance * ratio
-        twice = real(2) * far if twice > real(2) * far else twice
-        exponent = scale * twice
-        value = exp2_nonpositive(exponent)
-        out[i] += weight[i] * (real(0) if exponent < cut else value)
-
-
-def _reverse_quartic(weight, centre, width, t, d_offset, d_weight, d_centre, d_width):
-    """Gradients of one piece of a row, quartic basis."""
+def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
+    """Gradients of one piece of a row."""
     real = d_offset.dtype.type
-    floor, far, cut, scale = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT), real(-LOG2_E)
+    floor, cut = real(WIDTH_FLOOR), real(SMALLEST_EXPONENT)
+    scale, slope, constant, far, factor = _basis_constants_kernel(real, quartic)
     for i in range(d_offset.size):
         distance = t - centre[i]
         inverse = real(1) / (width[i] * width[i] + floor)
         ratio = distance * inverse
         u = distance * ratio
         u = far if u > far else u
-        exponent = scale * (u * u)
+        v = u * slope + constant
+        exponent = scale * (u * v)
         value = exp2_nonpositive(exponent) * d_offset[i]
         value = real(0) if exponent < cut else value
         ratio = real(0) if exponent < cut else ratio
-        common = real(4) * weight[i] * value * u
+        common = factor * weight[i] * value * v
         d_weight[i] = value
         d_centre[i] = common * ratio
         d_width[i] = common * u * (width[i] * inverse)
 
 
-def _reverse_gaussian(weight, centre, width, t, d_offset, d_weight, d_centre, d_width):
-    """Gradients of one piece of a row, Gaussian basis."""
-    real = d_offset.dtype.type
-    floor, far, cut = real(WIDTH_FLOOR), real(LARGEST_U), real(SMALLEST_EXPONENT)
-    scale = real(-0.5 * LOG2_E)
-    for i in range(d_offset.size):
-        distance = t - centre[i]
-        inverse = real(1) / (width[i] * width[i] + floor)
-        ratio = distance * inverse
-        twice = distance * ratio
-        twice = real(2) * far if twice > real(2) * far else twice
-        exponent = scale * twice
-        value = exp2_nonpositive(exponent) * d_offset[i]
-        value = real(0) if exponent < cut else value
-        ratio = real(0) if exponent < cut else ratio
-        common = weight[i] * value
-        d_weight[i] = value
-        d_centre[i] = common * ratio
-        d_width[i] = common * twice * (width[i] * inverse)
-
-
-_add_quartic_row = jit(_add_quartic)
-_add_gaussian_row = jit(_add_gaussian)
-_reverse_quartic_row = jit(_reverse_quartic)
-_reverse_gaussian_row = jit(_reverse_gaussian)
-
-
-def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
-    """One piece of a row with either basis: the choice is made outside of the lane loop."""
-    if quartic:
-        _reverse_quartic_row(weight, centre, width, t, d_offset, d_weight, d_centre, d_width)
-    else:
-        _reverse_gaussian_row(weight, centre, width, t, d_offset, d_weight, d_centre, d_width)
-
-
+add_row = jit(_add_row)
 reverse_row = jit(_reverse_row)
 
 
@@ -207,10 +171,7 @@ def _forward(first, last, weight, centre, width, t, quartic, offsets):
             out[i] = weight.dtype.type(0)
         for j in range(bases):
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
-            if quartic:
-                _add_quartic_row(w, m, s, time, out)
-            else:
-                _add_gaussian_row(w, m, s, time, out)
+            add_row(w, m, s, time, quartic, out)
 
 
 def _reverse(first, last, weight, centre, width, t, quartic, d_offsets, d_weight, d_centre, d_width, row_sums):
