@@ -117,29 +117,25 @@ def _variation_reverse(first, stop, image, mask, weight, d_image):
     """Adds weight x (sign of the steps that end here - sign of the steps that start here) outside tissue."""
     height, width = mask.shape
     zero = image.dtype.type(0)
-    scratch = np.empty((3, width), image.dtype)
-    line, other, slope = scratch[0], scratch[1], scratch[2]
+    rows = np.empty((3, width + 2), image.dtype)  # with one more sample at either end
+    above, line, below = rows[0], rows[1], rows[2]
     for index in range(first, stop):
         channel, y = index // height, index % height
-        _outside_tissue(image[channel, y], mask[y], line)
-        slope[width - 1] = zero
-        for i in range(width - 1):
-            slope[i] = _sign(line[i] - line[i + 1])
-        for i in range(width - 1):
-            slope[i + 1] += _sign(line[i + 1] - line[i])
-        for neighbour in range(y - 1, y + 2, 2):
-            if 0 <= neighbour < height:
-                _outside_tissue(image[channel, neighbour], mask[neighbour], other)
-                for i in range(width):
-                    slope[i] += _sign(line[i] - other[i])
+        for k in range(3):
+            near = min(max(y + k - 1, 0), height - 1)  # beyond the border: the pixel itself, a step of 0
+            _outside_tissue(image[channel, near], mask[near], rows[k, 1:])
+        line[0], line[width + 1] = line[1], line[width]
         out, tissue = d_image[channel, y], mask[y]
         for i in range(width):
-            change = weight * slope[i]
+            own = line[i + 1]
+            slope = _sign(own - line[i]) + _sign(own - line[i + 2])
+            slope += _sign(own - above[i + 1]) + _sign(own - below[i + 1])
+            change = weight * slope
             out[i] += zero if tissue[i] else change
 
 
 def _outside_tissue(row, tissue, out):
-    for i in range(out.size):
+    for i in range(row.size):
         value = row[i]  # loaded before the choice, so that the loop is one select per lane
         out[i] = row.dtype.type(0) if tissue[i] else value
 
