@@ -64,7 +64,7 @@ unit_quaternion = jit(_unit_quaternion)
 def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
     real = quaternion.dtype.type
     one, two, limit = real(1), real(2), real(LOG_SCALE_LIMIT)
-    for i in range(first, stop):
+    for i in range(np.uintp(first), np.uintp(stop)):
         w, x, y, z, _ = unit_quaternion(quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i])
         rotation[0, 0, i] = one - two * (y * y + z * z)
         rotation[0, 1, i] = two * (x * y - w * z)
@@ -82,7 +82,7 @@ def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
 def _covariance_reverse(first, stop, quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
     real = quaternion.dtype.type
     two, limit = real(2), real(LOG_SCALE_LIMIT)
-    for i in range(first, stop):
+    for i in range(np.uintp(first), np.uintp(stop)):
         w, x, y, z, inverse_norm = unit_quaternion(
             quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i]
         )
