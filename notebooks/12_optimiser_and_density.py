@@ -153,7 +153,7 @@ N = 60
 gaussians = Gaussians(
     position=np.vstack([rng.uniform(-2, 2, (2, N)), rng.uniform(4, 5, N)]),
     quaternion=rng.normal(size=(4, N)),
-    log_scale=np.log(rng.uniform(0.04, 0.3, (3, N))),
+    log_scale=np.log(rng.uniform(0.04, 0.3, (3, N)) * np.where(np.arange(N) % 2, 1.0, 0.33)),
     opacity_logit=rng.uniform(-7, 2, N),
     harmonics=rng.normal(0, 0.5, (1, 3, N)),
 )
@@ -214,7 +214,7 @@ for name, label in (
 ):
     axes[0].semilogy(steps, [learning_rates(int(i), PAPER).get(name, np.nan) for i in steps], label=label)
 axes[0].axvspan(500, 4000, color="0.93", label="density control")
-axes[0].set(title="learning rates, preset paper", xlabel="iteration", ylim=(1e-6, 0.2))
+axes[0].set(title="learning rates, preset paper", xlabel="iteration", ylim=(3e-8, 0.2))
 axes[0].legend(fontsize=7, loc="lower left", ncols=2)
 circle = np.stack([np.cos(np.linspace(0, 2 * np.pi, 40)), np.sin(np.linspace(0, 2 * np.pi, 40))])
 
