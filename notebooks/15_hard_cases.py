@@ -1,0 +1,343 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 15. Hard cases
+#
+# Correct on random input is not correct. Each section below is an input that a plausible program gets wrong, named after the
+# mistake, with what must come out. It ends with the question that matters most: could our gradient check have failed?
+#
+# Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears once more, because its **form** is what saves the first case.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.checking import (
+    all_pairs,
+    check_function,
+    check_pair,
+    check_precision,
+    one_thread,
+    pair_stream,
+    summary,
+    table,
+)
+from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.similarity import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import Scene, render_forward, render_reverse
+from endotsr.splatting.settings import EXACT, PAPER
+
+rng = np.random.default_rng(15)
+Y00 = 0.28209479177387814
+
+
+def made(position, log_scale=-2.0, logit=1.0, colour=0.7, quaternion=(1, 0, 0, 0), dtype=np.float64):
+    """Gaussians at given places (3, N); the rest one value for all, or one per Gaussian."""
+    position = np.asarray(position, dtype)
+    n = position.shape[1]
+    rgb = np.broadcast_to(np.asarray(colour, dtype), (3, n))
+    return Scene(
+        position,
+        np.repeat(np.array(quaternion, dtype)[:, None], n, axis=1),
+        np.broadcast_to(
+            np.asarray(log_scale, dtype).reshape(-1, 1) if np.ndim(log_scale) == 1 else dtype(log_scale), (3, n)
+        ).copy(),
+        np.broadcast_to(np.asarray(logit, dtype), n).copy(),
+        ((rgb - dtype(0.5)) / dtype(Y00))[None].copy(),
+    )
+
+
+def render(scene, camera, settings=EXACT, **more):
+    return render_forward(scene, camera, settings, degree=0, **more)
+
+
+small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
+
+# %% [markdown]
+# ## The needle: digits lost in the inverse matrix
+#
+# Seen at an angle, a needle 1000 pixels long has $a\approx b\approx c\approx5\cdot10^5$. The textbook writes
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$: a difference of numbers near $10^{12}$, divided by $3\cdot10^5$, that should give 1. The specification writes a sum of
+# squares:
+#
+# $$
+# \begin{aligned}
+# \eta&=d_x-m\,d_y,\\
+# q&=r\,d_y^2+A\,\eta^2=\frac{d_y^2}{c}+\frac{c}{\det}\Bigl(d_x-\frac bc\,d_y\Bigr)^2,\\
+# \alpha&=\min\bigl(\alpha_{\max},\ o\,e^{-q/2}\bigr).
+# \end{aligned}
+# $$
+
+
+# %% tags=["transcription"]
+def alpha_text(d_x, d_y, a, b, c, det, o):
+    m, r, A = b / c, 1 / c, c / det
+    eta = d_x - m * d_y
+    q = r * d_y**2 + A * eta**2
+    return np.minimum(1, o * np.exp(-q / 2))
+
+
+def textbook(d_x, d_y, a, b, c, det, o):
+    q = (c * d_x**2 - 2 * b * d_x * d_y + a * d_y**2) / det
+    return np.minimum(1, o * np.exp(-q / 2))
+
+
+# %%
+wide = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, -700.0, -700.0, 300, 300)  # its centre is 700 px off the image
+half_turn = (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))
+needle = dict(position=[[0.0], [0.0], [1.0]], log_scale=np.log([10.0, 1e-3, 1e-3]), logit=2.0, quaternion=half_turn)
+double, saved = render(made(**needle), wide)
+single, saved_32 = render(made(**needle, dtype=np.float32), wide)
+a, b, c = saved.projected.covariance2d[:, 0]
+det, o = saved.projected.determinant[0], 1 / (1 + np.exp(-2.0))
+along = np.arange(300)
+d = along + 0.5 - saved.projected.mean2d[:, :1]  # the pixels of the diagonal, which lie on the needle
+truth = double.opacity[along, along]
+np.testing.assert_allclose(truth, alpha_text(*d, a, b, c, det, o), rtol=1e-9)
+parts_32 = [np.float32(x) for x in (*saved_32.projected.covariance2d[:, 0], saved_32.projected.determinant[0], o)]
+lost = textbook(*d.astype(np.float32), *parts_32)
+np.testing.assert_allclose(single.opacity[along, along], truth, rtol=2e-3)
+print(
+    "endotsr in float32:",
+    np.abs(single.opacity[along, along] / truth - 1).max(),
+    " textbook:",
+    np.abs(lost / truth - 1).max(),
+)
+assert np.abs(lost / truth - 1).max() > 0.01
+
+# %% [markdown]
+# ## Equal depths: an order that depends on chance
+#
+# Stereo depth is often a whole number, so ties are common. Equal $z$ keep the order of their index. Distinct $z$: the order of the
+# input does not matter, bit by bit.
+
+# %%
+tie = made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+middle = render(tie, small)[0].colour[:, 6, 8]
+assert middle[0] > middle[2], "index 0 is in front"
+many = made(np.vstack([rng.uniform(-1, 1, (2, 30)), rng.uniform(2, 4, 30)]), colour=rng.uniform(0, 1, (3, 30)))
+shuffle = rng.permutation(30)
+shuffled = Scene(*(part[..., shuffle].copy() for part in many[:5]))
+assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].colour)
+
+# %% [markdown]
+# **Crossing depths.** Two Gaussians pass each other in depth: the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$, and no derivative sees it.
+# That is why the checker refuses differences across a change of order.
+
+
+# %%
+def crossing(gap):
+    return render(made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0 + gap]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]), small)
+
+
+(before, stage), (after, _) = crossing(1e-9), crossing(-1e-9)
+alpha = (1 / (1 + np.exp(-1.0))) * np.exp(-0.5 * (0.25 + 0.25) / stage.projected.covariance2d[0, 0])
+jump = before.colour[:, 6, 8] - after.colour[:, 6, 8]
+np.testing.assert_allclose(jump, alpha**2 * np.array([1.0, 0.0, -1.0]), atol=1e-6)
+
+# %% [markdown]
+# ## Behind the camera, on the near plane, at the camera
+#
+# No contribution, gradients exactly 0, and the image bitwise that of the scene without them. Not "very small": exactly.
+
+# %%
+plain = made([[0.1], [0.0], [2.0]])
+for z in (-1.0, 0.0, 1e-300, PAPER.near):
+    both = made([[0.1, 0.0], [0.0, 0.0], [2.0, z]])
+    out, saved = render(both, small, PAPER)
+    assert np.array_equal(out.colour, render(plain, small, PAPER)[0].colour)
+    grads = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), None, saved)
+    assert not any(
+        np.any(getattr(grads, name)[..., 1]) for name in ("position", "quaternion", "log_scale", "opacity_logit")
+    )
+
+# %% [markdown]
+# ## Nothing at all
+#
+# No Gaussians, or an image of one pixel: the background, and no gradient to anything.
+
+# %%
+nothing = made(np.zeros((3, 0)))
+out, saved = render(nothing, small._replace(width=1, height=1), background=np.array([0.1, 0.2, 0.3]))
+assert out.colour.ravel().tolist() == [0.1, 0.2, 0.3] and out.depth.item() == 0
+assert render_reverse(out.colour, out.depth, None, saved).position.shape == (3, 0)
+
+# %% [markdown]
+# ## Two thousand faint sheets
+#
+# Equal sheets of opacity $\alpha$ in colour $c$: the image must be $c\,(1-E)$ with $E=(1-\alpha)^n$. The opacity image is the **sum** of
+# weights: formed as $1-T_n$ it would be 0 in float32 for one sheet of $\alpha=10^{-8}$.
+
+# %%
+n, faint = 2000, 1e-3
+sheets = made(
+    np.vstack([np.zeros((2, n)), np.linspace(2, 3, n)]), log_scale=8.0, logit=np.log(faint / (1 - faint)), colour=0.8
+)
+value = render(sheets, small)[0].colour[0, 6, 8]
+expected = 0.8 * -np.expm1(n * np.log1p(-faint))
+np.testing.assert_allclose(value, expected, rtol=1e-5)
+one_sheet = made([[0.0], [0.0], [2.0]], log_scale=8.0, logit=np.log(1e-8), dtype=np.float32)
+assert render(one_sheet, small)[0].opacity[6, 8] > 0.99e-8
+
+# %% [markdown]
+# ## NaN under the instrument, and an empty level
+#
+# What lies under the mask is selected away, never multiplied: $0\cdot\mathrm{NaN}$ is NaN. And a mask so full that a level of the
+# pyramid has no valid value gives that level loss 0, not a mean of nothing.
+
+# %%
+image, observed = rng.uniform(size=(3, 40, 48)), rng.uniform(size=(3, 40, 48))
+mask = np.ones((40, 48), bool)
+mask[5:30, 20:31] = False
+depth, prior = rng.uniform(40, 60, mask.shape), rng.uniform(40, 60, mask.shape)
+depth[0, 0], prior[0, 0] = 70, 70  # the maxima of the whole image are on tissue
+
+
+def losses(image, observed, prior):
+    target, supports = ssim_target(observed, mask), support_masks(mask)
+    l1, l1_saved = masked_l1_forward(image, observed, mask)
+    ssim, ssim_saved = masked_ssim_forward(image, target)
+    lap, lap_saved = laplacian_loss_forward(image, observed, supports)
+    d, d_saved = normalised_depth_forward(depth, depth_target(prior, mask))
+    values = (l1, ssim, lap, d)
+    return values, [
+        masked_l1_reverse(1.0, l1_saved),
+        masked_ssim_reverse(1.0, ssim_saved),
+        laplacian_loss_reverse(1.0, lap_saved),
+        normalised_depth_reverse(1.0, d_saved),
+    ]
+
+
+clean_values, clean = losses(image, observed, prior)
+for poison in (np.nan, np.inf, 1e300):
+    values, grads = losses(*(np.where(mask, x, poison) for x in (image, observed)), np.where(mask, prior, np.nan))
+    assert values == clean_values and all(np.array_equal(x, y) for x, y in zip(grads, clean))
+
+slit = np.zeros((40, 48), bool)
+slit[:, 20:31] = True
+supports = support_masks(slit)
+print("valid values per level:", supports.counts)
+assert supports.counts[0] > 0 and supports.counts[2] == 0
+loss, saved = laplacian_loss_forward(image, observed, supports)
+assert np.isfinite(loss) and np.isfinite(laplacian_loss_reverse(1.0, saved)).all()
+
+# %% [markdown]
+# ## The same scene in metres, millimetres, micrometres
+#
+# A number with a unit hidden in the code (a fixed near plane, an epsilon added to $z$) shows when the unit changes.
+
+# %%
+reference = render(many, small, PAPER)[0]
+for factor in (1e-3, 1e3):
+    scaled = many._replace(position=many.position * factor, log_scale=many.log_scale + np.log(factor))
+    again = render(scaled, small, PAPER._replace(near=PAPER.near * factor))[0]
+    np.testing.assert_allclose(again.colour, reference.colour, atol=1e-11)
+    np.testing.assert_allclose(again.depth, reference.depth * factor, rtol=1e-9, atol=1e-9 * factor)
+
+# %% [markdown]
+# ## A picture of three of them
+
+# %%
+figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.7), layout="constrained")
+axes[0].plot(along, truth, color="0.7", lw=5, label="float64")
+axes[0].plot(along, lost, color="tab:red", lw=0.8, label="textbook form, float32")
+axes[0].plot(along, single.opacity[along, along], color="tab:green", lw=1.2, label="endotsr, float32")
+axes[0].set(title="$\\alpha$ along a needle of 1000 px", xlabel="pixel on the diagonal", ylim=(0, 1))
+axes[0].legend(fontsize=8, loc="upper right")
+gaps = np.linspace(-0.4, 0.4, 81)
+seen = np.array([crossing(gap)[0].colour[:, 6, 8] for gap in gaps])
+for channel, colour in ((0, "tab:red"), (2, "tab:blue")):
+    axes[1].plot(gaps, np.where(np.abs(gaps) < 1e-9, np.nan, seen[:, channel]), color=colour)
+axes[1].set(title="two Gaussians pass in depth: a jump", xlabel="$z_1-z_0$", ylabel="colour of the pixel")
+counts = np.unique(np.geomspace(1, 2000, 25).astype(int))
+for alpha_one, colour in ((1e-3, "tab:blue"), (1e-2, "tab:orange"), (0.1, "tab:green")):
+    stack = [
+        render(
+            made(
+                np.vstack([np.zeros((2, k)), np.linspace(2, 3, k)]),
+                log_scale=8.0,
+                logit=np.log(alpha_one / (1 - alpha_one)),
+                colour=0.8,
+            ),
+            small,
+        )[0].colour[0, 6, 8]
+        for k in counts
+    ]
+    axes[2].semilogx(counts, stack, "o", color=colour, ms=4, label=f"$\\alpha={alpha_one:g}$")
+    axes[2].semilogx(counts, 0.8 * -np.expm1(counts * np.log1p(-alpha_one)), color=colour, lw=1)
+axes[2].set(title="equal sheets: dots render, lines $c\\,(1-(1-\\alpha)^n)$", xlabel="number of sheets $n$")
+axes[2].legend(fontsize=8)
+# %% [markdown]
+# ## The reverse pass: a check that can fail
+#
+# We hand the checker a right reverse pass, and then four wrong ones: a flipped sign, one part in a thousand too much, a zero
+# gradient, one Gaussian forgotten. It must refuse all four, and say where.
+
+# %%
+pair = all_pairs()["matern_penalty"]
+inputs = pair.inputs(pair_stream("matern_penalty", 0))
+
+
+def forgetful(gradient):
+    gradient = gradient.copy()
+    gradient[..., 2] = 0
+    return gradient
+
+
+wrong = {
+    "right": lambda g: g,
+    "sign": lambda g: -g,
+    "factor 1.001": lambda g: 1.001 * g,
+    "zero": lambda g: 0 * g,
+    "one forgotten": forgetful,
+}
+with one_thread():
+    for name, damage in wrong.items():
+        report = check_function(
+            pair.forward,
+            lambda i, up, damage=damage: {key: damage(g) for key, g in pair.reverse(i, up).items()},
+            inputs,
+            hard={"motion_coefficients": np.arange(inputs["motion_coefficients"].size)},
+        )
+        print(f"{name:14s} {'accepted' if report.passed else 'refused: ' + report.failures[0][:90]}")
+        assert report.passed == (name == "right")
+
+# %% [markdown]
+# And the whole render, in float64 against differences and in float32 against float64:
+
+# %%
+with one_thread():
+    report = check_pair(all_pairs()["render_rows"], pair_stream("render_rows", 0))
+    precision = check_precision(all_pairs()["render_rows"], pair_stream("render_rows", 0))
+print(table([report], [precision]))
+print(summary([report], [precision]))
+assert report.passed and precision.passed
+
+# %% [markdown]
+# ## Exercise
+#
+# A quaternion of exactly 0 is not a rotation. The deformation model can reach it, because it adds to the raw quaternion. What
+# should the image be, and the gradient? And why is "add a small epsilon to the norm" a worse answer?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The identity rotation and no gradient: a defined result. With an epsilon the "rotation" matrix shrinks to something that is
+# no rotation (R = 1 - 2(y^2 + z^2) with a q that is too short), for every short quaternion and not only for 0.
+identity, zero = (
+    made([[0.0], [0.0], [2.0]], log_scale=[-1.0, -2.0, -1.5], quaternion=q) for q in ((1, 0, 0, 0), (0, 0, 0, 0))
+)
+(one, _), (two, saved) = render(identity, small), render(zero, small)
+assert np.array_equal(one.colour, two.colour)
+assert not render_reverse(np.ones_like(two.colour), np.ones_like(two.depth), None, saved).quaternion.any()
