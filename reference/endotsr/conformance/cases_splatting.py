@@ -206,7 +206,7 @@ def _composite() -> list[Spec]:
         f"d_{name}" for name in ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "background")
     )
     out.append(Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha exactly at 1/255: each may be drawn or not",
-                    ("cutoff_missing", "cutoff_1_over_256"), paper, inputs, ("opacity_logit", "mean2d", "covariance2d"),
+                    ("cutoff_missing",), paper, inputs, ("opacity_logit", "mean2d", "covariance2d"),
                     reverse, 5))  # fmt: skip
     return out
 

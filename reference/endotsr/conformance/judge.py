@@ -81,12 +81,17 @@ def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5
 
     again   a second folder of the same port: level 5 then also asks for the same bits everywhere
     """
-    reports = [_case(golden, case, outputs, precision, level) for case in golden.cases if case.level <= level]
+    reports = [judge_case(golden, case, outputs, precision, level) for case in golden.cases if case.level <= level]
     notes = []
     if again is not None and level >= 5:
         reports.append(_repeated(golden, outputs, again))
     elif level >= 5:
         notes.append("level 5: only the determinism cases; a second run (--again) compares all outputs bit by bit")
+    return conclude(golden, reports, precision, level, notes)
+
+
+def conclude(golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str]) -> Report:
+    """Levels, claim and suspects from the verdicts on all cases."""
     counts = {k: _count(reports, k) for k in LEVELS if k <= level}
     reached = -1
     for k, (good, asked) in counts.items():
@@ -105,7 +110,8 @@ def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
     return sum(o.status == "passed" for o in all_of), len(all_of)
 
 
-def _case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int) -> CaseReport:
+def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int = 5) -> CaseReport:
+    """The verdict on one case; nothing in `outputs` can make this raise."""
     folder = outputs / case.family / case.case
     found: list[OutputReport] = []
     looks: dict[str, float] = {}

@@ -87,8 +87,11 @@ def answer_all(golden: Golden, outputs: Path, precision: Precision) -> int:
     return len(golden.cases)
 
 
-def answer_wrongly(golden: Golden, outputs: Path, negative: Negative) -> int:
-    """The outputs of a wrong port in float64; returns how many cases it spoils. Right answers are the expected ones."""
+def answer_wrongly(golden: Golden, outputs: Path, negative: Negative, *, spoiled_only: bool = False) -> int:
+    """The outputs of a wrong port in float64; returns how many cases it spoils. Right answers are the expected ones.
+
+    spoiled_only   write no case that the mistake leaves alone
+    """
     operations, spoiled = all_operations(), 0
     for case in golden.cases:
         operation, inputs = operations[case.operation], _inputs(golden, case)
@@ -99,6 +102,8 @@ def answer_wrongly(golden: Golden, outputs: Path, negative: Negative) -> int:
 
         wrong = answer(negative, case.operation, WrongRequest(inputs, case.settings, run, right))
         spoiled += wrong is not None
+        if wrong is None and spoiled_only:
+            continue
         for name, value in (wrong or right).items():
             write_npy(outputs / case.name / f"{name}.npy", value)
     return spoiled

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.conformance.cases import Spec
-from endotsr.conformance.compare import fingerprint, largest
+from endotsr.conformance.compare import distances, fingerprint, largest
 from endotsr.conformance.format import Array, Because, Case, Mistake, Output, Rule, Truth
 from endotsr.conformance.generator import signs
 from endotsr.conformance.negative import Negative, Request, answer
@@ -175,10 +175,12 @@ def _mistakes(
         wrong = answer(negative, operation.name, Request(inputs, spec.settings, run, expected))
         if wrong is None:
             continue
-        shown = [(_size(wrong[name], expected[name], rules[name]), name) for name in expected]
-        (ratio, name) = max(shown)
-        if ratio >= MARGIN:
-            found[negative.name] = _mistake(name, wrong[name], expected[name], rules[name])
+        sizes = {name: _size(wrong[name], expected[name], rules[name]) for name in expected}
+        shown = [name for name in expected if sizes[name] >= MARGIN]
+        if shown:
+            made = {name: _mistake(name, wrong[name], expected[name], rules[name]) for name in shown}
+            best = max(shown, key=lambda name: (made[name].distance is not None, sizes[name]))
+            found[negative.name] = made[best]
     missing = [flag for flag in spec.flags if flag not in found]
     if missing:
         raise ValueError(f"{spec.name}: does not show {', '.join(missing)}")
@@ -192,7 +194,7 @@ def _size(wrong: NDArray, right: NDArray, rule: Rule) -> float:
     if rule.kind == "identical":
         return math.inf if (wrong != right).any() else 0.0
     if rule.kind == "band":
-        off = np.abs(wrong - right) / max(np.abs(right).max(), 1e-300)
+        off = distances(wrong, right, rule.scale)
         many = int((off > rule.float32).sum())
         return float(off.max() / rule.float32) if many > 10 * rule.flips or off.max() > 10 * rule.flip_size else 0.0
     return largest(wrong, right, rule.scale) / rule.float32

@@ -1,5 +1,6 @@
 """The folder `golden/`: where it is, how it is written, how it is read and checked."""
 
+import functools
 import hashlib
 import json
 import platform
@@ -40,7 +41,13 @@ class Golden(NamedTuple):
 
     def array(self, case: Case, file: str) -> NDArray:
         """An input or an expected output by its path within the case."""
-        return read_plain(self.folder / "cases" / case.family / case.case / file)
+        return _loaded(self.folder / "cases" / case.family / case.case / file)
+
+
+@functools.cache
+def _loaded(path: Path) -> NDArray:
+    """Read once; the array cannot be written to."""
+    return read_plain(path)
 
 
 def golden_folder(given: Path | None = None) -> Path:

@@ -1,0 +1,104 @@
+"""The reference goes through the doors of a port: a folder of outputs, and a command called with requests."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from endotsr.commands.golden import run
+from endotsr.conformance.judge import judge
+from endotsr.conformance.npy import npy_bytes, read_plain
+from endotsr.conformance.port import answer_all
+from endotsr.conformance.store import golden_folder, read_golden
+from endotsr.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(golden_folder())
+
+
+@pytest.fixture(scope="module", params=["float64", "float32"])
+def answered(request, golden, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    answer_all(golden, folder, request.param)
+    return request.param, folder
+
+
+def test_the_reference_passes_every_level(golden, answered):
+    precision, folder = answered
+    report = judge(golden, folder, precision, again=folder)
+    refused = [(c.name, o.name, o.reason) for c in report.cases for o in c.outputs if o.status != "passed"]
+    assert report.passed and not refused, refused[:5]
+    assert report.claim == f"golden {golden.short_version}, level 5, {precision}"
+
+
+def test_single_precision_does_not_pass_as_double(golden, answered):
+    precision, folder = answered
+    report = judge(golden, folder, "float64")
+    assert report.passed == (precision == "float64")
+
+
+def test_the_claim_is_the_highest_complete_level(golden, answered, tmp_path):
+    precision, folder = answered
+    name = "d_omega.npy"
+    path = folder / "dictionary" / "generic" / name
+    kept = path.read_bytes()
+    try:
+        path.write_bytes(npy_bytes(-read_plain(path)))
+        report = judge(golden, folder, precision)
+        assert report.level == 1 and not report.passed and judge(golden, folder, precision, level=1).passed
+    finally:
+        path.write_bytes(kept)
+
+
+def test_bits_that_change_between_runs_stop_level_5(golden, answered, tmp_path):
+    precision, folder = answered
+    if precision == "float64":
+        report = judge(golden, folder, precision, again=tmp_path)
+        assert report.level == 4
+
+
+def test_exit_codes_and_report_files(golden, answered, tmp_path, capsys):
+    precision, folder = answered
+    words = ["judge", str(folder), "--precision", precision]
+    page, data = tmp_path / "r.html", tmp_path / "r.json"
+    assert run([*words, "--html", str(page), "--json", str(data)]) == 0
+    assert f"level 5, {precision}" in capsys.readouterr().out
+    assert page.read_text().startswith("<!doctype html>") and data.stat().st_size > 1000
+    assert run(["judge", str(tmp_path)]) == 1
+    with pytest.raises(InputError):
+        run(["judge", str(tmp_path / "nothing")])
+    with pytest.raises(InputError):
+        run(["judje"])
+
+
+def test_a_command_is_called_with_requests_alone(golden, tmp_path, capsys):
+    port = f"{sys.executable} -m endotsr.cli golden reference {{outputs}} --requests {{requests}}"
+    code = run(["run", "--port", port, "--level", "2", "--precision", "float32", "--keep", str(tmp_path)])
+    assert code == 0 and "level 2, float32" in capsys.readouterr().out
+    assert not list((tmp_path / "requests").rglob("expected*"))
+    request = (tmp_path / "requests" / "motion" / "generic" / "request.json").read_text()
+    assert "compare" not in request and "mistakes" not in request
+
+
+def test_a_port_that_fails_gets_verdicts(tmp_path, capsys):
+    assert run(["run", "--port", f"{sys.executable} -c 1/0 {{requests}} {{outputs}}", "--level", "0"]) == 1
+    assert "ended with code 1" in capsys.readouterr().out
+    with pytest.raises(InputError, match="requests"):
+        run(["run", "--port", "true"])
+    with pytest.raises(InputError, match="started"):
+        run(["run", "--port", "no-such-program {requests} {outputs}"])
+
+
+def test_difference_images_stand_in_the_page(golden, answered, tmp_path):
+    precision, folder = answered
+    path = folder / "render" / "paper" / "colour_image.npy"
+    kept = path.read_bytes()
+    try:
+        path.write_bytes(npy_bytes(np.array(read_plain(path)[:, ::-1])))
+        page = tmp_path / "page.html"
+        assert run(["judge", str(folder), "--precision", precision, "--html", str(page)]) == 1
+        assert page.read_text().count("data:image/png;base64,") == 3
+    finally:
+        path.write_bytes(kept)

@@ -1,0 +1,173 @@
+"""The vectors themselves: complete, small, rebuilt from their recipes, and every changed byte is noticed."""
+
+import re
+import shutil
+
+import msgspec
+import numpy as np
+import pytest
+
+from endotsr.checking import all_pairs
+from endotsr.conformance.cases import all_operations
+from endotsr.conformance.format import SCHEMAS, schema_text
+from endotsr.conformance.generate import check, moved, solve_all
+from endotsr.conformance.generator import fnv1a, single, words
+from endotsr.conformance.npy import npy_bytes
+from endotsr.conformance.solve import MARGIN
+from endotsr.conformance.store import golden_folder, read_golden
+from endotsr.errors import InputError
+
+FOLDER = golden_folder()
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(FOLDER)
+
+
+def test_the_folder_equals_a_fresh_computation():
+    lines, summary = check(FOLDER, bitwise=False)
+    assert not lines, (summary, lines[:10])
+
+
+def test_every_registered_pair_has_a_case(golden):
+    assert {pair for case in golden.cases for pair in case.pairs} >= set(all_pairs())
+    assert {case.operation for case in golden.cases} == set(all_operations())
+    assert {o.level for case in golden.cases for o in case.outputs.values()} == {0, 1, 2, 3, 4, 5}
+
+
+def test_the_choices_of_the_method_are_all_there(golden):
+    def chosen(*keys):
+        found = set()
+        for case in golden.cases:
+            value = case.settings
+            for key in keys:
+                value = value.get(key) if isinstance(value, dict) else None
+            found.add(value)
+        return found - {None}
+
+    assert chosen("basis") == {"quartic", "gaussian"}
+    assert chosen("upsampling") == chosen("loss", "upsampling") == {"co_sited", "half_pixel"}
+    assert chosen("degree") == {0, 1, 2, 3}
+    assert chosen("raster", "support") == {"everywhere", "ellipse", "three_sigma_tiles"}
+
+
+def test_the_folder_is_small():
+    assert sum(p.stat().st_size for p in FOLDER.rglob("*") if p.is_file()) < 10_000_000
+
+
+def test_raw_reading_needs_no_header(golden):
+    for entry in golden.manifest.files:
+        if entry.offset is None:
+            continue
+        raw = (FOLDER / entry.path).read_bytes()[entry.offset :]
+        assert entry.dtype is not None and entry.shape is not None
+        array = np.frombuffer(raw, entry.dtype).reshape(entry.shape)
+        assert npy_bytes(array) == (FOLDER / entry.path).read_bytes()
+
+
+def test_numpy_reads_the_files_to_the_same_arrays(golden):
+    for case in golden.cases[::7]:
+        for name, output in case.outputs.items():
+            path = FOLDER / "cases" / case.name / output.file
+            loaded = np.load(path, allow_pickle=False)
+            assert np.array_equal(loaded, golden.array(case, output.file)), name
+
+
+def test_real_inputs_are_float32_numbers(golden):
+    for case in golden.cases:
+        for array in case.inputs.values():
+            value = golden.array(case, array.file)
+            if array.dtype == "real":
+                assert np.array_equal(value, single(value)), (case.name, array.file)
+
+
+def test_uniform_inputs_are_rebuilt_with_integers_alone(golden):
+    """The generator written once more, in Python integers, from the text of the README."""
+    rebuilt = 0
+    for case in golden.cases:
+        for array in case.inputs.values():
+            recipe = re.fullmatch(r"uniform\((.+), (.+)\) seed (\S+)", array.recipe)
+            if not recipe:
+                continue
+            seed = 0xCBF29CE484222325
+            for byte in recipe[3].encode():
+                seed = (seed ^ byte) * 0x100000001B3 % 2**64
+            value, low, high = [], float(recipe[1]), float(recipe[2])
+            for k in range(int(np.prod(array.shape))):
+                z = (seed + (k + 1) * 0x9E3779B97F4A7C15) % 2**64
+                z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9 % 2**64
+                z = (z ^ z >> 27) * 0x94D049BB133111EB % 2**64
+                z ^= z >> 31
+                value.append(low + (high - low) * ((z >> 40) / 2**24))
+            wanted = np.float32(np.array(value)).reshape(array.shape)
+            assert np.array_equal(golden.array(case, array.file), wanted), (case.name, array.file)
+            rebuilt += 1
+    assert rebuilt > 100
+
+
+def test_first_words_of_splitmix64():
+    """Published first outputs of splitmix64 for seed 1234567."""
+    assert words(1234567, 3).tolist() == [6457827717110365317, 3203168211198807973, 9817491932198370423]
+    assert fnv1a("a") == 0xAF63DC4C8601EC8C
+
+
+def test_tolerances_lie_far_below_the_mistakes(golden):
+    for case in golden.cases:
+        for flag, mistake in case.mistakes.items():
+            rule = case.outputs[mistake.output].compare
+            if rule.kind == "relative" and mistake.distance is not None:
+                assert mistake.distance >= 0.99 * MARGIN * rule.float32, (case.name, flag)
+        for name, output in case.outputs.items():
+            if output.because is not None:
+                assert output.compare.float32 >= output.because.spread_float32, (case.name, name)
+                assert output.compare.float64 >= output.because.spread_float64, (case.name, name)
+
+
+def test_schemas_describe_the_files():
+    for name, kind in SCHEMAS.items():
+        assert (FOLDER / "schemas" / f"{name}.schema.json").read_text() == schema_text(kind)
+    assert "$ref" in schema_text(SCHEMAS["case"]) and msgspec.json.decode(schema_text(SCHEMAS["case"]))
+
+
+@pytest.fixture
+def copy(tmp_path):
+    target = tmp_path / "golden"
+    shutil.copytree(FOLDER, target)
+    return target
+
+
+def test_one_changed_byte_is_noticed(copy):
+    for entry in read_golden(copy, verify=False).manifest.files[::97]:
+        path = copy / entry.path
+        data = bytearray(path.read_bytes())
+        data[-1] ^= 1
+        path.write_bytes(data)
+        with pytest.raises(InputError, match="checksum"):
+            read_golden(copy)
+        data[-1] ^= 1
+        path.write_bytes(data)
+    read_golden(copy)
+
+
+def test_a_missing_file_is_noticed(copy):
+    (copy / "cases/motion/generic/expected/translation.npy").unlink()
+    with pytest.raises(InputError, match="incomplete"):
+        read_golden(copy)
+
+
+def test_regeneration_says_what_moved(copy):
+    one = next(s for s in solve_all() if s.case.name == "motion/generic")
+    assert moved(copy, one) == []
+    path = copy / "cases/motion/generic/expected/translation.npy"
+    path.write_bytes(npy_bytes(one.expected["translation"] * 1.001))
+    (line,) = moved(copy, one)
+    assert line.startswith("motion/generic/translation: ") and "e-0" in line and "tolerance" not in line
+
+
+def test_writing_ends_with_exit_code_1(copy):
+    from endotsr.commands.golden import run
+
+    (copy / "cases/motion/generic/expected/translation.npy").unlink()
+    assert run(["generate", "--golden", str(copy), "--write"]) == 1
+    assert run(["generate", "--golden", str(copy)]) == 0
