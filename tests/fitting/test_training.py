@@ -342,3 +342,14 @@ def test_a_nan_parameter_in_the_middle_of_a_run_never_crashes_the_kernels(name, 
         training_step(state, workshop(sequence, settings()))
     except FloatingPointError as error:
         assert "iteration 31" in str(error)
+
+
+def test_a_checkpoint_never_replaces_a_good_one_by_numbers_that_are_not_finite(finished, tmp_path):
+    state = copy.deepcopy(finished[2][30])
+    path = tmp_path / "checkpoint.npz"
+    save_state(path, state, settings())
+    good = path.read_bytes()
+    state.gaussians.fdm_centre[4, 1, 2] = np.nan
+    with pytest.raises(FloatingPointError, match=r"fdm_centre\[4, 1, 2\] is nan; the last checkpoint is kept"):
+        save_state(path, state, settings())
+    assert path.read_bytes() == good and list(tmp_path.iterdir()) == [path]

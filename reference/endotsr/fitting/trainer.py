@@ -127,7 +127,15 @@ def new_training(sequence: Sequence, config: Config) -> TrainingState:
 
 
 def save_state(path: Path, state: TrainingState, config: Config) -> None:
-    """Write a checkpoint, atomically. Raises OSError (the previous one is then intact)."""
+    """Write a checkpoint, atomically.
+
+    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (its Gaussian would
+            only vanish from the picture). The previous checkpoint is then intact.
+    """
+    try:
+        check_finite(arrays(state.gaussians))
+    except ValueError as error:
+        raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
     header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap}
     generator = dict(state.rng.bit_generator.state)
     save_checkpoint(path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header)
