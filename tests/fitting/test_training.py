@@ -350,6 +350,6 @@ def test_a_checkpoint_never_replaces_a_good_one_by_numbers_that_are_not_finite(f
     save_state(path, state, settings())
     good = path.read_bytes()
     state.gaussians.fdm_centre[4, 1, 2] = np.nan
-    with pytest.raises(FloatingPointError, match=r"fdm_centre\[4, 1, 2\] is nan; the last checkpoint is kept"):
+    with pytest.raises(FloatingPointError, match=r"fdm_centre\[4, 1, 2\] is nan: .* the last checkpoint is kept"):
         save_state(path, state, settings())
     assert path.read_bytes() == good and list(tmp_path.iterdir()) == [path]
