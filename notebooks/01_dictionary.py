@@ -102,6 +102,7 @@ def folded_text(p):
     r = p - np.round(p)
     k = np.round(4 * r)
     delta = r - k / 4
+    assert abs(r) <= 1 / 2 and abs(delta) <= 1 / 8
     s, c = np.sin(2 * np.pi * delta), np.cos(2 * np.pi * delta)
     return {0: (s, c), 1: (c, -s), 2: (-s, -c), 3: (-c, s)}[int(k) % 4]
 

@@ -52,7 +52,7 @@ C_3d, C_3e = np.sqrt(7 / (16 * np.pi)), np.sqrt(105 / (16 * np.pi))
 def Y_text(x, y, z):
     return np.array(
         [
-            C_0 + 0 * x,
+            np.full_like(x, C_0),
             -C_1 * y,
             C_1 * z,
             -C_1 * x,

@@ -140,9 +140,15 @@ def images_text(scene, settings):
 
 
 # %%
-for settings in (PAPER, EXACT):
-    out, _ = composite(scene, settings)
-    for found, text in zip(out, images_text(scene, settings)):
+opaque = scene | {"logit": np.full(N, 7.0)}  # so opaque that some pixels end early
+assert any(
+    len(pixel_text(x, y, opaque, PAPER)[0]) < len(pixel_text(x, y, opaque, EXACT)[0])
+    for x in range(5, 12)
+    for y in range(5, 9)
+)
+for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
+    out, _ = composite(some, settings)
+    for found, text in zip(out, images_text(some, settings)):
         np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-13)
 
 # %% [markdown]

@@ -102,6 +102,9 @@ def bands_text(image, rule):
 
 
 # %%
+for matrix in (D_matrix(9), U_matrix(9, "co_sited"), U_matrix(9, "half_pixel")):
+    np.testing.assert_allclose(matrix.sum(axis=1), 1)  # a constant stays what it is
+
 for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
     image = rng.uniform(size=shape)
     for rule in ("co_sited", "half_pixel"):

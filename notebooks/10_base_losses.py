@@ -299,7 +299,7 @@ np.testing.assert_allclose(
     normalised_depth_reverse(1.0, saved_depth), depth_reverse_text(1.0, D_hat, D_prior, M), rtol=1e-9, atol=1e-16
 )
 for found, text in zip(smoothness_reverse(0.5, saved_smooth), smoothness_reverse_text(0.5, step, I_hat, M, E, 30.0)):
-    np.testing.assert_allclose(found, text, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-18)
 
 # %% [markdown]
 # ## The gradient check

@@ -117,6 +117,7 @@ print(
     np.abs(lost / truth - 1).max(),
 )
 assert np.abs(lost / truth - 1).max() > 0.01
+np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)  # the same formula, while digits last
 
 # %% [markdown]
 # ## Equal depths: an order that depends on chance
