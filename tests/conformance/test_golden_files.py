@@ -13,7 +13,7 @@ from endotsr.conformance.format import SCHEMAS, schema_text
 from endotsr.conformance.generate import check, moved, solve_all
 from endotsr.conformance.generator import fnv1a, single, words
 from endotsr.conformance.npy import npy_bytes
-from endotsr.conformance.solve import MARGIN
+from endotsr.conformance.solve import MARGIN, reference
 from endotsr.conformance.store import golden_folder, read_golden
 from endotsr.errors import InputError
 
@@ -122,6 +122,26 @@ def test_tolerances_lie_far_below_the_mistakes(golden):
             if output.because is not None:
                 assert output.compare.float32 >= output.because.spread_float32, (case.name, name)
                 assert output.compare.float64 >= output.because.spread_float64, (case.name, name)
+
+
+RASTERISED = ("composite", "render", "objective")
+
+
+def test_no_decision_hangs_on_rounding(golden):
+    """Thresholds moved by 1e-5 either way leave every image as it is, but in the case that stands on the cutoff."""
+    operations = all_operations()
+    for case in golden.cases:
+        if case.operation not in RASTERISED or case.case == "on_the_cutoff":
+            continue
+        inputs = {name: golden.array(case, a.file) for name, a in case.inputs.items()}
+        for factor in (1 - 1e-5, 1 + 1e-5):
+            moved_to = {name: case.settings["raster"][name] * factor
+                        for name in ("alpha_cutoff", "transmittance_stop", "near")}  # fmt: skip
+            settings = case.settings | {"raster": case.settings["raster"] | moved_to}
+            found = reference(operations[case.operation], inputs, settings, "float64", "definition")
+            for name in ("colour_image", "depth_image"):
+                expected = golden.array(case, case.outputs[name].file)
+                assert np.abs(found[name] - expected).max() < 1e-6, (case.name, name)
 
 
 def test_schemas_describe_the_files():

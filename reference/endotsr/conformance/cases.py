@@ -23,6 +23,7 @@ class Spec(NamedTuple):
     still: tuple[str, ...] = ()  # inputs that stand at a tie or kink: not perturbed when spreads are measured
     without: tuple[str, ...] = ()  # outputs that this case does not ask for
     band: int = 0  # flip budget of the images, for a case that stands on the cutoff
+    own: tuple[str, ...] = ()  # outputs for which the oracle has no answer here: the truth is the reference
 
     @property
     def name(self) -> str:

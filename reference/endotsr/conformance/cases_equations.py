@@ -183,7 +183,9 @@ def _calibration() -> list[Spec]:
         if case == "all_dead":
             rgb = changed(rgb, ..., 0.0, "all 0")
         inputs = {"d_photometric": rgb, "d_laplacian": lap}
-        out.append(Spec("calibration", case, "calibration", title, flags, {"gradient_ratio": 0.25}, inputs))
+        own = ("lambda_lap",) if case == "all_dead" else ()
+        settings = {"gradient_ratio": 0.25}
+        out.append(Spec("calibration", case, "calibration", title, flags, settings, inputs, own=own))
     return out
 
 
@@ -225,7 +227,7 @@ def _adam() -> list[Spec]:
     inputs = {"parameter": seeds.uniform("parameter", -1.0, 1.0, 4, 5), "gradients": gradients}
     settings = {"rate": 0.005, "beta1": 0.9, "beta2": 0.999, "epsilon": 1e-15}
     flags = ("adam_without_bias_correction", "adam_epsilon_in_root", "adam_epsilon_1e-8", "adam_first_step_zero")
-    return [Spec("adam", "three_steps", "adam", "Bias correction, epsilon outside the root; a tiny gradient moves as far",
+    return [Spec("adam", "three_steps", "adam", "Bias correction, epsilon outside the root, a tiny gradient",
                  flags, settings, inputs)]  # fmt: skip
 
 

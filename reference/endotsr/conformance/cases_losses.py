@@ -83,7 +83,7 @@ def _depth() -> list[Spec]:
     few["prior_depth"] = changed(few["prior_depth"], ..., keep, "0 but row 6, columns 0..8")
     flags = ("depth_holes_count", "depth_maximum_constant", "depth_maximum_of_tissue", "depth_not_normalised")
     name, rows = "normalised_depth", [
-        ("generic", "Both depths over their largest value, holes left out, gradient to the maximum", flags, generic, ()),
+        ("generic", "Both depths over their largest value, without holes; gradient to the maximum", flags, generic, ()),
         ("two_maxima", "The gradient of the maximum is split evenly over ties", ("depth_first_maximum",), ties,
          ("rendered_depth",)),
         ("few_priors", "Fewer than ten priors say nothing", ("depth_few_priors",), few, ()),

@@ -149,6 +149,10 @@ def _training() -> list[Spec]:
     for name in ("rotation_matrix", "translation"):
         del inputs[name]
     inputs["opacity_logit"] = changed(inputs["opacity_logit"], 3, -5.0, "[3] is -5: pruned")
+    small = inputs["log_scale"].array[:, 5:10] - 1.75
+    inputs["log_scale"] = changed(
+        inputs["log_scale"], (slice(None), slice(5, 10)), small, "[:, 5:10] minus 1.75: cloned"
+    )
     shape = (10, BASES, 16)
     inputs["fdm_weight"] = seeds.uniform("fdm_weight", -0.03, 0.03, *shape)
     inputs["fdm_centre"] = seeds.uniform("fdm_centre", 0.1, 0.8, *shape)

@@ -58,7 +58,7 @@ def _covariance() -> list[Spec]:
     out = [Spec("covariance", "generic", "covariance", "Raw quaternions w, x, y, z of any length", flags, {}, inputs)]
     zero = inputs | {"quaternion": changed(quaternion, (slice(None), 2), 0.0, "quaternion 2 is 0")}
     out.append(Spec("covariance", "zero_quaternion", "covariance", "A zero quaternion is the identity, gradient 0",
-                    ("zero_quaternion",), {}, zero, ("quaternion",)))  # fmt: skip
+                    ("zero_quaternion",), {}, zero, ("quaternion",), own=("rotation",)))  # fmt: skip
     return out
 
 
@@ -205,7 +205,7 @@ def _composite() -> list[Spec]:
     reverse = tuple(
         f"d_{name}" for name in ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "background")
     )
-    out.append(Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha exactly at 1/255: each may be drawn or not",
+    out.append(Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha at 1/255: each may be drawn or not",
                     ("cutoff_missing",), paper, inputs, ("opacity_logit", "mean2d", "covariance2d"),
                     reverse, 5))  # fmt: skip
     return out
@@ -259,13 +259,13 @@ def _render() -> list[Spec]:
 def _hard_renders() -> list[Spec]:
     out = []
 
-    def add(case: str, title: str, flags: tuple[str, ...], change, still=(), raster=PAPER, band=0, count=8, without=()):
-        seeds, cast = Seeds("render", case), pose(static=True)
+    def add(case: str, title: str, flags: tuple[str, ...], change, still=(), own=()):
+        seeds, cast, count = Seeds("render", case), pose(static=True), 8
         inputs = scene_inputs(seeds, count, 1, cast) | _cotangents(seeds)
         inputs["residual"] = seeds.uniform("residual", -0.2, 0.2, 3, count)
         change(inputs, seeds)
-        settings = _lens(raster, degree=1)
-        out.append(Spec("render", case, "render", title, flags, settings, inputs, still, without, band))
+        settings = _lens(PAPER, degree=1)
+        out.append(Spec("render", case, "render", title, flags, settings, inputs, still, own=own))
 
     def near(inputs, seeds):
         z = [0.1984375, 0.2015625, -2.0, 0.0]
@@ -285,7 +285,8 @@ def _hard_renders() -> list[Spec]:
     def zero(inputs, seeds):
         inputs["quaternion"] = changed(inputs["quaternion"], (slice(None), 4), 0.0, "quaternion 4 is 0")
 
-    add("zero_quaternion", "A zero quaternion renders as the identity", ("zero_quaternion",), zero, ("quaternion",))
+    add("zero_quaternion", "A zero quaternion renders as the identity", ("zero_quaternion",), zero, ("quaternion",),
+        ("colour_image", "depth_image", "opacity_image"))  # fmt: skip
 
     def ties(inputs, seeds):
         inputs["position"] = changed(inputs["position"], 2, 4.0, "z is 4 for all")

@@ -1,4 +1,4 @@
-"""What the files of `golden/` look like, as typed structures: JSON is read and written through them and nowhere else."""
+"""What the files of `golden/` look like, as typed structures: the only way in and out for JSON."""
 
 import json
 from pathlib import Path

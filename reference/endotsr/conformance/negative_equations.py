@@ -135,16 +135,15 @@ def laplacian_with(request: Request, *, border="mirror", rule=None, masks="suppo
         ry, rx, ey, ex = _filter(h, border), _filter(w, border), _expand(h, rule), _expand(w, rule)
         next_y, next_x = ry @ down_y, rx @ down_x
 
-        def band(image, y=down_y, x=down_x, v=ey @ next_y, u=ex @ next_x):
-            return y @ image @ x.T - v @ image @ u.T
-
+        smooth_y, smooth_x = ey @ next_y, ex @ next_x
+        band_of = [down_y @ i @ down_x.T - smooth_y @ i @ smooth_x.T for i in (difference, observed)]
         valid = request.right[f"valid_{level + 1}"] if masks == "support" else shrunk
-        sign = np.sign(band(difference)) * valid
+        sign = np.sign(band_of[0]) * valid
         count = 3 * (valid.sum() if divide == "valid" else valid.size)
-        parts.append(np.abs(band(difference) * valid).sum() / count if count else None)
-        g = down_y.T @ sign @ down_x - (ey @ next_y).T @ sign @ (ex @ next_x)
+        parts.append(np.abs(band_of[0] * valid).sum() / count if count else None)
+        g = down_y.T @ sign @ down_x - smooth_y.T @ sign @ smooth_x
         gradients.append(g / max(count, 1))
-        out[f"band_{level + 1}"], out[f"valid_{level + 1}"] = band(observed), valid
+        out[f"band_{level + 1}"], out[f"valid_{level + 1}"] = band_of[1], valid
         down_y, down_x, shrunk = next_y, next_x, shrunk[::2, ::2]
     present = [p for p in parts if p is not None]
     share = 1.0 if not levels_mean else 1.0 / (len(present) if rescale and present else len(parts))

@@ -75,7 +75,7 @@ NEGATIVES = [
              {"scene": _normalised_motion}),
     Negative("deformation_channels_shifted", "Deformation channels in another order",
              "position, log-scale, quaternion; right: position, quaternion, log-scale", {"scene": _shifted_channels}),
-    Negative("scale_offset_after_activation", "Scale offset added to the semi-axis", "exp(s) + psi; right: exp(s + psi)",
+    Negative("scale_offset_after_activation", "Offset added to the semi-axis", "exp(s) + psi; right: in the exponent",
              {"scene": _after_activation}),
     Negative("depth_term_dropped", "Depth term left out", "0; right: weight 1", _loss(depth_weight=0.0)),
     Negative("detail_term_dropped", "Laplacian term left out", "0; right: lambda_lap", _loss(lambda_lap=0.0)),

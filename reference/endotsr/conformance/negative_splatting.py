@@ -266,7 +266,7 @@ NEGATIVES = [
     Negative("direction_gradient_dropped", "No gradient through the view direction", "0; right: kept",
              {"harmonics": lambda r: {n: 0 * r.right[n] for n in ("d_position", "d_centre")}
               if r.settings["degree"] else None}),
-    Negative("bands_channel_first", "Harmonics read as [channel, band]", "(3, K); right: (K, 3)", {"harmonics": _bands}),
+    Negative("bands_channel_first", "Harmonics as [channel, band]", "(3, K); right: (K, 3)", {"harmonics": _bands}),
     Negative("colour_not_clamped", "Colour not clamped at 0", "negative colours; right: max(0, .)",
              {"harmonics": _unclamped}),
     Negative("colour_clamped_above", "Colour clamped at 1", "min(1, .); right: no upper clamp",
@@ -312,6 +312,6 @@ NEGATIVES = [
              _raster(("composite",), transmittance_stop=lambda v: 1e-3 if v > 0 else v)),
     Negative("stop_after", "Stop after T fell below 1e-4", "one Gaussian too many; right: stop before",
              {"composite": _stop_after}),
-    Negative("divide_by_one_minus_alpha", "Reverse pass divides by 1 - alpha", "0 / 0 behind alpha = 1; right: recursion",
+    Negative("divide_by_one_minus_alpha", "Reverse pass divides by 1 - alpha", "0 / 0 at alpha = 1; right: recursion",
              {"composite": _division}),
 ]  # fmt: skip

@@ -19,6 +19,7 @@ class Asked(NamedTuple):
     unit: str = "1"
     scale: str = "max"  # "exact", "max" or "last"
     oracle: str = ""  # "<file of tests/oracle>.<function>"; empty: the reference itself is the truth
+    least32: float = 0.0  # least float32 tolerance: what another sound formula loses, beyond the measured spread
 
 
 class Operation(NamedTuple):

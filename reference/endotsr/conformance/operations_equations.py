@@ -129,8 +129,8 @@ def _calibration(inputs: Inputs, settings: Settings) -> dict[str, NDArray | floa
 
 
 def _deformation(inputs: Inputs, settings: Settings) -> dict[str, NDArray | float]:
-    names = ("fdm_weight", "fdm_centre", "fdm_width")
-    offsets, saved = deformation_forward(*(inputs[n] for n in names), float(inputs["t"]), settings["basis"])
+    weight, centre, width = inputs["fdm_weight"], inputs["fdm_centre"], inputs["fdm_width"]
+    offsets, saved = deformation_forward(weight, centre, width, float(inputs["t"]), settings["basis"])
     grads = deformation_reverse(inputs["d_offsets"], saved)
     return {
         "offsets": offsets,

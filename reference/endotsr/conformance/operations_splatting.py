@@ -5,6 +5,7 @@ the reference answers, which must not matter.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,9 @@ Found = dict[str, NDArray | float | None]
 
 def raster_of(settings: Settings) -> RasterSettings:
     """The rasteriser settings written out in a case."""
-    fields = dict(settings["raster"])
-    return RasterSettings(**(fields | {"deviations": LegacyDeviations(**fields["deviations"])}))
+    fields: dict[str, Any] = dict(settings["raster"])
+    fields["deviations"] = LegacyDeviations(**fields["deviations"])
+    return RasterSettings(**fields)
 
 
 def raster_dict(raster: RasterSettings) -> dict:
@@ -154,8 +156,9 @@ def _render(inputs: Inputs, settings: Settings) -> Found:
     grads = render_reverse(*images, saved, background_gradient=True, pose_gradient=True)
     assert grads.camera is not None and grads.background is not None
     names = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual", "mean2d", "background")
-    found |= {f"d_{name}": getattr(grads, name) for name in names}
-    return found | {
+    return {
+        **found,
+        **{f"d_{name}": getattr(grads, name) for name in names},
         "d_rotation_matrix": grads.camera.rotation.astype(dtype),
         "d_translation": grads.camera.translation.astype(dtype),
     }

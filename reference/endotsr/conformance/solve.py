@@ -15,7 +15,7 @@ from endotsr.conformance.operation import Asked, Inputs, Operation, Outputs, in_
 
 MARGIN = 10.0  # a mistake counts as caught when it is this many tolerances large
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
-FLOOR = {"float64": 1e-13, "float32": 4e-6}
+FLOOR = {"float64": 1e-12, "float32": 4e-6}
 STEP = {"float64": 2.0**-52, "float32": 2.0**-23}
 BAND = 1e-5  # relative change of the cutoff within which a pixel counts as on it
 
@@ -62,7 +62,7 @@ def solve(spec: Spec, operation: Operation, negatives: dict[str, Negative]) -> S
         exact = rules[name].kind == "exact"
         outputs[name] = Output(
             file=f"expected/{name}.npy", level=asked[name].level, unit=asked[name].unit, dtype=kind_of(value),  # type: ignore[arg-type]
-            shape=value.shape, compare=rules[name], truth=_truth(asked[name]),
+            shape=value.shape, compare=rules[name], truth=_truth(asked[name], name in spec.own),
             because=None if exact else Because(spread_float64=_two(spreads[name][0]), spread_float32=_two(
                 spreads[name][1]), smallest_mutant=_two(min(caught)) if caught else None),
         )  # fmt: skip
@@ -79,8 +79,8 @@ def solve(spec: Spec, operation: Operation, negatives: dict[str, Negative]) -> S
     return Solved(case, inputs, expected)
 
 
-def _truth(asked: Asked) -> Truth:
-    return Truth(kind="oracle", oracle=asked.oracle) if asked.oracle else Truth(kind="self")
+def _truth(asked: Asked, own: bool) -> Truth:
+    return Truth(kind="oracle", oracle=asked.oracle) if asked.oracle and not own else Truth(kind="self")
 
 
 def _two(value: float) -> float:
@@ -98,6 +98,7 @@ def _rule(asked: Asked, spread: tuple[float, float]) -> Rule:
     if asked.scale == "exact":
         return Rule(kind="exact")
     double, single = (nice(max(FLOOR[p], SAFETY[p] * s)) for p, s in zip(("float64", "float32"), spread))
+    single = max(single, asked.least32)
     if asked.scale.startswith("identical"):
         return Rule(kind="identical", scale="max", float64=double, float32=single, to=asked.scale.split()[1])
     return Rule(kind="relative", scale=asked.scale, float64=double, float32=single)  # type: ignore[arg-type]
