@@ -266,5 +266,7 @@ assert all(report.passed for report in reports)
 # Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead, so at most 15 remain: that
 # is why the rank is reported, and why a clip whose frames lie on the grid of the highest frequency is a special one.
 assert report_atoms(stamps, omega).rank == 16
+singular = np.linalg.svd(bars, compute_uv=False)  # how much worse the faintest combination is seen than the clearest
+np.testing.assert_allclose(report_atoms(stamps, omega).condition, singular[0] / singular[-1], rtol=1e-9)
 assert report_atoms(stamps_32, omega).rank == 15
 print(report_atoms(stamps, omega).rank, report_atoms(stamps_32, omega).rank)

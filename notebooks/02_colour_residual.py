@@ -28,7 +28,7 @@ from endotsr.equations.appearance import Y00, appearance_forward, appearance_rev
 from endotsr.equations.fourier import atom_statistics, frequencies, normalised_atoms
 
 rng = np.random.default_rng(2)
-F, N, beta = 8, 5, 0.3
+F, N, beta = 8, 150, 0.3
 omega = frequencies(F, 1.0, 16.0)
 stamps = np.delete(np.arange(63), np.arange(1, 63, 8)) / 63
 statistics = atom_statistics(stamps, omega)

@@ -29,7 +29,7 @@ from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reve
 from endotsr.equations.motion import motion_forward, motion_reverse
 
 rng = np.random.default_rng(4)
-F, N, length = 8, 6, 0.2
+F, N, length = 8, 150, 0.2
 omega = frequencies(F, 1.0, 16.0)
 C = rng.normal(0, 0.5, (3, 2 * F, N))
 
@@ -107,6 +107,8 @@ def penalty_text(C, rho):
 # %%
 rho = matern_weights(omega, length)
 np.testing.assert_allclose(rho, rho_text(omega, length), rtol=1e-14)
+for ell in (0.001, 0.01, 0.02, 0.05, 1.0):  # the stable form has two branches
+    np.testing.assert_allclose(matern_weights(omega, ell), rho_text(omega, ell), rtol=1e-13)
 print("rho:", " ".join(f"{value:.3g}" for value in rho))
 penalty, saved_penalty = matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, penalty_text(C, rho), rtol=1e-13)

@@ -24,7 +24,7 @@ import numpy as np
 
 from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.config import PAPER, DensityConfig
-from endotsr.fitting.adam import adam_state, adam_step
+from endotsr.fitting.adam import adam_state, adam_step, adam_update
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
 from endotsr.scene.density_control import DensityStatistics, densify, empty_statistics, gather_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -69,6 +69,14 @@ for k in range(1, 30):
     adam_step(kernel[0], g, kernel[1], kernel[2], k, 1e-3, beta_1, beta_2, epsilon)
     for found, text in zip(kernel, mine):
         np.testing.assert_allclose(found, text, rtol=1e-12)
+
+# `adam_update` steps every array by name and counts for each
+state, named = adam_state({"theta": theta}), {"theta": theta.copy()}
+mine = (theta.copy(), np.zeros_like(theta), np.zeros_like(theta))
+for k in (1, 2, 3):
+    mine = adam_text(mine[0], theta**k, mine[1], mine[2], k, 1e-3)
+    adam_update(state, named, {"theta": theta**k}, {"theta": 1e-3}, beta_1, beta_2, epsilon)
+np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
 # **Size does not matter, sign does.** The first step is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 or of $10^{-10}$. With
@@ -157,6 +165,7 @@ gaussians = Gaussians(
     opacity_logit=rng.uniform(-7, 2, N),
     harmonics=rng.normal(0, 0.5, (1, 3, N)),
 )
+gaussians.opacity_logit[0] = -5.2983  # an opacity of 0.00498: just below the bound
 camera = Camera(np.eye(3), np.zeros(3), 40.0, 40.0, 32.0, 24.0, 64, 48)
 scene = Scene(
     gaussians.position, gaussians.quaternion, gaussians.log_scale, gaussians.opacity_logit, gaussians.harmonics
