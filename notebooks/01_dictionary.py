@@ -173,7 +173,7 @@ resurrected = (naive - naive.mean()) / naive.std()  # what a division without th
 right = [normalise_forward(dictionary_forward(t, omega)[0], statistics_32)[0][F - 1] for t in stamps_32]
 assert np.abs(resurrected).max() > 1 and not np.any(right)
 
-# %%
+# %% tags=["hide-input"]
 fine = np.linspace(0, 1, 801)
 raw = np.array([dictionary_forward(t, omega)[0] for t in fine])
 bar = np.array([normalise_forward(p, statistics)[0] for p in raw])
@@ -198,6 +198,7 @@ axes[2].plot(stamps_32, right, "o", color="tab:green", ms=4, label="endotsr: dea
 axes[2].set(title="the dead atom, 32 frames", xlabel="t")
 axes[2].set_ylim(-3.2, 3.2)
 axes[2].legend(fontsize=8, loc="lower left")
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

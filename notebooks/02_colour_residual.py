@@ -81,7 +81,7 @@ assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 # neighbour 4 px away is shifted so that a pixel shows the same brightness at each time. The picture at this pixel is right in both
 # cases; the geometry of the second is wrong by up to 4 px. This is why the paper separates the two.
 
-# %%
+# %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)
 target = 0.45 + 0.2 * np.exp(-(((fine - 0.55) / 0.12) ** 2))  # display brightness of a patch
 phis = np.array([normalised_atoms(t, omega, statistics) for t in fine])
@@ -116,6 +116,7 @@ axes[2].semilogy(x, np.maximum(1 - np.tanh(x.astype(np.float32)) ** 2, 1e-14), c
 axes[2].semilogy(x, 4 * e / (1 + e) ** 2, color="tab:green", label="$4e/(1+e)^2,\\ e=\\exp(-2|x|)$")
 axes[2].set(title="slope of tanh in float32", xlabel="x", ylim=(1e-13, 2))
 axes[2].legend(fontsize=8)
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

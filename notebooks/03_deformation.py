@@ -87,7 +87,7 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
 # no bump is higher than 0.001: a frame that lies there hardly moves anything at first. Not an error, but slow. The preset
 # `sharp` starts at 0.05.
 
-# %%
+# %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
 centres = np.linspace(0, 1, B)
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.4), layout="constrained")
@@ -110,6 +110,7 @@ curve = [deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1
 axes[2].plot(fine, np.array(curve), label=["x", "y", "z"])
 axes[2].set(title="a trajectory: weights at random, width 0.06", xlabel="t", ylabel="offset [scene units]")
 axes[2].legend()
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

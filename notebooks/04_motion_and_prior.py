@@ -141,7 +141,7 @@ np.testing.assert_allclose(matern_penalty_forward(turned, rho)[0], penalty, rtol
 # Fourier series twice: by least squares alone, and with $\lambda\,\mathcal L_{\mathrm{msp}}$ added (the minimum of a
 # quadratic, so one linear system; its matrix is built from the reverse pass below).
 
-# %%
+# %% tags=["hide-input"]
 stamps = np.delete(np.arange(20), np.arange(1, 20, 8)) / 20
 fine = np.linspace(stamps[0], stamps[-1], 501)
 path = lambda t: 1.5 * np.sin(2 * np.pi * 1.2 * t) + 0.7 * np.cos(2 * np.pi * 2.3 * t + 1)
@@ -183,6 +183,7 @@ for ell in (0.0, 0.05, 0.1, 0.2, np.inf):
     axes[2].loglog(omega, matern_weights(omega, ell), "o-", ms=4, label=f"$\\ell=${ell:g}")
 axes[2].set(title="weights $\\rho_f$", xlabel="$\\omega$ [cycles per sequence]", ylim=(1e-7, 20))
 axes[2].legend(fontsize=8)
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

@@ -153,7 +153,7 @@ np.testing.assert_allclose(
 #
 # Minimise $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass. $g_\Sigma=2(\Sigma-\Sigma^\star)$.
 
-# %%
+# %% tags=["hide-input"]
 q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
 target = covariance_matrix(
     covariance_forward(np.array([[0.9], [0.3], [-0.2], [0.6]]), np.log([[1.4], [0.7], [0.2]]))[0]
@@ -188,6 +188,7 @@ for k in range(3):
     axis = final.rotation[:, k, 0] * final.scale[k, 0] * 1.3
     panel.plot(*np.stack([-axis, axis], axis=1), color="k", lw=1)
 panel.set(title=f"the fitted shape, loss {losses[-1]:.0e}", aspect="equal")
+plt.show()
 
 # %% [markdown]
 # ## The gradient check

@@ -101,7 +101,7 @@ for settings in (PAPER, EXACT):
 #
 # ## A picture: where the expansion is good, and where digits are lost
 
-# %%
+# %% tags=["hide-input"]
 front = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 32.0, 24.0, 64, 48)
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
 circle = 2 * np.stack([np.cos(np.linspace(0, 2 * np.pi, 200)), np.sin(np.linspace(0, 2 * np.pi, 200))])
@@ -153,6 +153,7 @@ for name, colour in zip(errors, ("tab:red", "tab:green")):
     axes[2].loglog(lengths, np.maximum(errors[name], 1e-8), ".-", color=colour, label=name)
 axes[2].set(title="relative error of det, float32", xlabel="length of a needle [px]")
 axes[2].legend()
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass
@@ -172,11 +173,10 @@ axes[2].legend()
 #
 # $$
 # \begin{aligned}
-# g_x &= \frac{f_x}{z}g_u+[\,|x/z|\le L_x\,]\,g_{x'},\qquad g_y=\frac{f_y}{z}g_v+[\,|y/z|\le L_y\,]\,g_{y'},\\
-# g_z &= g_z^{\mathrm{img}}-\frac{f_xx\,g_u+f_yy\,g_v}{z^2}-\frac{f_x}{z^2}g_{J_{00}}-\frac{f_y}{z^2}g_{J_{11}}
-# +\frac{2f_xx'}{z^3}g_{J_{02}}+\frac{2f_yy'}{z^3}g_{J_{12}}\\
-# &\quad+[\,|x/z|>L_x\,]\,\frac{x'}{z}\,g_{x'}+[\,|y/z|>L_y\,]\,\frac{y'}{z}\,g_{y'},\\
-# g_\mu&=W^\top(g_x,g_y,g_z)^\top .
+# e_k&=r\Bigl[\varepsilon\,t_{0k}+\sum_l S_l^2\,t_{1l}\,(t_{0k}t_{1l}-t_{1k}t_{0l})\Bigr],\\
+# g_{S_k}&=-2S_k\bigl[A^2g_A\,e_k^2-r\,g_m\,t_{1k}e_k+r^2g_r\,t_{1k}^2\bigr],\\
+# g_{T_{0k}}&=S_k^2\bigl[r\,g_m\,t_{1k}-2A^2g_A\,e_k\bigr],\\
+# g_{T_{1k}}&=S_k^2\bigl[2A^2m\,g_A\,e_k+r\,g_m\,(e_k-m\,t_{1k})-2r^2g_r\,t_{1k}\bigr].
 # \end{aligned}
 # $$
 #
@@ -184,8 +184,11 @@ axes[2].legend()
 #
 # $$
 # \begin{aligned}
-# g_{\mathbf d}&=\sum_i (g_x,g_y,g_z)_i^\top-W g_{\mathbf o},\\
-# g_W&=\sum_i\bigl[(g_x,g_y,g_z)_i^\top\mu_i^\top+J_i^\top g_{T,i}R_i^\top\bigr]-\mathbf d\,g_{\mathbf o}^\top,
+# g_x &= \frac{f_x}{z}g_u+[\,|x/z|\le L_x\,]\,g_{x'},\qquad g_y=\frac{f_y}{z}g_v+[\,|y/z|\le L_y\,]\,g_{y'},\\
+# g_z &= g_z^{\mathrm{img}}-\frac{f_xx\,g_u+f_yy\,g_v}{z^2}-\frac{f_x}{z^2}g_{J_{00}}-\frac{f_y}{z^2}g_{J_{11}}
+# +\frac{2f_xx'}{z^3}g_{J_{02}}+\frac{2f_yy'}{z^3}g_{J_{12}}\\
+# &\quad+[\,|x/z|>L_x\,]\,\frac{x'}{z}\,g_{x'}+[\,|y/z|>L_y\,]\,\frac{y'}{z}\,g_{y'},\\
+# g_\mu&=W^\top(g_x,g_y,g_z)^\top .
 # \end{aligned}
 # $$
 

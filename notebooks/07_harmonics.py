@@ -111,7 +111,7 @@ for band in range(4):
 # Each drawn over the whole sphere (longitude to the right, latitude upwards), red positive, blue negative. Evaluated by the
 # kernel: one Gaussian per direction, one coefficient switched on.
 
-# %%
+# %% tags=["hide-input"]
 lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37))
 around = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]).reshape(3, -1)
 figure = plt.figure(figsize=(13, 6), layout="constrained")
@@ -130,6 +130,7 @@ for band in range(4):
 weights = np.cos(lat).ravel()
 gram = np.einsum("ku,lu,u->kl", Y_text(*around), Y_text(*around), weights) * (2 * np.pi / 73) * (np.pi / 36)
 assert np.abs(gram - np.eye(16)).max() < 0.05, "orthonormal on the sphere"
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

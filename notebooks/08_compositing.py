@@ -159,7 +159,7 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 # fallen to 1/255. `legacy` takes the tiles within three standard deviations: here that cuts a strip at the
 # bottom, values that can be seen.
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1])
 contributors, T_n = pixel_text(9, 7, scene, PAPER)
 for k, (i, alpha, T) in enumerate(contributors):
@@ -190,6 +190,7 @@ figure.colorbar(shown, ax=axes[1:], label="$\\log_{10}\\alpha$; green line 1/255
 assert np.array_equal(reached["paper"] > 0, np.minimum(reached["exact"], 0.99) >= 1 / 255), "the ellipse loses nothing"
 assert np.count_nonzero(reached["exact"]) == 72 * 56
 assert np.count_nonzero(reached["legacy"]) < np.count_nonzero(reached["paper"])
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass, line by line

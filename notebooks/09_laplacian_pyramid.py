@@ -209,7 +209,7 @@ assert np.array_equal(laplacian_loss_reverse(1.0, saved_spoiled), laplacian_loss
 # the bands of the observed image if it is multiplied by the mask first and then filtered. The edge of the instrument is the
 # brightest "detail" of the picture; a render would be asked to reproduce it.
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(13, 5.4), layout="constrained")
 axes[0, 0].imshow(observed.transpose(1, 2, 0))
 axes[0, 0].set_title("observed frame")
@@ -227,6 +227,7 @@ for j, valid in enumerate(masks.bands):
     assert false[~valid].max() > false[valid].max(), "the false edge is stronger than all true detail"
 for panel in axes.flat:
     panel.set(xticks=[], yticks=[])
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

@@ -186,7 +186,7 @@ np.testing.assert_allclose(L_smooth, smoothness_text(step, I_hat, M, E, 30.0), r
 # Three renders with **equal** masked L1. A person prefers the first by far. L1 cannot tell; SSIM can. (Maps of $1-s$, mean over
 # channels.)
 
-# %%
+# %% tags=["hide-input"]
 from scipy.ndimage import gaussian_filter
 
 blurred = gaussian_filter(I, (0, 1.2, 1.2)) - I
@@ -207,6 +207,7 @@ for column, (name, change) in enumerate(changes.items(), start=1):
 for panel in axes.flat:
     panel.set(xticks=[], yticks=[])
 assert scores["brighter"] > scores["noisy"] and scores["brighter"] > scores["blurred"]
+plt.show()
 
 # %% [markdown]
 # ## The reverse passes

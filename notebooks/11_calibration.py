@@ -103,7 +103,7 @@ np.testing.assert_allclose(calibrate(sizes, 2 * r).lambda_lap, 2 * calibration.l
 # sign; SSIM adds strength, and varies. The Laplacian pulls in fine grain, and not at all beside the instrument, where
 # no band value is valid. (Its scale is a quarter of the other one, as its force is.) Right: what $\lambda_{\mathrm{lap}}$ becomes for other weights $w$ of SSIM. The published 0.83 belongs to a small $w$.
 
-# %%
+# %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])
 found = {}
 for blur in (1.0, 1.5, 2.5):
@@ -131,6 +131,7 @@ for blur, values in found.items():
 axes[3].axhline(0.83, color="k", ls=":", label="published 0.83")
 axes[3].set(xlabel="$w$", ylabel="$\\lambda_{\\rm lap}$", title="the calibrated weight")
 axes[3].legend(fontsize=8)
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

@@ -210,7 +210,7 @@ for column, parent in enumerate(to_split):
 # %% [markdown]
 # ## A picture: rates over a run, and one act of density control
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1])
 steps = np.arange(1, T + 1, 10)
 for name, label in (
@@ -245,6 +245,7 @@ axes[1].set_title(f"before: {N}. black: to prune, blue: to clone,\nred: to split
 axes[2].set_title(f"after: {after.gaussians.count}. blue: clones (on their parents),\nred: children", fontsize=10)
 for panel in axes[1:]:
     panel.set(xlim=(-2.7, 2.7), ylim=(-2.5, 2.5), aspect="equal", xticks=[], yticks=[])
+plt.show()
 
 # %% [markdown]
 # ## The reverse pass

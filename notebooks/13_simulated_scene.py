@@ -77,7 +77,7 @@ for index in (0, 5, 11):
 #
 # With all effects off, all frames are equal. With one on, the difference between two frames is that effect and nothing else.
 
-# %%
+# %% tags=["hide-input"]
 tiny = SimulatorSettings(width=64, height=51, frames=8)
 frozen = simulate(with_effects(tiny)).sequence
 assert (frozen.images == frozen.images[0]).all() and frozen.masks.all()
@@ -98,6 +98,7 @@ for panel, effect in zip(axes.flat, EFFECTS):
         title = f"{effect}: frame 3 - frame 0"
     panel.set_title(title, fontsize=10)
     panel.set(xticks=[], yticks=[])
+plt.show()
 
 # %% [markdown]
 # ## A picture: frames, true depth, true motion
@@ -105,7 +106,7 @@ for panel, effect in zip(axes.flat, EFFECTS):
 # The flow is what optical flow methods look for; here it is known, behind the instrument too. The lower right panel follows
 # single points over the clip: breathing moves all of them, the beat and the pull only some.
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(14, 5.6), layout="constrained")
 middle = sequence.count // 2
 for panel, index in zip(axes[0], np.linspace(0, sequence.count - 1, 4).astype(int)):
@@ -133,6 +134,7 @@ axes[1, 3].set(title="lift towards the camera [mm]", xlabel="t")
 axes[1, 3].legend(fontsize=8)
 for panel in axes.flat[:-1]:
     panel.set(xticks=[], yticks=[])
+plt.show()
 
 # %% [markdown]
 # ## Where Gaussians start

@@ -150,11 +150,10 @@ born = config.training.residual_activation
 assert "msp" not in log[born - 1] and log[born]["msp"] == 0.0, "the residuals start at zero, one iteration after K_s"
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 2, figsize=(13, 3.8), layout="constrained")
 iterations = np.array([e["iteration"] for e in log])
 smooth = lambda values: np.convolve(values, np.ones(9) / 9, mode="same")
-weights = {"l1": 1.0, "depth": config.loss.depth_weight, "laplacian": config.loss.lambda_lap}
 for name, label in (
     ("l1", "$\\mathcal{L}_1$"),
     ("ssim", "$1-\\mathcal{S}$"),
@@ -179,6 +178,8 @@ axes[1].plot(
 )
 axes[1].set(title="PSNR over tissue", xlabel="frame", ylabel="dB")
 axes[1].legend(fontsize=8)
+plt.show()
+
 # %% [markdown]
 # ## Held-out frames
 #
@@ -186,7 +187,7 @@ axes[1].legend(fontsize=8)
 # truth, render, error over tissue, and what each residual does to the picture. S adds little here: its rate is a tenth of that of
 # the deformation, and a short run gives it few steps.
 
-# %%
+# %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
 figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
 for row, k in zip(axes, shown):
@@ -214,6 +215,7 @@ for row, k in zip(axes, shown):
         )
         panel.imshow(picture, **({} if picture.ndim == 3 else limits))
         panel.set(title=title, xticks=[], yticks=[])
+plt.show()
 
 # %% [markdown]
 # ## Ablation
@@ -222,7 +224,7 @@ for row, k in zip(axes, shown):
 # honest with small differences: one seed of a short run says little. On a slow clip the blend of two neighbouring frames is
 # hard to beat; a reconstruction also gives depth, and any other moment and view.
 
-# %%
+# %% tags=["hide-input"]
 variants = {
     "full": {},
     "without A": {"appearance": False},
@@ -249,6 +251,8 @@ figure, axis = plt.subplots(figsize=(8, 3.4), layout="constrained")
 axis.barh(list(scores), list(scores.values()), color=["tab:blue"] * 5 + ["0.7"] * 4)
 axis.invert_yaxis()
 axis.set(title="held-out PSNR over tissue", xlabel="dB", xlim=(min(scores.values()) - 2, max(scores.values()) + 0.5))
+plt.show()
+
 # %% [markdown]
 # ## The reverse pass
 #

@@ -251,7 +251,7 @@ for factor in (1e-3, 1e3):
 # %% [markdown]
 # ## A picture of three of them
 
-# %%
+# %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.7), layout="constrained")
 axes[0].plot(along, truth, color="0.7", lw=5, label="float64")
 axes[0].plot(along, lost, color="tab:red", lw=0.8, label="textbook form, float32")
@@ -281,6 +281,8 @@ for alpha_one, colour in ((1e-3, "tab:blue"), (1e-2, "tab:orange"), (0.1, "tab:g
     axes[2].semilogx(counts, 0.8 * -np.expm1(counts * np.log1p(-alpha_one)), color=colour, lw=1)
 axes[2].set(title="equal sheets: dots render, lines $c\\,(1-(1-\\alpha)^n)$", xlabel="number of sheets $n$")
 axes[2].legend(fontsize=8)
+plt.show()
+
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
