@@ -1,5 +1,6 @@
 """`endotsr golden generate`: computes all cases anew and compares them with the folder; writes only when told."""
 
+import functools
 import shutil
 from pathlib import Path
 
@@ -15,8 +16,12 @@ from endotsr.conformance.store import machine_class, plain_or_none, rendered_fil
 GENERATED = ("cases", "schemas")
 
 
+@functools.cache
 def solve_all() -> list[Solved]:
-    """Every case with its answers. Raises ValueError where a case does not show what it was made for."""
+    """Every case with its answers, computed once a process.
+
+    Raises: ValueError where a case does not show the mistakes it was made for.
+    """
     operations, negatives = all_operations(), all_negatives()
     return [solve(spec, operations[spec.operation], negatives) for spec in all_specs()]
 
