@@ -25,7 +25,7 @@ import numpy as np
 from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward
-from endotsr.splatting.projection import projection_forward, projection_reverse
+from endotsr.splatting.projection import projection_forward, projection_reverse, projection_reverse_footprint
 from endotsr.splatting.settings import EXACT, PAPER
 
 rng = np.random.default_rng(6)
@@ -168,8 +168,9 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# Then the centre. It enters through $(u,v)$, and through $J$, whose entries depend on $z$ and on the clamped $x',y'$. Where the clamp
-# is not active, $x'=x$. Where it is active, $x'=\pm zL_x$: it no longer depends on $x$, but it does on $z$. That is the last line.
+# In float32 this way has a hole: $g_a,g_b,g_c$ of a needle are huge and nearly cancel. The render therefore goes from the gradients of
+# the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$. It is the same chain rule, with $e_k=t_{0k}-m\,t_{1k}$
+# written so that nothing cancels:
 #
 # $$
 # \begin{aligned}
@@ -180,7 +181,8 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The pose collects from all Gaussians (the terms with $g_{\mathbf o}$ come from the viewing directions and are not part of this stage):
+# Then the centre. It enters through $(u,v)$, and through $J$, whose entries depend on $z$ and on the clamped $x',y'$. Where the clamp
+# is not active, $x'=x$. Where it is active, $x'=\pm zL_x$: it no longer depends on $x$, but it does on $z$. That is the last line.
 #
 # $$
 # \begin{aligned}
@@ -189,6 +191,15 @@ plt.show()
 # +\frac{2f_xx'}{z^3}g_{J_{02}}+\frac{2f_yy'}{z^3}g_{J_{12}}\\
 # &\quad+[\,|x/z|>L_x\,]\,\frac{x'}{z}\,g_{x'}+[\,|y/z|>L_y\,]\,\frac{y'}{z}\,g_{y'},\\
 # g_\mu&=W^\top(g_x,g_y,g_z)^\top .
+# \end{aligned}
+# $$
+#
+# The pose collects from all Gaussians (the terms with $g_{\mathbf o}$ come from the viewing directions and are not part of this stage):
+#
+# $$
+# \begin{aligned}
+# g_{\mathbf d}&=\sum_i (g_x,g_y,g_z)_i^\top-W g_{\mathbf o},\\
+# g_W&=\sum_i\bigl[(g_x,g_y,g_z)_i^\top\mu_i^\top+J_i^\top g_{T,i}R_i^\top\bigr]-\mathbf d\,g_{\mathbf o}^\top,
 # \end{aligned}
 # $$
 
@@ -238,6 +249,42 @@ for settings in (PAPER, EXACT):
         g_d, g_W = g_d + g_xyz, g_W + share
     np.testing.assert_allclose(grads.camera.translation, g_d, rtol=1e-10)
     np.testing.assert_allclose(grads.camera.rotation, g_W, rtol=1e-10)
+
+# %% [markdown]
+# The direct way gives the same gradients as the way through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in {doc}`08_compositing`:
+
+
+# %% tags=["transcription"]
+def footprint_reverse_text(g_A, g_m, g_r, T, S, a, b, c, det, eps=0.3):
+    """g_S and g_T of one Gaussian from the footprint."""
+    A, m, r = c / det, b / c, 1 / c
+    g_S, g_T = np.zeros(3), np.zeros((2, 3))
+    for k in range(3):
+        e_k = r * (eps * T[0, k] + sum(S[l] ** 2 * T[1, l] * (T[0, k] * T[1, l] - T[1, k] * T[0, l]) for l in range(3)))
+        g_S[k] = -2 * S[k] * (A**2 * g_A * e_k**2 - r * g_m * T[1, k] * e_k + r**2 * g_r * T[1, k] ** 2)
+        g_T[0, k] = S[k] ** 2 * (r * g_m * T[1, k] - 2 * A**2 * g_A * e_k)
+        g_T[1, k] = S[k] ** 2 * (2 * A**2 * m * g_A * e_k + r * g_m * (e_k - m * T[1, k]) - 2 * r**2 * g_r * T[1, k])
+    return g_S, g_T
+
+
+# %%
+g_A, g_m, g_r = g_abc  # any numbers will do
+projected, saved = projection_forward(mu, shape, camera, PAPER)
+direct = projection_reverse_footprint(g_uv, g_abc, g_z, saved)
+a, b, c = projected.covariance2d
+A, m, r = c / projected.determinant, b / c, 1 / c
+g_through = np.stack([-(A**2) * g_A, 2 * A**2 * m * g_A + r * g_m, -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r])
+through = projection_reverse(g_uv, g_through, g_z, saved)
+for i in range(N):
+    S, (J, T) = (
+        shape.scale[:, i],
+        project_text(mu[:, i], shape.rotation[:, :, i], shape.scale[:, i], camera, 1.3)[3][-2:],
+    )
+    g_S, g_T = footprint_reverse_text(g_A[i], g_m[i], g_r[i], T, S, a[i], b[i], c[i], projected.determinant[i])
+    np.testing.assert_allclose(direct.scale[:, i], g_S, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(direct.rotation[:, :, i], (J @ camera.rotation).T @ g_T, rtol=1e-9, atol=1e-12)
+for name in ("position", "rotation", "scale"):
+    np.testing.assert_allclose(getattr(direct, name), getattr(through, name), rtol=1e-7, atol=1e-9)
 
 # %% [markdown]
 # ## The gradient check

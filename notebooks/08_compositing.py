@@ -335,7 +335,7 @@ wide = 1e12  # px^2: the pixel sees the centre
 one = {
     "mean2d": np.full((2, 3), 0.5),
     "covariance2d": np.array([[wide] * 3, [0.0] * 3, [wide] * 3]),
-    "logit": np.array([np.log(0.3 / 0.7), 800.0, 0.0]),
+    "logit": np.array([np.log(0.3 / 0.7), 700.0, 0.0]),
     "colour": np.eye(3),
     "depth": np.array([1.0, 2.0, 3.0]),
 }
@@ -345,7 +345,7 @@ grads = kernel_reverse(one, EXACT, white, zero, zero, width=1, height=1)
 np.testing.assert_allclose(grads["colour"].sum(axis=0), np.array([0.3, 0.7, 0.0]) * 7)
 np.testing.assert_allclose(
     grads["logit"], [0.3 * 0.7 * (1 - 2), 0, 0], atol=1e-14
-)  # a logit of 800 is flat: (1 - o) = 0
+)  # a logit of 700 is flat: (1 - o) = 0
 with np.errstate(invalid="ignore"):
     T_2 = np.float64(0.0) / (1 - 0.5)
     assert np.isnan(T_2 / np.float64(1 - 1.0))

@@ -62,11 +62,7 @@ print(f"{sequence.count} frames of {sequence.width}x{sequence.height}; held out:
 # from iteration $a$ to $b$:
 #
 # $$
-# \begin{aligned}
-# \mathcal L^{(i)} ={}& \underbrace{(1-w)\,\mathcal L_{1} + w\,(1-\mathcal S)}_{\mathcal L_{\mathrm{rgb}}}
-# + w_D\,\mathcal L_{D} + [\,i\ge i_s\,]\;w_S\,\mathcal L_{\mathrm{smooth}}\\
-# &+ [\,i>K_s\,]\;\lambda_{\mathrm{msp}}\,\mathcal L_{\mathrm{msp}} + \lambda_{\mathrm{lap}}(i)\,\mathcal L_{\mathrm{lap}}
-# \end{aligned}
+# \lambda_{\mathrm{lap}}(i) = \lambda_{\mathrm{lap}}\,\min\!\left(1,\max\!\left(0,\frac{i-a}{b-a}\right)\right).
 # $$
 #
 # The rest of the iteration is bookkeeping: draw a view, render, reverse, one Adam step ({doc}`12_optimiser_and_density`).
