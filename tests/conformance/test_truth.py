@@ -168,12 +168,60 @@ def render(i, s, right):
     return dict(zip(("colour_image", "depth_image", "opacity_image"), images))
 
 
+def scene(i, s, right):
+    """Offsets, C phi and the colour residual at time t, each by its own oracle."""
+    m, t = s["model"], s["t"]
+    omega = floats(fourier_oracle.frequencies(m["frequencies"], m["frequency_min"], m["frequency_max"]))
+    names = "position", "quaternion", "log_scale"
+    now = {name: i[name] for name in names}
+    if "fdm_weight" in i:
+        psi = deformation.offsets(i["fdm_weight"], i["fdm_centre"], i["fdm_width"], t, m["basis"])
+        now = {name: i[name] + part for name, part in zip(names, (psi[:3], psi[3:7], psi[7:]))}
+    if "motion_coefficients" in i:
+        phi = floats(fourier_oracle.dictionary(t, omega))
+        now["position"] = now["position"] + residuals_oracle.linear(i["motion_coefficients"], phi)
+    residual = None
+    if "colour_coefficients" in i:
+        found = fourier_oracle.normalised(i["times"][i["train_index"]], omega, t)
+        phi_bar = np.array([0.0 if v is None else v for v in found])
+        residual = residuals_oracle.colour_residual(i["colour_coefficients"], phi_bar, m["beta"])
+    return {f"{name}_at_t": value for name, value in (now | {"residual": residual}).items()}
+
+
+def objective(i, s, right):
+    """The whole of equation (6), forward."""
+    w, m = s["loss"], s["model"]
+    at_t = {name.removesuffix("_at_t"): value for name, value in scene(i, s, right).items()}
+    pose, black = (i["rotation_matrix"], i["translation"]), np.zeros(3)
+    images = splatting_oracle.render(i | at_t, pose, lens_of(s), s["raster"], black, s["degree"])
+    colour, depth = images[:2]
+    mask, observed = i["mask"], i["observed"]
+    masks = laplacian_oracle.masks_by_impulse_response(mask, w["upsampling"])
+    terms = {
+        "l1": losses.masked_l1(colour, observed, mask),
+        "ssim": losses.masked_ssim(colour, observed, mask),
+        "depth": losses.normalised_depth(depth, i["prior_depth"], mask)[0],
+        "smoothness": losses.smoothness(depth, colour, mask, i["edges"], w["total_variation_factor"])[0],
+        "laplacian": laplacian_oracle.loss(colour, observed, masks, w["upsampling"]),
+    }
+    total = (1 - w["ssim_weight"]) * terms["l1"] + w["ssim_weight"] * (1 - terms["ssim"])
+    total += w["depth_weight"] * terms["depth"] + w["smoothness_weight"] * terms["smoothness"]
+    total += w["lambda_lap"] * terms["laplacian"]
+    if "motion_coefficients" in i:
+        omega = fourier_oracle.frequencies(m["frequencies"], m["frequency_min"], m["frequency_max"])
+        rho = floats(matern_oracle.weights(omega, m["correlation_length"]))
+        terms["penalty"] = matern_oracle.penalty(i["motion_coefficients"], rho)
+        total += w["lambda_msp"] * terms["penalty"]
+    named = {f"term_{name}": value for name, value in terms.items()}
+    return named | {"colour_image": colour, "depth_image": depth, "objective": total}
+
+
 ORACLES = {
     "frequencies": frequencies, "dictionary": dictionary, "atoms": atoms, "appearance": appearance, "motion": motion,
     "matern": matern, "laplacian": laplacian, "calibration": calibration, "deformation": deformation_case,
     "adam": adam_case, "masked_l1": masked_l1, "masked_ssim": masked_ssim, "normalised_depth": normalised_depth,
     "smoothness": smoothness, "covariance": covariance, "projection": projection, "harmonics": harmonics,
-    "composite": composite, "render": render,
+    "composite": composite, "render": render, "scene": scene, "objective": objective,
 }  # fmt: skip
 CASES = [c for c in GOLDEN.cases if any(o.truth.kind == "oracle" for o in c.outputs.values())]
 

@@ -240,7 +240,14 @@ def _render() -> list[Spec]:
     shared = ("pixel_corner_camera", "low_pass_missing", "quaternion_xyzw", "pose_inverted")
     rows: list[tuple[str, RasterSettings, int, bool, str, tuple[str, ...]]] = [
         ("exact", EXACT, 3, False, "The definition: every Gaussian at every pixel", ("cutoff_added",)),
-        ("paper", PAPER, 3, False, "The shared semantics, moving camera", ("cutoff_missing", "depth_gradient_dropped")),
+        (
+            "paper",
+            PAPER,
+            3,
+            False,
+            "The shared semantics, moving camera",
+            ("cutoff_missing", "depth_gradient_dropped", "screen_gradient_in_ndc"),
+        ),
         ("legacy", LEGACY, 3, False, "The released code's support and gradients", ("deviations_off",)),
         *((f"paper_degree_{d}", PAPER, d, True, f"Degree {d}, static camera at the origin", ()) for d in range(3)),
     ]

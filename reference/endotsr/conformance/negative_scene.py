@@ -64,6 +64,32 @@ def _clamped_render(request: Request) -> dict[str, NDArray] | None:
     return {"term_l1": new, "objective": request.right["objective"] + (1 - w) * (new - old)}
 
 
+def _gradients_without(**changes: Any) -> Wrong:
+    """Right values, but gradients as if a term had no weight."""
+    wrong = setting(**{f"loss__{key}": value for key, value in changes.items()})
+
+    def limited(request: Request) -> dict[str, NDArray] | None:
+        found = wrong(request)
+        return None if found is None else {name: a for name, a in found.items() if name.startswith("d_")}
+
+    return limited
+
+
+def _position_offsets_only(request: Request) -> dict[str, NDArray]:
+    """Rotation and scale offsets of the deformation learn nothing."""
+    out = {}
+    for name in ("d_fdm_weight", "d_fdm_centre", "d_fdm_width"):
+        if name in request.right:
+            out[name] = request.right[name].copy()
+            out[name][3:] = 0
+    return out
+
+
+def _unscaled_residual(request: Request) -> dict[str, NDArray]:
+    name = "d_colour_coefficients"
+    return {name: request.right[name] * 0.28209479177387814} if name in request.right else {}
+
+
 def _other_bits(request: Request) -> dict[str, NDArray]:
     """The second answer differs in the last bit of float32."""
     d = request.right["d_position_2"]
@@ -85,6 +111,16 @@ NEGATIVES = [
     Negative("smoothness_dropped", "Smoothness left out", "0; right: its weight", _loss(smoothness_weight=0.0)),
     Negative("photometric_of_clamped_render", "Loss of the clamped render", "clip(render); right: as it is",
              {"objective": _clamped_render}),
+    Negative("detail_gradient_dropped", "Laplacian loss without gradient", "value only; right: its adjoint too",
+             {"objective": _gradients_without(lambda_lap=0.0)}),
+    Negative("depth_loss_gradient_dropped", "Depth loss without gradient", "value only; right: by the depth image",
+             {"objective": _gradients_without(depth_weight=0.0)}),
+    Negative("penalty_gradient_dropped", "Matern penalty without gradient", "value only; right: added to that of C",
+             {"objective": _gradients_without(lambda_msp=0.0)}),
+    Negative("deformation_of_position_only", "No gradient to rotation and scale offsets", "0; right: all ten channels",
+             {"objective": _position_offsets_only}),
+    Negative("residual_gradient_unscaled", "1 / Y00 missing in the gradient of the residual", "Y00 times too small",
+             {"objective": _unscaled_residual}),
     Negative("skipped_step_when_densifying", "No optimiser step when densifying", "skipped; right: taken",
              _config(optimiser__legacy_skip=True)),
     Negative("residuals_born_late", "Residuals start one iteration late", "K_s + 2; right: K_s + 1",

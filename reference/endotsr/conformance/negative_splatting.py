@@ -253,6 +253,9 @@ NEGATIVES = [
              {"projection": _clamped_jacobian}),
     Negative("clamp_term_twice", "Factor 2 in the gradient of the clamped Jacobian", "2 / z; right: 1 / z",
              {"projection": _switch("double_clamp_term"), "render": _switch("double_clamp_term")}),
+    Negative("screen_gradient_in_ndc", "Screen gradient per NDC unit", "times half the image size; right: per px",
+             {"render": lambda r: {"d_mean2d": r.right["d_mean2d"] * np.array(
+                 [[r.settings["camera"]["width"] / 2], [r.settings["camera"]["height"] / 2]])}}),
     Negative("near_plane_zero", "Near plane at 0", "z > 0; right: z > near",
              _raster(("projection", "render"), near=1e-3)),
     Negative("pose_inverted", "Pose taken as camera to world", "W^T; right: world to camera",

@@ -176,14 +176,21 @@ FIELDS = Gaussians._fields
 
 OPERATIONS = [
     Operation("scene", "2", "raw parameters at time t, every component applied", _scene, {
-        "position_at_t": Asked(1, "scene unit", "last"), "quaternion_at_t": Asked(1, "1", "last"),
-        "log_scale_at_t": Asked(1, "1", "last"), "residual_at_t": Asked(1, "display / Y00", "last"),
+        "position_at_t": Asked(1, "scene unit", "last", "residuals_oracle.linear"),
+        "quaternion_at_t": Asked(1, "1", "last", "deformation.offsets"),
+        "log_scale_at_t": Asked(1, "1", "last", "deformation.offsets"),
+        "residual_at_t": Asked(1, "display / Y00", "last", "residuals_oracle.colour_residual"),
     }),
     Operation("objective", "6", "moving scene, render, full loss, every gradient", _objective, {
-        "colour_image": Asked(3, "display"), "depth_image": Asked(3, "scene unit"),
-        "term_l1": Asked(3, "display"), "term_ssim": Asked(3), "term_depth": Asked(3),
-        "term_smoothness": Asked(3, "scene unit^2"), "term_laplacian": Asked(3, "display"),
-        "term_penalty": Asked(3, "scene unit^2"), "objective": Asked(3, "loss"),
+        "colour_image": Asked(3, "display", oracle="splatting_oracle.render"),
+        "depth_image": Asked(3, "scene unit", oracle="splatting_oracle.render"),
+        "term_l1": Asked(3, "display", oracle="losses.masked_l1"),
+        "term_ssim": Asked(3, oracle="losses.masked_ssim"),
+        "term_depth": Asked(3, oracle="losses.normalised_depth"),
+        "term_smoothness": Asked(3, "scene unit^2", oracle="losses.smoothness"),
+        "term_laplacian": Asked(3, "display", oracle="laplacian_oracle.loss"),
+        "term_penalty": Asked(3, "scene unit^2", oracle="matern_oracle.penalty"),
+        "objective": Asked(3, "loss", oracle="losses.masked_l1"),
         **{f"d_{name}": Asked(3, UNITS.get(name, "loss"), "last") for name in FIELDS},
     }, ("objective",)),
     Operation("training", "6", "calibration and twenty iterations", _training, {
