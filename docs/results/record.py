@@ -1,7 +1,9 @@
 """Record a run: docs/results/NAME.json from RUN/metrics.json, and the tables made from all recorded runs.
 
-    python docs/results/record.py RUN NAME        add or replace one record, then rewrite the tables
-    python docs/results/record.py                 rewrite the tables only
+    python docs/results/record.py RUN NAME COMMIT   add or replace one record, then rewrite the tables
+    python docs/results/record.py                   rewrite the tables only
+
+COMMIT is the revision of this repository that made the run.
 
 The tables stand in docs/results/README.md and in README.md, between the `results:start` and `results:end` marks.
 """
@@ -24,11 +26,12 @@ COLUMNS = (
 )
 
 
-def record(run: Path, name: str) -> None:
+def record(run: Path, name: str, commit: str) -> None:
     """Copy the metrics of a run; paths of the machine are reduced to the name of the folder."""
     metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
     source = metrics["run"]["input"]
     source["source"] = Path(source["source"]).name
+    metrics["run"]["commit"] = commit
     metrics["published"] = [row for clip, row in PUBLISHED.items() if clip in source["source"]]
     write_json(FOLDER / f"{name}.json", metrics)
 
@@ -60,7 +63,7 @@ def about(name: str, metrics: dict) -> str:
         f"{run['gaussians']} Gaussians at the end, training PSNR {training['psnr_full']:.2f} dB, "
         f"lambda_lap {run['lambda_lap']:.3g}, {run['seconds'] / 60:.0f} minutes and "
         f"{run['peak_memory_bytes'] / 1e9:.2f} GB on {run['threads']} threads of {machine['processor']} "
-        f"({machine['cores']} cores), {run['started'][:10]}."
+        f"({machine['cores']} cores, shared with other work), {run['started'][:10]}, revision {run['commit']}."
     )
 
 
@@ -74,8 +77,8 @@ def replace_marked(path: Path, text: str) -> None:
 
 def main(words: list[str]) -> None:
     """The command."""
-    if len(words) == 2:
-        record(Path(words[0]), words[1])
+    if len(words) == 3:
+        record(Path(words[0]), words[1], words[2])
     elif words:
         sys.exit(__doc__)
     records = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(FOLDER.glob("pulling*.json"))}
