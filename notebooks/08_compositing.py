@@ -285,7 +285,7 @@ def reverse_text(g_I, g_D, g_O, scene, settings):
 g_I, g_D, g_O = rng.normal(size=(3, HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH))
 
 
-def kernel_reverse(scene, settings, g_I, g_D, g_O, **size):
+def kernel_reverse(scene, settings, g_I, g_D, g_O, conic_epsilon=0.0, **size):
     out, (order, projected, saved, _) = composite(scene, settings, **size)
     pairs = composite_reverse(g_I, g_D, g_O, saved)
     grads = gather_gradients(
@@ -295,7 +295,7 @@ def kernel_reverse(scene, settings, g_I, g_D, g_O, **size):
         pairs,
         projected.determinant,
         scene["logit"],
-        conic_epsilon=0.0,
+        conic_epsilon=conic_epsilon,
         keep_depth=True,
     )
     names = ("mean2d", "covariance2d", "logit", "colour", "depth")
@@ -306,6 +306,15 @@ for settings in (PAPER, EXACT):
     found, text = kernel_reverse(scene, settings, g_I, g_D, g_O), reverse_text(g_I, g_D, g_O, scene, settings)
     for name in text:
         np.testing.assert_allclose(found[name], text[name], rtol=1e-9, atol=1e-11, err_msg=name)
+
+# %% [markdown]
+# The released program adds a small number to $\det^2$ in this last step, so that its $g_a,g_b,g_c$ are multiplied by
+# $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces it under the name `conic_epsilon`; here with a number large enough to show.
+
+# %%
+exact, damped = (kernel_reverse(scene, PAPER, g_I, g_D, g_O, conic_epsilon=number) for number in (0.0, 1e4))
+det = scene["covariance2d"][0] * scene["covariance2d"][2] - scene["covariance2d"][1] ** 2
+np.testing.assert_allclose(damped["covariance2d"], exact["covariance2d"] * det**2 / (det**2 + 1e4), rtol=1e-12)
 
 # %% [markdown]
 # ## The gradient check

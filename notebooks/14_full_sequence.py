@@ -162,7 +162,7 @@ for name, label in (
     axes[0].semilogy([e["iteration"] for e in there][4:-4], np.maximum(smooth(values), 1e-9)[4:-4], label=label)
 for milestone, label in ((config.loss.detail_from, "detail begins"), (born, "A and S are born")):
     axes[0].axvline(milestone, color="0.7", lw=1)
-    axes[0].text(milestone, 1.3, label, fontsize=8, rotation=90, va="top", ha="right")
+    axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
 axes[0].legend(fontsize=8, ncols=3, loc="lower left")
 per_frame = [score(state, shop, [k]) for k in range(sequence.count)]
