@@ -90,7 +90,7 @@ def _gather(
 ):  # fmt: skip
     """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
     real = records.dtype.type
-    half, one, zero = real(0.5), real(1), real(0)
+    half, one, zero, largest = real(0.5), real(1), real(0), real(700)
     total = np.empty(GRADIENT, records.dtype)
     for k in range(first, stop):
         for j in range(GRADIENT):
@@ -110,7 +110,8 @@ def _gather(
         d_footprint[0, i] = factor * (-half * total[SUM_SEE])
         d_footprint[1, i] = factor * (a * total[SUM_SEY])
         d_footprint[2, i] = factor * (-half * total[SUM_SYY])
-        d_logit[i] = total[SUM_S] / (one + math.exp(opacity_logit[i]))  # sum of s, times 1 - opacity
+        # sum of s, times 1 - opacity; the bound keeps exp from raising where it is not compiled
+        d_logit[i] = total[SUM_S] / (one + math.exp(min(opacity_logit[i], largest)))
         d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
         d_depth[i] = total[SUM_DEPTH] if keep_depth else zero
 
