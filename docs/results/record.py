@@ -63,7 +63,7 @@ def about(name: str, metrics: dict) -> str:
         f"{run['gaussians']} Gaussians at the end, training PSNR {training['psnr_full']:.2f} dB, "
         f"lambda_lap {run['lambda_lap']:.3g}, {run['seconds'] / 60:.0f} minutes and "
         f"{run['peak_memory_bytes'] / 1e9:.2f} GB on {run['threads']} threads of {machine['processor']} "
-        f"({machine['cores']} cores, shared with other work), {run['started'][:10]}, revision {run['commit']}."
+        f"({machine['cores']} cores), {run['started'][:10]}, revision {run['commit']}."
     )
 
 
