@@ -69,7 +69,7 @@ def test_every_pair_names_a_function_of_the_package():
 
 
 def test_compiled_kernels_go_through_the_one_jit():
-    """numba is imported for prange and helpers, but nothing except jit.py decides how a kernel is compiled."""
+    """numba is imported for types and thread counts, but nothing except jit.py decides how a kernel is compiled."""
     for file in SOURCES:
         if file.name == "jit.py":
             continue

@@ -30,7 +30,7 @@ def load_model(folder: RunFolder) -> Model:
         raise InputError(f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --resume`")
     checkpoint, config, record = load_checkpoint(folder.checkpoint), folder.config(), folder.sequence_record()
     times = np.array(record["times"])[record["train_index"]]
-    spectral = spectral_from(config.model, times, checkpoint.gaussians.position.dtype)
+    spectral = spectral_from(config.model, times)
     return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration)
 
 

@@ -10,7 +10,7 @@ time; goes out: the `Scene` that the rasteriser takes, or gradients by field nam
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from endotsr.config import Config, ModelConfig
 from endotsr.equations.appearance import AppearanceSaved, appearance_forward, appearance_reverse
@@ -49,12 +49,12 @@ class SceneGrads(NamedTuple):
     offsets: FloatArray | None  # (10, N)
 
 
-def spectral_from(model: ModelConfig, train_times: NDArray[np.floating], dtype: DTypeLike = np.float64) -> Spectral:
-    """Frequencies, atom statistics over the TRAINING times only, and Matern weights; computed in float64.
+def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spectral:
+    """Frequencies, atom statistics over the TRAINING times only, and Matern weights; computed in float64
+    and rounded once, where they meet the coefficients.
 
     train_times  (n,) normalised times of the training frames
     """
-    del dtype  # the atoms are formed in float64 and rounded once, where they meet the coefficients
     omega = frequencies(model.frequencies, model.frequency_min, model.frequency_max, np.float64)
     statistics = atom_statistics(np.asarray(train_times, np.float64), omega)
     return Spectral(omega, statistics, matern_weights(omega, model.correlation_length))
