@@ -15,6 +15,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
+PEERS = [PACKAGE / "bench" / "peer_gsplat.py"]  # runs another program beside ours, and is never needed
 
 # Forward functions whose check runs under the name of another pair, and why.
 ALIASES: dict[str, str] = {}
@@ -110,7 +111,14 @@ def test_no_file_is_too_long():
 
 @pytest.mark.parametrize("library", ["torch", "jax", "tensorflow", "autograd", "pickle", "dill", "joblib"])
 def test_no_autodiff_library_and_no_pickle(library):
-    assert [str(f) for f in SOURCES if library in imported(f)] == []
+    assert [str(f) for f in SOURCES if library in imported(f) and f not in PEERS] == []
+
+
+def test_comparisons_with_other_programs_load_them_inside_functions_only():
+    for file in PEERS:
+        at_the_top = [n for n in parse(file).body if isinstance(n, ast.Import | ast.ImportFrom)]
+        loaded = [n.module if isinstance(n, ast.ImportFrom) else n.names[0].name for n in at_the_top]
+        assert not {"torch", "gsplat"} & {str(name).split(".")[0] for name in loaded}, file
 
 
 def test_no_pickle_through_numpy():
