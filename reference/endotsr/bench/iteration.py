@@ -7,13 +7,11 @@ warm-up; compilation is timed apart. Medians and quartiles, because a shared mac
 import time
 from typing import Any
 
-import numpy as np
-
 from endotsr.bench import workload
+from endotsr.bench.case import WARM_UP, representative
+from endotsr.bench.timing import spread
 from endotsr.config import PAPER, Config
 from endotsr.runs import peak_memory_bytes
-
-WARM_UP = 2  # iterations after the compiling one
 
 
 class StageTimer:
@@ -49,7 +47,7 @@ def benchmark_iteration(
     """
     from endotsr.fitting.trainer import bench_state, training_step, workshop
 
-    iteration = _representative(config)
+    iteration = representative(config)
     shop = workshop(workload.sequence(width, height), config)
     for index in shop.sequence.train_index:
         shop.targets_of(int(index))  # a run makes them once a frame
@@ -75,23 +73,11 @@ def benchmark_iteration(
         "precision": config.training.precision,
         "iteration_of_schedule": iteration + 1,
         "repeats": repeats,
-        "stages": {name: _spread(seconds) for name, seconds in timer.seconds.items()},
-        "iteration": _spread(totals),
+        "stages": {name: spread(seconds) for name, seconds in timer.seconds.items()},
+        "iteration": spread(totals),
         "first_iteration_s": first,
         "peak_memory_bytes": peak_memory_bytes(),
     }
-
-
-def _representative(config: Config) -> int:
-    """An iteration after which everything runs: residuals, detail loss and statistics, but no densification."""
-    t, loss = config.training, config.loss
-    start = max(t.residual_activation + 1, loss.detail_full, loss.smoothness_from)
-    return start + config.density.interval // 2
-
-
-def _spread(seconds: list[float]) -> dict[str, Any]:
-    low, median, high = np.percentile(np.array(seconds) * 1e3, [25, 50, 75])
-    return {"median_ms": float(median), "quartiles_ms": [float(low), float(high)]}
 
 
 def table(result: dict[str, Any]) -> str:
@@ -100,8 +86,8 @@ def table(result: dict[str, Any]) -> str:
     total = result["iteration"]["median_ms"]
     rows = [*result["stages"].items(), ("iteration", result["iteration"])]
     lines = []
-    for name, spread in rows:
-        low, high = spread["quartiles_ms"]
-        share = f"{spread['median_ms'] / total:8.0%}" if name != "iteration" else ""
-        lines.append(f"{name:<18}{spread['median_ms']:>12.2f}{f'{low:.2f} - {high:.2f}':>20}{share}")
+    for name, times in rows:
+        low, high = times["quartiles_ms"]
+        share = f"{times['median_ms'] / total:8.0%}" if name != "iteration" else ""
+        lines.append(f"{name:<18}{times['median_ms']:>12.2f}{f'{low:.2f} - {high:.2f}':>20}{share}")
     return "\n".join([head, *lines])

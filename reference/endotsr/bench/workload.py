@@ -19,7 +19,7 @@ WIDTH, HEIGHT, FOCAL = 640, 512, 570.0
 SIGMA_PIXELS = {20_000: 3.6, 60_000: 2.4, 150_000: 1.7}
 BORDER = 0.04  # share of the picture beyond each border that holds Gaussians too
 OPAQUE_SHARE = 0.55
-FRAMES = 9  # of the sequence: frame 1 is held out
+FRAMES = 9  # of the sequence, if nothing else is asked for: frame 1 is held out
 
 
 def camera(width: int = WIDTH, height: int = HEIGHT) -> Camera:
@@ -34,15 +34,18 @@ def surface(column: FloatArray, row: FloatArray) -> FloatArray:
     return 4.0 + 0.35 * np.sin(column / 61.0) * np.cos(row / 47.0) + fine
 
 
-def gaussians(count: int, config: Config, seed: int = 7) -> Gaussians:
-    """The scene, with the time bases and residuals that `config.model` has, in `config.training.precision`."""
+def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> Gaussians:
+    """The scene, with the time bases and residuals that `config.model` has, in `config.training.precision`.
+
+    size  factor on the semi-axes: more or fewer pixels under the same Gaussians
+    """
     rng = np.random.default_rng(seed)
     column = rng.uniform(-BORDER * WIDTH, (1 + BORDER) * WIDTH, count)
     row = rng.uniform(-BORDER * HEIGHT, (1 + BORDER) * HEIGHT, count)
     depth = surface(column, row) + rng.normal(0, 0.01, count)
     position = np.stack([(column - WIDTH / 2) / FOCAL * depth, (row - HEIGHT / 2) / FOCAL * depth, depth])
     sigma = SIGMA_PIXELS.get(count, 2.4 * np.sqrt(60_000 / count)) * depth.mean() / FOCAL
-    scale = sigma * np.exp(rng.normal(0, 0.45, (count, 3))).T
+    scale = size * sigma * np.exp(rng.normal(0, 0.45, (count, 3))).T
     scale[2] *= 0.25
     quaternion = _facing(rng, count)
     opaque = rng.random(count) < OPAQUE_SHARE
@@ -56,10 +59,10 @@ def gaussians(count: int, config: Config, seed: int = 7) -> Gaussians:
         log_scale=np.log(scale),
         opacity_logit=np.log(opacity / (1 - opacity)),
         harmonics=harmonics,
-        **_temporal(rng, count, config, sigma),
     )
     dtype = np.dtype(config.training.precision)
-    return Gaussians(**{name: np.ascontiguousarray(a, dtype=dtype) for name, a in arrays(scene).items()})
+    scene = Gaussians(**{name: np.ascontiguousarray(a, dtype=dtype) for name, a in arrays(scene).items()})
+    return scene._replace(**temporal(rng, count, config, sigma))
 
 
 def _facing(rng: np.random.Generator, count: int) -> FloatArray:
@@ -70,45 +73,61 @@ def _facing(rng: np.random.Generator, count: int) -> FloatArray:
     return np.stack([cos * w, sin_x * w + sin_y * z, sin_y * w - sin_x * z, cos * z])
 
 
-def _temporal(rng: np.random.Generator, count: int, config: Config, sigma: float) -> dict[str, FloatArray]:
+def temporal(rng: np.random.Generator, count: int, config: Config, sigma: float) -> dict[str, FloatArray]:
     """Small time-dependent parameters: every Gaussian moves a little, so no branch is skipped."""
     model, made = config.model, {}
+    dtype = np.dtype(config.training.precision)
     if model.deformation:
         shape = (DEFORMATION_CHANNELS, model.bases, count)
-        made["fdm_weight"] = rng.normal(0, 0.02 * sigma, shape)
-        made["fdm_centre"] = np.linspace(0, 1, model.bases)[:, None] + rng.normal(0, 0.01, shape)
-        made["fdm_width"] = np.full(shape, max(model.initial_width, 0.05))
+        made["fdm_weight"] = _normal(rng, 0.02 * sigma, shape, dtype)
+        made["fdm_centre"] = _normal(rng, 0.01, shape, dtype, np.linspace(0, 1, model.bases))
+        made["fdm_width"] = np.full(shape, max(model.initial_width, 0.05), dtype)
     shape = (3, 2 * model.frequencies, count)
     if model.appearance:
-        made["colour_coefficients"] = rng.normal(0, 0.02, shape)
+        made["colour_coefficients"] = _normal(rng, 0.02, shape, dtype)
     if model.spectral_motion:
-        made["motion_coefficients"] = rng.normal(0, 0.02 * sigma, shape)
+        made["motion_coefficients"] = _normal(rng, 0.02 * sigma, shape, dtype)
     return made
 
 
-def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11) -> Sequence:
-    """Nine frames to compare with: a soft moving pattern with fine texture; an instrument hides one corner."""
+def _normal(
+    rng: np.random.Generator, sigma: float, shape: tuple[int, ...], dtype: np.dtype, middle: FloatArray | None = None
+) -> FloatArray:
+    """Normal numbers about `middle` (one per index of the second axis), a row at a time.
+
+    The memory of a million Gaussians is that of their training, not that of a float64 draft.
+    """
+    out = np.empty(shape, dtype)
+    for block in out:
+        for j, row in enumerate(block):
+            row[:] = rng.normal(0, sigma, row.size) + (0.0 if middle is None else middle[j])
+    return out
+
+
+def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11, frames: int = FRAMES) -> Sequence:
+    """Frames to compare with: a soft moving pattern with fine texture; an instrument hides one corner."""
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[0:height, 0:width].astype(np.float64)
     column, row = column * (WIDTH / width), row * (HEIGHT / height)
     depth = surface(column, row).astype(np.float32)
     texture = rng.normal(0, 12, (3, height, width))
     phase = np.array([0.0, 1.0, 2.0])[:, None, None]
-    images = np.empty((FRAMES, 3, height, width), np.uint8)
-    masks = np.ones((FRAMES, height, width), bool)
-    for i in range(FRAMES):
-        wave = np.sin(column / 40 + phase + 0.2 * i) * np.cos(row / 35 - 0.1 * i)
+    step = FRAMES / frames  # more frames are a finer sampling of the same clip
+    images = np.empty((frames, 3, height, width), np.uint8)
+    masks = np.ones((frames, height, width), bool)
+    for i in range(frames):
+        wave = np.sin(column / 40 + phase + 0.2 * step * i) * np.cos(row / 35 - 0.1 * step * i)
         images[i] = np.clip(128 + 70 * wave + texture, 0, 255)
-        edge = WIDTH * (0.55 + 0.02 * i)
+        edge = WIDTH * (0.55 + 0.02 * step * i)
         masks[i] = ~((column > edge) & (row > 0.55 * HEIGHT))
-    index = np.arange(FRAMES)
+    index = np.arange(frames)
     view = camera(width, height)
     return Sequence(
         images=images,
         masks=masks,
         depth=np.where(masks, depth, np.float32(0)),
-        times=index / FRAMES,
-        cameras=[view] * FRAMES,
+        times=index / frames,
+        cameras=[view] * frames,
         names=[f"{i:06d}" for i in index],
         near=0.2,
         unit="scene units",

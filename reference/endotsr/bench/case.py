@@ -1,0 +1,149 @@
+"""One point of a benchmark: sizes in, times by stage, pairs and memory out. Runs in a process of its own.
+
+The iteration that is timed is one of the published schedule after which everything runs: all components, all losses,
+the statistics of density control. Densification, which comes once an interval, is timed after the others.
+"""
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from endotsr.bench import workload
+from endotsr.bench.timing import spread
+from endotsr.config import PAPER, Config
+
+Precision = Literal["float32", "float64"]
+
+WARM_UP = 2  # iterations after the compiling one
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is timed; the defaults are the common workload at 60 000 Gaussians."""
+
+    gaussians: int = 60_000
+    width: int = workload.WIDTH
+    height: int = workload.HEIGHT
+    precision: Precision = "float32"
+    threads: int = 2
+    repeats: int = 11
+    bases: int = PAPER.model.bases
+    frequencies: int = PAPER.model.frequencies
+    frames: int = workload.FRAMES
+    size: float = 1.0  # factor on the semi-axes of the Gaussians
+    scene: str | None = None  # file of a trained scene in place of the common workload; `gaussians` is then ignored
+    densifications: int = 2  # timed after the iterations, 0 = none
+
+    def config(self) -> Config:
+        """The published settings with the sizes of this case."""
+        change = msgspec.structs.replace
+        training = change(PAPER.training, precision=self.precision, threads=self.threads)
+        model = change(PAPER.model, bases=self.bases, frequencies=self.frequencies)
+        return change(PAPER, training=training, model=model)
+
+
+def apart(function: Callable[..., Any], *arguments: Any) -> Any:
+    """The result of `function(*arguments)` from a fresh process, so that its peak memory is its own."""
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=spawn) as pool:
+        return pool.submit(function, *arguments).result()
+
+
+def measure(case: Case) -> dict[str, Any]:
+    """Times of the stages and of the iteration, pairs, memory. Call it through `apart`.
+
+    returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration", the same for the sum of the four
+             splatting stages and for everything; "first_iteration_s", compilation or loading of compiled code
+             included; "view" {"visible", "listed", "blended"}; "parameters" a Gaussian; "peak_memory_bytes";
+             "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was asked for
+    """
+    import numba
+
+    from endotsr.bench.clock import SPLAT, StageClock
+    from endotsr.fitting.trainer import training_step
+    from endotsr.runs import peak_memory_bytes
+    from endotsr.scene.gaussians import arrays
+
+    numba.set_num_threads(min(case.threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    config = case.config()
+    state, shop = prepare(case, config)
+    iteration = state.iteration
+    began = time.perf_counter()
+    training_step(state, shop)
+    first, clock = time.perf_counter() - began, StageClock()
+    with clock.watching():
+        for _ in range(WARM_UP + case.repeats):
+            state.iteration = iteration
+            with clock.iteration():
+                training_step(state, shop)
+    times, peak = clock.repeats[WARM_UP:], peak_memory_bytes()
+    numbers = sum(a.size for a in arrays(state.gaussians).values())
+    return {
+        "case": asdict(case) | {"gaussians": state.gaussians.count, "scene": case.scene and Path(case.scene).stem},
+        "stages": {name: spread([t[name] for t in times]) for name in times[0]},
+        "splat": spread([sum(t[name] for name in SPLAT) for t in times]),
+        "iteration": spread([sum(t.values()) for t in times]),
+        "first_iteration_s": first,
+        "view": _view(state, shop),
+        "parameters": numbers // state.gaussians.count,
+        "peak_memory_bytes": peak,
+        "densification": _densification(state, shop, case.densifications),
+    }
+
+
+def prepare(case: Case, config: Config) -> tuple[Any, Any]:
+    """State and workshop of a case, at the iteration that is timed, every target made."""
+    from endotsr.bench.trained import trained_gaussians
+    from endotsr.fitting.trainer import bench_state, workshop
+
+    shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
+    for index in shop.sequence.train_index:
+        shop.targets_of(int(index))  # a run makes them once a frame
+    if case.scene:
+        scene = trained_gaussians(Path(case.scene), config)
+    else:
+        scene = workload.gaussians(case.gaussians, config, size=case.size)
+    return bench_state(scene, config, representative(config)), shop
+
+
+def representative(config: Config) -> int:
+    """An iteration after which everything runs: residuals, detail loss and statistics, but no densification."""
+    t, loss = config.training, config.loss
+    start = max(t.residual_activation + 1, loss.detail_full, loss.smoothness_from)
+    return start + config.density.interval // 2
+
+
+def _view(state: Any, shop: Any) -> dict[str, int]:
+    """Gaussians on the screen, entries of the tile lists and blended pairs of the first training view."""
+    from endotsr.bench.pairs import count_pairs
+    from endotsr.fitting.model import raster_settings, scene_at
+
+    model, index = shop.config.model, int(shop.sequence.train_index[0])
+    scene, _ = scene_at(state.gaussians, shop.spectral, model, float(shop.sequence.times[index]))
+    camera = shop.sequence.cameras[index]
+    return count_pairs(scene, camera, raster_settings(shop.config), model.harmonics_degree)
+
+
+def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:
+    """What an iteration that densifies spends on it; the scene changes, so there are few repeats."""
+    from endotsr.bench.clock import StageClock
+    from endotsr.fitting.trainer import training_step
+
+    if repeats == 0:
+        return None
+    interval, clock = shop.config.density.interval, StageClock()
+    with clock.watching():
+        for _ in range(1 + repeats):  # the first one loads its kernels
+            state.iteration = -(-state.iteration // interval) * interval - 1
+            with clock.iteration():
+                training_step(state, shop)
+    seconds = [t["density control"] for t in clock.repeats[1:]]
+    share = float(np.median(seconds)) * 1e3 / interval
+    return spread(seconds) | {"per_iteration_ms": share, "gaussians": state.gaussians.count}

@@ -1,0 +1,75 @@
+"""Pictures of benchmark results, on white, drawn with matplotlib."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from endotsr.bench.clock import REST, STAGES
+from endotsr.evaluation.curves import UNSIGNED
+
+INK, FAINT = "#24303a", "#c9d1d8"
+# Stages of one kind share a hue: time bases blue, splatting orange to red, losses green, optimiser violet.
+COLOURS = {
+    "FDM": "#0b6e99",
+    "FDM reverse + Adam": "#58a6c9",
+    "Fourier": "#a9d3e6",
+    "projection": "#7f2704",
+    "binning": "#b8480f",
+    "blend forward": "#e8762c",
+    "blend reverse": "#fdb27a",
+    "L1 and SSIM": "#3f6d1c",
+    "pyramid": "#79ab45",
+    "depth and smoothness": "#bfdc9a",
+    "Adam": "#8a4fa3",
+    "density control": "#cfa9df",
+    REST: "#9aa6b0",
+}
+assert set(COLOURS) == {*STAGES, REST}
+
+
+def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """One stacked bar a case, the stages in their order, the whole iteration in numbers at its end."""
+    figure, axes = _figure(9.6, 1.7 + 0.42 * len(cases))
+    labels = [_label(case["case"]) for case in cases]
+    left = [0.0] * len(cases)
+    for name, colour in COLOURS.items():
+        widths = [case["stages"][name]["median_ms"] for case in cases]
+        axes.barh(labels, widths, left=left, color=colour, label=name, height=0.72, edgecolor="white", linewidth=0.5)
+        left = [a + b for a, b in zip(left, widths)]
+    longest = max(left, default=0.0)
+    for row, (end, case) in enumerate(zip(left, cases)):
+        text = f"{case['iteration']['median_ms']:.0f} ms"
+        axes.text(end + 0.012 * longest, row, text, va="center", color=INK, fontsize=9)
+    axes.set_xlim(0, 1.1 * longest)
+    axes.invert_yaxis()
+    axes.set_xlabel("median time of one training iteration, ms", color=INK, fontsize=9)
+    _finish(axes, "x")
+    figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=9, labelcolor=INK)
+    _save(figure, path)
+
+
+def _label(case: Mapping[str, Any]) -> str:
+    what = case["scene"] or f"{case['gaussians'] / 1000:g}k"
+    return f"{what}, {case['precision']}, {case['threads']} thread{'s' if case['threads'] > 1 else ''}"
+
+
+def _figure(width: float, height: float, columns: int = 1, rows: int = 1) -> tuple[Any, Any]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns)
+
+
+def _finish(axes: Any, grid: str = "both") -> None:
+    axes.tick_params(which="both", colors=INK, labelsize=9, length=0)
+    axes.grid(True, axis=grid, color=FAINT, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in axes.spines.values():
+        side.set_visible(False)
+
+
+def _save(figure: Any, path: Path) -> None:
+    metadata = UNSIGNED if path.suffix == ".png" else {"Creator": None, "Date": None}
+    figure.savefig(path, dpi=150, metadata=metadata)

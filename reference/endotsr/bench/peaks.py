@@ -1,0 +1,96 @@
+"""What this machine can do at most: fused multiply-adds per second, and bytes to and from memory per second.
+
+Measured, not looked up, because a virtual machine gets what its host leaves. A stage of the training is then compared
+with these peaks (see `endotsr.bench.limits`).
+"""
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from endotsr.bench.timing import repeated
+from endotsr.jit import jit
+from endotsr.sharing import share
+
+STEPS = 16  # multiply-adds of one chain, each waiting for the one before
+CHAINS = 8  # of one number, independent: enough to hide the latency of an FMA
+BLOCK = 4096  # numbers of one task: they stay in the first-level cache
+TRIAD_BYTES = 96 << 20  # of one array, beyond any cache of the machine
+PIECE = 1 << 16  # numbers in one task of a memory kernel
+
+
+def _multiply_add(first, stop, values, f):
+    """STEPS steps x <- f x + f of CHAINS chains for every number: 2 operations each, and no memory to wait for.
+
+    Plain names, one array and a fixed count of steps: the loop over the numbers becomes vector code.
+    """
+    real = values.dtype.type
+    for task in range(first, stop):
+        row = values[task]
+        for i in range(row.size):
+            s = row[i]
+            t, u, v, w = s + real(1), s + real(2), s + real(3), s + real(4)
+            x, y, z = s + real(5), s + real(6), s + real(7)
+            for _ in range(STEPS):
+                s = f * s + f
+                t = f * t + f
+                u = f * u + f
+                v = f * v + f
+                w = f * w + f
+                x = f * x + f
+                y = f * y + f
+                z = f * z + f
+            row[i] = ((s + t) + (u + v)) + ((w + x) + (y + z))
+
+
+def _triad(first, stop, out, left, right, factor):
+    """out = left + factor right."""
+    begin, end = first * PIECE, min(out.size, stop * PIECE)
+    o, x, y = out[begin:end], left[begin:end], right[begin:end]
+    for i in range(o.size):
+        o[i] = x[i] + factor * y[i]
+
+
+def _update(first, stop, out, left, right, factor):
+    """out <- right + factor out, in place: what an optimiser does; `left` is not read."""
+    begin, end = first * PIECE, min(out.size, stop * PIECE)
+    o, y = out[begin:end], right[begin:end]
+    for i in range(o.size):
+        o[i] = y[i] + factor * o[i]
+
+
+_multiply_add_kernel = jit(_multiply_add, contract=True)
+_triad_kernel = jit(_triad, contract=True)
+_update_kernel = jit(_update, contract=True)
+
+
+def fma_peak(precision: str, repeats: int = 7) -> float:
+    """Floating-point operations per second with the threads in use; a fused multiply-add counts as two."""
+    real = np.dtype(precision).type
+    tasks = 64 * numba.get_num_threads()
+    values = np.ones((tasks, BLOCK), real)
+    work = lambda: share(_multiply_add_kernel, tasks, values, real(0.5))
+    return 2.0 * STEPS * CHAINS * values.size / min(repeated(work, repeats, warm_up=2))
+
+
+def bandwidths(repeats: int = 7, array_bytes: int = TRIAD_BYTES) -> dict[str, float]:
+    """Bytes per second with the threads in use: "triad" (two arrays read, one written), "update"
+    (one read, one changed).
+
+    A line that is only written is read first by most processors; that traffic is not counted, as in STREAM.
+    """
+    out, left, right = (np.ones(array_bytes // 4, np.float32) for _ in range(3))
+    tasks, factor = -(-out.size // PIECE), np.float32(0.5)
+    seconds = {
+        name: min(repeated(lambda k=kernel: share(k, tasks, out, left, right, factor), repeats))
+        for name, kernel in (("triad", _triad_kernel), ("update", _update_kernel))
+    }
+    return {name: 3.0 * out.nbytes / best for name, best in seconds.items()}
+
+
+def measure_peaks(threads: int) -> dict[str, Any]:
+    """Peaks with `threads` threads: "fma_per_precision" in FLOP/s, "bandwidth" in bytes/s. The best of the repeats."""
+    numba.set_num_threads(threads)
+    fma = {precision: fma_peak(precision) for precision in ("float32", "float64")}
+    return {"threads": threads, "flop_per_second": fma, "bytes_per_second": bandwidths()}

@@ -1,0 +1,102 @@
+"""`endotsr bench stages`: every stage of a training iteration over sizes, precisions and threads, beside its limit."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from endotsr.bench.case import Case, Precision, apart, measure
+from endotsr.bench.limits import limits
+from endotsr.bench.peaks import measure_peaks
+
+Say = Callable[[str], None]
+
+
+class Grid(Protocol):
+    """What a person chooses."""
+
+    gaussians: tuple[int, ...]
+    scenes: tuple[Path, ...]
+    precisions: tuple[Precision, ...]
+    threads: tuple[int, ...]
+    width: int
+    height: int
+    repeats: int
+
+
+def grid(chosen: Grid) -> list[Case]:
+    """Every combination of scene, precision and threads; the common workload first, one bar group a size."""
+    base = Case(width=chosen.width, height=chosen.height, repeats=chosen.repeats)
+    scenes = [replace(base, gaussians=n) for n in chosen.gaussians]
+    scenes += [replace(base, scene=str(path)) for path in chosen.scenes]
+    return [
+        replace(scene, precision=precision, threads=threads)
+        for scene in scenes
+        for precision in chosen.precisions
+        for threads in chosen.threads
+    ]
+
+
+def measure_stages(cases: Iterable[Case], say: Say) -> dict[str, Any]:
+    """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}."""
+    cases = list(cases)
+    peaks = {threads: apart(measure_peaks, threads) for threads in sorted({case.threads for case in cases})}
+    results = []
+    for case in cases:
+        result = apart(measure, case)
+        result["limits"] = limits(result, peaks[case.threads])
+        result["ns_per_pair"] = ns_per_pair(result)
+        results.append(result)
+        say(line(result))
+    return {"peaks": list(peaks.values()), "cases": results}
+
+
+def ns_per_pair(result: dict[str, Any]) -> dict[str, float | None]:
+    """Nanoseconds per blended pair of both blending stages and of all splatting; None if nothing was blended."""
+    pairs = result["view"]["blended"]
+    medians = {name: result["stages"][name]["median_ms"] for name in ("blend forward", "blend reverse")}
+    medians["splat"] = result["splat"]["median_ms"]
+    return {name: 1e6 * median / pairs if pairs else None for name, median in medians.items()}
+
+
+def name_of(case: dict[str, Any]) -> str:
+    """A case in words."""
+    what = case["scene"] or f"{case['gaussians']} Gaussians"
+    return f"{what}, {case['width']}x{case['height']}, {case['precision']}, {case['threads']} threads"
+
+
+def line(result: dict[str, Any]) -> str:
+    """One case in a line."""
+    pairs = result["view"]["blended"]
+    return (
+        f"{name_of(result['case'])}: iteration {result['iteration']['median_ms']:.1f} ms, splat "
+        f"{result['splat']['median_ms']:.1f} ms, {pairs / 1e6:.2f} M pairs, {memory(result['peak_memory_bytes'])}"
+    )
+
+
+def memory(found: int | None) -> str:
+    """Peak memory in words."""
+    return f"{found / 1e9:.2f} GB" if found else "memory not known"
+
+
+def table(result: dict[str, Any]) -> str:
+    """One case for a person: each stage with its quartiles, share of the iteration, limit and what binds it."""
+    total = result["iteration"]["median_ms"]
+    lines = [f"{'stage':<22}{'median ms':>11}{'quartiles':>19}{'share':>7}{'limit ms':>10}{'of limit':>10}  bound by"]
+    rows = [*result["stages"].items(), ("splat", result["splat"]), ("iteration", result["iteration"])]
+    for name, spread in rows:
+        low, high = spread["quartiles_ms"]
+        limit = result["limits"].get(name)
+        reached = f"{limit['share']:.0%}" if limit and limit["share"] is not None else "-"
+        bound = f"{limit['limit_ms']:>10.2f}{reached:>10}  {limit['bound']}" if limit else ""
+        share = f"{spread['median_ms'] / total:.0%}"
+        lines.append(f"{name:<22}{spread['median_ms']:>11.2f}{f'{low:.2f} - {high:.2f}':>19}{share:>7}{bound}")
+    dense = result["densification"]
+    if dense:
+        per = f"{dense['per_iteration_ms']:.2f} ms an iteration"
+        lines.append(f"{'densification':<22}{dense['median_ms']:>11.2f}  once an interval: {per}")
+    ns = result["ns_per_pair"]
+    if ns["splat"] is not None:
+        each = ", ".join(f"{name} {value:.2f}" for name, value in ns.items())
+        lines.append(f"{result['view']['blended'] / 1e6:.2f} M blended pairs; ns a pair: {each}")
+    return "\n".join(lines)

@@ -1,0 +1,60 @@
+"""A trained scene in place of the common workload: real sizes, needles and opacities, nothing tuned for speed.
+
+The file is an npz with xyz (N, 3), log_scale (N, 3), quat_wxyz (N, 4), rgb (N, 3) and opacity (N,).
+"""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.bench import workload
+from endotsr.config import Config
+from endotsr.equations.appearance import Y00
+from endotsr.errors import InputError
+from endotsr.scene.gaussians import Gaussians
+
+ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
+DEPTH = 4.0  # scene units of the middle of the scene, that of the common workload
+PERCENTILES = (5, 95)  # of the positions: what is fitted into the picture
+
+
+def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
+    """The scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
+
+    Raises: InputError naming the file and what is missing.
+    """
+    found = _read(path)
+    position, log_scale = found["xyz"].T.astype(np.float64), found["log_scale"].T.astype(np.float64)
+    low, high = np.percentile(position, PERCENTILES, axis=1)
+    across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units a pixel
+    factor = DEPTH / workload.FOCAL / across
+    middle = (low + high)[:, None] / 2
+    opacity = np.clip(found["opacity"].astype(np.float64), 1e-4, 1 - 1e-4)
+    harmonics = np.zeros(((config.model.harmonics_degree + 1) ** 2, 3, opacity.size))
+    harmonics[0] = (found["rgb"].T - 0.5) / Y00
+    dtype = np.dtype(config.training.precision)
+    cast = lambda array: np.ascontiguousarray(array, dtype)
+    scene = Gaussians(
+        position=cast((position - middle) * factor + np.array([[0.0], [0.0], [DEPTH]])),
+        quaternion=cast(found["quat_wxyz"].T),
+        log_scale=cast(log_scale + np.log(factor)),
+        opacity_logit=cast(np.log(opacity / (1 - opacity))),
+        harmonics=cast(harmonics),
+    )
+    sigma = float(np.exp(np.median(scene.log_scale)))
+    return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path) as file:
+            found = {name: file[name] for name in ARRAYS}
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        reason = error.args[0] if isinstance(error, KeyError) else error
+        raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
+    for name, rest in ARRAYS.items():
+        expected = (len(found["xyz"]), *rest)
+        if found[name].shape != expected:
+            raise InputError(f"{path}: {name} has shape {found[name].shape}; allowed: {expected}")
+    return found
