@@ -52,6 +52,23 @@ def test_the_claim_is_the_highest_complete_level(golden, answered, tmp_path):
         path.write_bytes(kept)
 
 
+def test_what_a_port_leaves_out_stands_in_its_claim(golden, answered):
+    precision, folder = answered
+    note, motion = folder / "not_ported.txt", folder / "motion"
+    moved = motion.rename(folder / "motion_away")
+    try:
+        assert judge(golden, folder, precision).level == 0
+        note.write_text("# to do\nmotion  # equation (3)\n")
+        report = judge(golden, folder, precision, again=folder)
+        assert report.passed and report.claim.endswith(f"level 5, {precision}, without motion")
+        note.write_text("motion\nrender\nobjective\n")
+        report = judge(golden, folder, precision)
+        assert report.level == 2 and report.claim.endswith(f"level 2, {precision}, without motion")
+    finally:
+        moved.rename(motion)
+        note.unlink(missing_ok=True)
+
+
 def test_bits_that_change_between_runs_stop_level_5(golden, answered, tmp_path):
     precision, folder = answered
     if precision == "float64":

@@ -130,3 +130,34 @@ def test_names_in_the_report_are_escaped(golden, tmp_path):
     report = judge(golden, tmp_path, "float64", level=0)
     report.cases[0].title = "<script>alert(1)</script>"
     assert "<script>alert" not in as_html(report, golden, tmp_path)
+
+
+LEFT_OUT = {
+    "no operation": (b"nothing_of_this_name\n\x1b[31mred", r"no operation '\\x1b\[31mred'"),
+    "not text": (b"\xff\xfe\x00", "not UTF-8"),
+    "huge": (b"motion\n" * 1000, "longer than"),
+}
+
+
+@pytest.mark.parametrize("name", list(LEFT_OUT))
+def test_a_bad_list_of_operations_left_out_leaves_out_nothing(name, golden, tmp_path):
+    data, reason = LEFT_OUT[name]
+    (tmp_path / "not_ported.txt").write_bytes(data)
+    report = judge(golden, tmp_path, "float32", level=2)
+    assert report.without == () and {c.status for c in report.cases} == {"missing"}
+    assert any(re.search(reason, note) for note in report.notes), report.notes
+
+
+def test_a_port_that_leaves_out_everything_claims_nothing(golden, tmp_path):
+    (tmp_path / "not_ported.txt").write_text("\n".join({case.operation for case in golden.cases}))
+    report = judge(golden, tmp_path, "float32")
+    assert report.level == -1 and not report.passed and report.claim == "no level is complete"
+    as_table(report), as_json(report), as_html(report, golden, tmp_path)
+
+
+def test_the_list_of_what_is_left_out_is_not_read_through_a_link(golden, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "list").write_text("motion\n")
+    (tmp_path / "outputs").mkdir()
+    (tmp_path / "outputs" / "not_ported.txt").symlink_to(tmp_path / "elsewhere" / "list")
+    assert judge(golden, tmp_path / "outputs", "float32", level=1).without == ()

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from endotsr.conformance.compare import Verdict, fingerprint, judged
 from endotsr.conformance.format import LEVELS, Case, Output, Precision
-from endotsr.conformance.npy import Refused, read_plain
+from endotsr.conformance.npy import Refused, read_plain, read_text
 from endotsr.conformance.store import Golden
 
 NEAR = 0.02  # of the way from right to wrong: a fingerprint this close to that of a mistake is that mistake
 
-Status = Literal["passed", "refused", "missing"]
+NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
+
+Status = Literal["passed", "refused", "missing", "not ported"]
 
 
 class OutputReport(msgspec.Struct, kw_only=True):
@@ -63,6 +65,8 @@ class Report(msgspec.Struct, kw_only=True):
     asked_level: int
     level: int
     """highest level that is complete, -1 = none"""
+    without: tuple[str, ...]
+    """operations that the port declares not to do"""
     claim: str
     levels: dict[int, tuple[int, int]]
     """passed and asked outputs by level"""
@@ -81,28 +85,63 @@ def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5
 
     again   a second folder of the same port: level 5 then also asks for the same bits everywhere
     """
-    reports = [judge_case(golden, case, outputs, precision, level) for case in golden.cases if case.level <= level]
-    notes = []
+    without, notes = declared(golden, outputs)
+    reports = [
+        _left_out(case) if case.operation in without else judge_case(golden, case, outputs, precision, level)
+        for case in golden.cases
+        if case.level <= level
+    ]
     if again is not None and level >= 5:
-        reports.append(_repeated(golden, outputs, again))
+        reports.append(_repeated(golden, outputs, again, without))
     elif level >= 5:
         notes.append("level 5: only the determinism cases; a second run (--again) compares all outputs bit by bit")
-    return conclude(golden, reports, precision, level, notes)
+    return conclude(golden, reports, precision, level, notes, without)
 
 
-def conclude(golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str]) -> Report:
-    """Levels, claim and suspects from the verdicts on all cases."""
+def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]:
+    """Operations named in the port's file of what it leaves out, and notes on what could not be understood there."""
+    try:
+        lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
+    except Refused as refusal:
+        return (), [] if str(refusal) == "missing" else [f"{NOT_PORTED}: {refusal}; every operation is asked for"]
+    named = {line.split("#")[0].strip() for line in lines} - {""}
+    known = dict.fromkeys(case.operation for case in golden.cases)
+    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - set(known))]
+    return tuple(name for name in known if name in named), unknown[:5]
+
+
+def _left_out(case: Case) -> CaseReport:
+    return CaseReport(
+        name=case.name, title=case.title, level=case.level, status="not ported", outputs=[], looks_like=[], made_for=[]
+    )
+
+
+def conclude(
+    golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str],
+    without: tuple[str, ...] = (),
+) -> Report:  # fmt: skip
+    """Levels, claim and suspects from the verdicts on all cases. A level of which nothing is left is not complete."""
     counts = {k: _count(reports, k) for k in LEVELS if k <= level}
     reached = -1
     for k, (good, asked) in counts.items():
-        if good < asked:
+        if good < asked or not asked:
             break
         reached = k
-    claim = f"golden {golden.short_version}, level {reached}, {precision}" if reached >= 0 else "no level is complete"
     return Report(
-        version=golden.manifest.version, precision=precision, asked_level=level, level=reached, claim=claim,
-        levels=counts, cases=reports, suspects=_suspects(golden, reports), notes=notes,
+        version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
+        claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
+        suspects=_suspects(golden, reports), notes=notes,
     )  # fmt: skip
+
+
+def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...]) -> str:
+    """What the port may print; names what it leaves out of the levels that it claims."""
+    if reached < 0:
+        return "no level is complete"
+    claim = f"golden {golden.short_version}, level {reached}, {precision}"
+    asked = {case.operation for case in golden.cases if case.level <= reached}
+    missing = [name for name in without if name in asked]
+    return f"{claim}, without {', '.join(missing)}" if missing else claim
 
 
 def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
@@ -205,10 +244,12 @@ def _suspects(golden: Golden, reports: list[CaseReport]) -> list[Suspect]:
     return sorted(found, key=lambda s: (s.contradicted - s.matches, s.contradicted))
 
 
-def _repeated(golden: Golden, first: Path, second: Path) -> CaseReport:
+def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
     """All outputs of two runs, bit by bit."""
     found = []
     for case in golden.cases:
+        if case.operation in without:
+            continue
         for name, asked in case.outputs.items():
             files = [folder / case.family / case.case / f"{name}.npy" for folder in (first, second)]
             limit = 8 * max(int(np.prod(asked.shape)), 1)

@@ -8,11 +8,14 @@ import math
 import os
 import re
 import stat
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+T = TypeVar("T")
 
 MAGIC = b"\x93NUMPY"
 LONGEST_HEADER = 4096
@@ -62,6 +65,26 @@ def header_of(data: bytes) -> Header:
 
 def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> NDArray:
     """A little-endian, C-order array of at most `largest` bytes. Raises Refused; follows no link out of `root`."""
+    return _with_open(path, root, lambda handle: _read_open(handle, largest))
+
+
+def read_text(path: Path, root: Path, largest: int = LONGEST_HEADER) -> str:
+    """A small UTF-8 text, with the same caution. Raises Refused."""
+
+    def read(handle: int) -> str:
+        _check_regular(handle)
+        data = os.read(handle, largest + 1)
+        if len(data) > largest:
+            raise Refused(f"longer than {largest} bytes")
+        try:
+            return data.decode()
+        except UnicodeDecodeError:
+            raise Refused("not UTF-8 text") from None
+
+    return _with_open(path, root, read)
+
+
+def _with_open(path: Path, root: Path | None, read: Callable[[int], T]) -> T:
     try:
         if root is not None and not path.resolve().is_relative_to(root.resolve()):
             raise Refused("a link that leaves the folder")
@@ -71,17 +94,23 @@ def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> 
     except (OSError, ValueError, RuntimeError) as error:
         raise Refused(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from None
     try:
-        return _read_open(handle, largest)
+        return read(handle)
     except OSError as error:
         raise Refused(f"cannot be read: {error.strerror}") from None
     finally:
         os.close(handle)
 
 
-def _read_open(handle: int, largest: int) -> NDArray:
+def _check_regular(handle: int) -> int:
+    """Size in bytes."""
     status = os.fstat(handle)
     if not stat.S_ISREG(status.st_mode):
         raise Refused("not a regular file")
+    return status.st_size
+
+
+def _read_open(handle: int, largest: int) -> NDArray:
+    size_on_disk = _check_regular(handle)
     with os.fdopen(os.dup(handle), "rb") as file:
         header = header_of(file.read(LONGEST_HEADER + 12))
         order, kind, size = header.dtype[0], header.dtype[1], int(header.dtype[2:])
@@ -94,8 +123,8 @@ def _read_open(handle: int, largest: int) -> NDArray:
         length = math.prod(header.shape) * size
         if length > largest:
             raise Refused(f"shape {header.shape} has {length} bytes; allowed: {largest}")
-        if status.st_size != header.offset + length:
-            raise Refused(f"{status.st_size} bytes; header and shape {header.shape} need {header.offset + length}")
+        if size_on_disk != header.offset + length:
+            raise Refused(f"{size_on_disk} bytes; header and shape {header.shape} need {header.offset + length}")
         file.seek(header.offset)
         data = file.read(length)
         if len(data) != length:

@@ -47,8 +47,8 @@ def as_table(report: Report) -> str:
 
 
 def _summary(case: CaseReport) -> str:
-    if case.status == "passed":
-        return "passed"
+    if case.status in ("passed", "not ported"):
+        return case.status
     found = f"looks like {', '.join(case.looks_like[:3])}" if case.looks_like else ""
     made = f"made for {', '.join(case.made_for)}" if case.made_for else ""
     return f"{case.status}: {found or made or case.title}"
