@@ -85,22 +85,25 @@ def test_hard_F1_the_two_bases_are_told_apart():
         deformation_forward(one, one, one, 0.5, "gauss")  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("basis", BASES)
-def test_hard_F2_F3_width_zero_is_finite_and_stuck(rng, basis):
-    weight, centre, width = arrays(rng)
+def test_hard_F2_F3_width_zero_is_finite_and_stuck(rng, basis, dtype):
+    weight, centre, width = arrays(rng, dtype=dtype)
     width = np.zeros_like(width)
     out, saved = deformation_forward(weight, centre, width, 0.4, basis)
-    grads = deformation_reverse(rng.normal(size=out.shape), saved)
+    grads = deformation_reverse(rng.normal(size=out.shape).astype(dtype), saved)
     assert np.isfinite(out).all()
     assert all(np.isfinite(g).all() for g in grads[:3])
     assert (grads.width == 0).all()
-    on_centre, _ = deformation_forward(np.ones((10, 1, 1)), np.full((10, 1, 1), 0.4), width[:, :1, :1], 0.4, basis)
+    one = np.ones((10, 1, 1), dtype)
+    on_centre, _ = deformation_forward(one, one / 2, width[:, :1, :1], 0.5, basis)
     assert (on_centre == 1).all()
 
 
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("basis", BASES)
-def test_hard_F4_zero_weights_stop_the_gradient_of_centre_and_width(rng, basis):
-    weight, centre, width = arrays(rng)
+def test_hard_F4_zero_weights_stop_the_gradient_of_centre_and_width(rng, basis, dtype):
+    weight, centre, width = arrays(rng, dtype=dtype)
     out, saved = deformation_forward(np.zeros_like(weight), centre, width, 0.4, basis)
     grads = deformation_reverse(np.ones_like(out), saved)
     assert (grads.centre == 0).all()

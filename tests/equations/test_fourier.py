@@ -1,8 +1,12 @@
 """Equations (1) and (1b): the dictionary, its statistics and its hard cases W1 to W6."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from endotsr.bench import workload
+from endotsr.config import Config
 from endotsr.equations.fourier import (
     AtomStatistics,
     atom_statistics,
@@ -14,6 +18,7 @@ from endotsr.equations.fourier import (
     normalised_atoms,
     report_atoms,
 )
+from endotsr.fitting.trainer import workshop
 from oracle import fourier_oracle
 
 U = np.finfo(np.float64).eps / 2
@@ -122,6 +127,27 @@ def test_hard_W3_rank_of_the_published_sequence_lengths(n, rank):
 
 
 @pytest.mark.parametrize("n", [9, 63, 156])
+def test_hard_W4_float32_atoms_are_the_rounded_float64_ones(n):
+    times, omega = training_stamps(n), frequencies(8, 1.0, 16.0, np.float32)
+    narrow, wide = atom_statistics(times, omega), atom_statistics(times, omega.astype(np.float64))
+    for t in times[:5]:
+        found, truth = normalised_atoms(t, omega, narrow), normalised_atoms(t, omega.astype(np.float64), wide)
+        assert found.dtype == np.float32 and np.abs(found - truth).max() <= 8 * 2.0**-24
+
+
+def test_hard_W4_statistics_do_not_read_the_test_stamps():
+    """A run on a sequence whose held-out stamps are moved has the same atoms, bit by bit."""
+    config, atoms = Config(), []
+    for shift in (0.0, 0.3):
+        sequence = workload.sequence(32, 24)
+        moved = sequence.times.copy()
+        moved[sequence.test_index] += shift
+        spectral = workshop(dataclasses.replace(sequence, times=moved), config).spectral
+        atoms.append(normalised_atoms(0.77, spectral.omega, spectral.statistics).tobytes())
+    assert atoms[0] == atoms[1]
+
+
+@pytest.mark.parametrize("n", [9, 63, 156])
 def test_hard_W4_mean_zero_and_rms_one_over_the_training_stamps(n):
     times, omega = training_stamps(n), frequencies(8, 1.0, 16.0)
     statistics = atom_statistics(times, omega)
@@ -150,11 +176,15 @@ def test_hard_W5_end_points_are_exact():
     assert third[0] == 1 / 3 and third[-1] == 7.7
 
 
-def test_hard_W6_stamps_outside_the_unit_interval():
-    omega = frequencies(8, 1.0, 16.0)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_hard_W6_stamps_outside_the_unit_interval(dtype):
+    omega = frequencies(8, 1.0, 16.0, dtype)
     statistics = atom_statistics(training_stamps(63), omega)
     for t in (-1.0, 2.0, 1e6):
         assert np.all(np.isfinite(normalised_atoms(t, omega, statistics)))
+        phi, saved = dictionary_forward(t, omega)
+        grads = dictionary_reverse(np.ones_like(phi), saved)
+        assert np.isfinite(phi).all() and np.isfinite(grads.t) and np.isfinite(grads.omega).all()
     assert not np.allclose(dictionary_forward(0.2, omega)[0], dictionary_forward(1.2, omega)[0])
 
 

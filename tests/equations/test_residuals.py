@@ -1,4 +1,4 @@
-"""Equations (2) and (3): the colour and the translation residual, hard cases T1 to T4."""
+"""Equations (2) and (3): the colour and the translation residual, hard cases H3 and T1 to T4."""
 
 import mpmath
 import numba
@@ -50,6 +50,20 @@ def test_residuals_against_oracle(n, dtype):
         motion_reverse(upstream, saved), residuals_oracle.linear_gradients(wide[2], wide[0], wide[1])
     ):
         np.testing.assert_allclose(found, expected, rtol=bound, atol=bound * (1 + np.abs(expected).max(initial=0)))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_hard_H3_a_tiny_residual_keeps_its_digits(dtype):
+    """beta tanh(x) / Y00 relative to 8 u down to x = 1e-30; colour with it minus colour without it is 0 in float32."""
+    x = np.geomspace(1e-30, 1e-9, 64).astype(dtype)
+    residual, saved = appearance_forward(np.tile(x, (3, 1, 1)), np.ones(1, dtype), BETA)
+    np.testing.assert_allclose(residual[0], BETA / Y00 * x.astype(np.float64), rtol=8 * unit(dtype))
+    back = appearance_reverse(np.ones((3, 64), dtype), saved)
+    np.testing.assert_allclose(back.colour_coefficients, BETA / Y00, rtol=8 * unit(dtype))
+    np.testing.assert_allclose(back.phi_bar, 3 * BETA / Y00 * x.astype(np.float64).sum(), rtol=8 * unit(dtype))
+    if dtype is np.float32:
+        base = np.float32(0.5)
+        assert ((base + residual[0]) - base == 0).all()
 
 
 @pytest.mark.parametrize(("dtype", "top"), [(np.float64, 350.0), (np.float32, 43.0)])

@@ -39,6 +39,19 @@ def test_scale_of_either_depth_does_not_matter():
     assert abs((gradient * rendered).sum()) <= 1e-14 * np.abs(gradient * rendered).sum()
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_D2_faint_pixels_have_a_bounded_gradient(dtype):
+    """Depth over its maximum, not 1 / depth: at D = 1e-6 the latter sends 1e12, this sends 1 / (n m) and no more."""
+    rendered, prior = (a.astype(dtype) for a in depths())
+    rendered[1, 1:8] = [1e-6, 1e-12, 1e-30, 0.0, 1e-37, 1e-3, 1.0]
+    rendered[0, 0] = 90.0
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    assert gradient.dtype == dtype and np.isfinite(loss)
+    n, largest = tool_mask().sum(), np.delete(np.abs(gradient), 0).max()  # the maximum itself holds the counterweight
+    np.testing.assert_allclose(largest, 1 / (n * 90.0), rtol=8 * np.finfo(dtype).eps)
+    np.testing.assert_allclose(np.abs(gradient[1, 1:8]), 1 / (n * 90.0), rtol=8 * np.finfo(dtype).eps)
+
+
 def test_hard_D3_gradient_of_the_maximum_is_split_between_ties():
     rendered, prior = depths()
     rendered[2, 2] = rendered[0, 9] = 90.0

@@ -297,7 +297,7 @@ def test_bad_input_names_file_frame_and_reason(tmp_path, case):
     assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
 
 
-def test_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
+def test_hard_E3_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
     stamp = lambda i, kind: f"2021-03-04 12_{59 + i // 2 - 1}_{(i * 30) % 60:02d} {kind}.png"
     written = write_synthetic_folder(tmp_path, name=stamp)
     np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)

@@ -1,10 +1,14 @@
-"""Spherical harmonics: the basis is orthonormal, hard cases H1, H2, H5, clamps, residual."""
+"""Spherical harmonics: the basis is orthonormal, hard cases H1, H2, H4, H5, clamps, residual."""
 
 import numpy as np
 import pytest
 from made_up_scenes import U64, Y00, assert_bitwise, random_scene, run, turned_camera
 from scipy.spatial.transform import Rotation
 
+from endotsr.config import ModelConfig
+from endotsr.fitting.model import scene_at, spectral_from
+from endotsr.scene.gaussians import Gaussians
+from endotsr.splatting.camera import camera_centre
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 from endotsr.splatting.settings import PAPER
 from oracle import splatting_oracle as oracle
@@ -78,13 +82,15 @@ def test_hard_H1_at_the_camera_centre_band_0_only(dtype):
     assert back.position[:, 1].any() and all(np.isfinite(a).all() for a in (back.position, back.harmonics, back.centre))
 
 
-def test_hard_H2_below_zero_the_colour_is_zero_with_zero_gradient():
-    h = np.zeros((1, 3, 3))
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_H2_below_zero_the_colour_is_zero_with_zero_gradient(dtype):
+    h = np.zeros((1, 3, 3), dtype)
     h[0] = np.array([-1.0, 0.0, 1.0]) / Y00
-    colour, saved = harmonics_forward(h, None, np.ones((3, 3)), np.zeros(3), 0)
-    np.testing.assert_allclose(colour, np.tile([0.0, 0.5, 1.5], (3, 1)), atol=4 * U64)  # and no upper clamp
-    back = harmonics_reverse(np.ones((3, 3)), saved)
-    np.testing.assert_array_equal(back.harmonics[0], np.tile([0.0, Y00, Y00], (3, 1)))
+    colour, saved = harmonics_forward(h, None, np.ones((3, 3), dtype), np.zeros(3, dtype), 0)
+    eps = np.finfo(dtype).eps
+    np.testing.assert_allclose(colour, np.tile([0.0, 0.5, 1.5], (3, 1)), atol=2 * eps)  # and no upper clamp
+    back = harmonics_reverse(np.ones((3, 3), dtype), saved)
+    np.testing.assert_array_equal(back.harmonics[0], np.tile(np.array([0.0, Y00, Y00], dtype), (3, 1)))
 
 
 def test_hard_H2_at_zero_exactly_the_gradient_passes():
@@ -117,6 +123,29 @@ def test_hard_H5_rotating_camera_scene_and_harmonics_together():
     other, _ = run(turned, seen_from, PAPER, "definition")
     for name in images:
         assert np.abs(other[name] - images[name]).max() <= 1e-12 * max(1.0, np.abs(images[name]).max())
+
+
+@pytest.mark.parametrize("dtype, bound", [(np.float64, 1e-12), (np.float32, 1e-5)])
+def test_hard_H4_the_viewing_direction_is_that_of_the_deformed_centre(dtype, bound):
+    """A deformed scene with harmonics equals one of degree 0 coloured at the deformed centres, not at the canonical."""
+    camera, model = turned_camera(33, 29, 25.0), ModelConfig(bases=1)
+    raw = random_scene(5, 40, camera)
+    raw.harmonics[1:4] = np.random.default_rng(6).normal(0, 0.6, (3, 3, 40))
+    weight = np.zeros((10, 1, 40))
+    weight[:3] = np.random.default_rng(7).normal(0, 0.8, (3, 1, 40))
+    curves = (weight, np.full((10, 1, 40), 0.4), np.full((10, 1, 40), 0.2))
+    gaussians = Gaussians(*(np.ascontiguousarray(a, dtype) for a in (*raw[:5], *curves)))
+    scene, _ = scene_at(gaussians, spectral_from(model, np.arange(20) / 20), model, 0.4)
+    images, gradients = run(scene, camera, PAPER, degree=1)
+    assert gradients["position"].any()
+    centre = camera_centre(camera)
+    shown = {}
+    for name, position in (("deformed", scene.position), ("canonical", gaussians.position)):
+        rgb = oracle.colour(scene.harmonics, None, position, centre, 1)
+        flat = scene._replace(harmonics=((rgb - 0.5) / Y00)[None].astype(dtype), residual=None)
+        shown[name] = run(flat, camera, PAPER, degree=0)[0]["colour"]
+    assert np.abs(shown["deformed"] - images["colour"]).max() <= bound
+    assert np.abs(shown["canonical"] - images["colour"]).max() > 0.05
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

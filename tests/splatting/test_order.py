@@ -1,11 +1,24 @@
-"""Depth order and tile lists: hard cases S1-S4."""
+"""Depth order, boxes and tile lists: hard cases C7 and S1-S4."""
 
 import numpy as np
 import pytest
-from made_up_scenes import U64, assert_bitwise, assert_close, plain_camera, random_scene, run, screen_scene, select
+from made_up_scenes import (
+    U64,
+    as_dtype,
+    assert_bitwise,
+    assert_close,
+    plain_camera,
+    random_scene,
+    run,
+    screen_scene,
+    select,
+)
 
-from endotsr.splatting.binning import depth_order, tile_lists
-from endotsr.splatting.settings import EXACT, PAPER
+from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.splatting.covariance import covariance_forward
+from endotsr.splatting.projection import projection_forward
+from endotsr.splatting.records import log_opacity
+from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 CAMERA = plain_camera(33, 29, 25.0)
 BACKGROUND = np.array([0.3, 0.6, 0.1])
@@ -62,6 +75,18 @@ def test_hard_S2_depths_one_rounding_apart_are_told_apart():
     np.testing.assert_array_equal(depth_order(z, np.ones(3, bool)), [2, 1, 0])
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_S2_view_depth_keeps_every_value_that_ndc_depth_loses(dtype):
+    """200 001 depths in [20, 100]: the order follows view z; NDC depth in float32 (planes 0.01, 100) keeps 3 %."""
+    z = np.linspace(20, 100, 200_001).astype(dtype)
+    near, far = np.float32(0.01), np.float32(100)
+    ndc = (far * (z.astype(np.float32) - near)) / (z.astype(np.float32) * (far - near))
+    assert np.unique(ndc).size < 0.04 * z.size and np.unique(z).size == z.size
+    shuffle = np.random.default_rng(4).permutation(z.size)
+    found = depth_order(z[shuffle], np.ones(z.size, bool))
+    np.testing.assert_array_equal(shuffle[found], np.arange(z.size))
+
+
 @pytest.mark.parametrize("path", ["definition", "rows"])
 def test_hard_S3_the_image_jumps_where_two_depths_cross(path):
     """By alpha1 alpha2 T (c1 - c2), T in front of both."""
@@ -77,6 +102,36 @@ def test_hard_S4_what_is_not_visible_never_reaches_the_sort():
     depth = np.array([3.0, np.nan, 1.0, 0.0, -5.0, np.inf, 2.0])
     visible = np.array([True, False, True, False, False, False, True])
     np.testing.assert_array_equal(depth_order(depth, visible), [2, 6, 0])
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_C7_largest_eigenvalue_of_round_and_long_splats(dtype):
+    """lambda = h + sqrt(max(0.1, h^2 - det)): round splats make the root's argument 0 or, rounded, negative.
+
+    The 3 sigma tiles equal those of lambda = h + hypot((a - c) / 2, b) in float64; in float32 the radius may differ by
+    one part in 1e3 (the square root of a rounding), so by one tile at the border.
+    """
+    camera = plain_camera(4000, 3000, 500.0)
+    rng = np.random.default_rng(5)
+    sigma = np.concatenate([np.geomspace(0.01, 1e4, 300), np.geomspace(1, 300, 300)])
+    scene = screen_scene(camera, rng.uniform(0, 4000, 600), rng.uniform(0, 3000, 600), 4.0, sigma, 0.5, [1, 1, 1])
+    scene.log_scale[0, 300:] += np.log(20.0)
+    scene.quaternion[:, 300:] = rng.normal(0, 1, (4, 300))
+    scene = as_dtype(scene, dtype)
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, _ = projection_forward(scene.position, shape, camera, LEGACY)
+    box, seen = screen_boxes(projected, log_opacity(scene.opacity_logit), LEGACY, 4000, 3000)
+    assert seen.all()  # a NaN radius reaches nothing
+    a, b, c = projected.covariance2d.astype(np.float64)
+    spread = np.maximum(np.hypot((a - c) / 2, b), np.sqrt(0.1))
+    radius = np.ceil(3 * np.sqrt((a + c) / 2 + spread))
+    for axis, pixels in enumerate((4000, 3000)):
+        middle = projected.mean2d[axis].astype(np.float64) - 0.5
+        first = 16 * np.clip(np.trunc((middle - radius) / 16), 0, None)
+        last = np.minimum(16 * np.trunc((middle + radius + 15) / 16) - 1, pixels - 1)
+        bound = 0 if dtype is np.float64 else 16 * np.ceil(1e-3 * radius / 16)
+        assert (np.abs(box[:, 2 * axis] - first) <= bound).all()
+        assert (np.abs(box[:, 2 * axis + 1] - last) <= bound).all()
 
 
 def test_tile_lists_hold_every_pair_once_in_depth_order():

@@ -96,16 +96,19 @@ def test_hard_Q1_subnormal_quaternion_has_a_finite_gradient(dtype):
     assert_finite(shape._asdict(), covariance_reverse(d, saved)._asdict())
 
 
-def test_hard_Q2_gradient_is_orthogonal_and_scales_with_the_inverse_length():
+@pytest.mark.parametrize(
+    "dtype, bound, factors", [(np.float64, 1e-12, (1e-3, 7.0, 1e100)), (np.float32, 1e-5, (1e-3, 7, 1e15))]
+)
+def test_hard_Q2_gradient_is_orthogonal_and_scales_with_the_inverse_length(dtype, bound, factors):
     rng = np.random.default_rng(4)
-    q, s = rng.normal(0, 1, (4, 200)), rng.normal(0, 1, (3, 200))
-    d = Shape(rng.normal(0, 1, (3, 3, 200)), rng.normal(0, 1, (3, 200)))
+    q, s = rng.normal(0, 1, (4, 200)).astype(dtype), rng.normal(0, 1, (3, 200)).astype(dtype)
+    d = Shape(rng.normal(0, 1, (3, 3, 200)).astype(dtype), rng.normal(0, 1, (3, 200)).astype(dtype))
     g = covariance_reverse(d, covariance_forward(q, s)[1]).quaternion
     length = np.linalg.norm
-    assert (np.abs((g * q).sum(axis=0)) <= 1e-12 * length(g, axis=0) * length(q, axis=0)).all()
-    for factor in (1e-3, 7.0, 1e100):
-        other = covariance_reverse(d, covariance_forward(q * factor, s)[1]).quaternion
-        np.testing.assert_allclose(other * factor, g, rtol=1e-12, atol=1e-13)
+    assert (np.abs((g * q).sum(axis=0)) <= bound * length(g, axis=0) * length(q, axis=0)).all()
+    for factor in factors:
+        other = covariance_reverse(d, covariance_forward(q * dtype(factor), s)[1]).quaternion
+        np.testing.assert_allclose(other * dtype(factor), g, rtol=bound, atol=bound)
 
 
 def test_hard_C6_log_scale_beyond_40_is_clipped_with_zero_gradient():
