@@ -19,6 +19,7 @@ COMMANDS = {
     "evaluate": "held-out metrics beside honest baselines, renders, and one self-contained report",
     "gradcheck": "check every reverse pass against finite differences",
     "bench": "time one full training iteration, stage by stage",
+    "tradeoff": "what accuracy costs in time: errors beside seconds, and what a budget buys",
     "golden": "the conformance target of ports: judge outputs, run a port, check the vectors",
 }
 

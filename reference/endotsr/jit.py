@@ -24,7 +24,7 @@ import numba
 
 F = TypeVar("F", bound=Callable)
 
-_KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simulator", "evaluation")
+_KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simulator", "evaluation", "tradeoff")
 
 
 def kernel_source_hash() -> str:

@@ -1,0 +1,135 @@
+"""`--budget`: what a person can afford, in a person's words, and the measured setting that keeps it.
+
+Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), an error (`1/255`, `0.5/255`, `1e-3`, in display units), or a
+training time (`5 min`, `1 h`).
+"""
+
+import re
+from typing import Any, Literal, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.tradeoff.page import levels, milliseconds
+
+Kind = Literal["frame", "error", "training"]
+
+NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+)"
+FORMS = 'a time per frame ("10 ms", "0.1 s", "30 fps"), an error ("1/255", "1e-3") or a training time ("5 min", "1 h")'
+FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+class Budget(NamedTuple):
+    """What may be spent: seconds a frame, a largest error in display units, or seconds of training."""
+
+    kind: Kind
+    amount: float
+    text: str
+
+
+class Advice(NamedTuple):
+    """A measured setting that keeps a budget."""
+
+    point: dict[str, Any]
+    lines: list[str]
+
+
+def parse_budget(text: str) -> Budget:
+    """Raises InputError naming the allowed forms."""
+    plain = " ".join(text.lower().split())
+    if fraction := re.fullmatch(rf"{NUMBER} ?/ ?{NUMBER}", plain):
+        numerator, denominator = map(float, fraction.groups())
+        if numerator > 0 and denominator > 0:
+            return Budget("error", numerator / denominator, text)
+    elif found := re.fullmatch(rf"{NUMBER} ?(us|ms|s|min|h|fps)?", plain):
+        amount, unit = float(found[1]), found[2]
+        if amount > 0:
+            if unit is None:
+                return Budget("error", amount, text)
+            if unit == "fps":
+                return Budget("frame", 1 / amount, text)
+            return Budget("training" if unit in ("min", "h") else "frame", amount * FACTORS[unit], text)
+    raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each > 0")
+
+
+def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
+    """The setting of the front, by time of a frame, that keeps the budget.
+
+    A time: the most accurate one whose upper quartile keeps it. An error: the fastest one that errs no more.
+    Raises InputError with the reason when none does.
+    """
+    by_name = {p["name"]: p for p in result["points"]}
+    front = [by_name[name] for name in result["fronts"]["forward"]]
+    about = result["scene"]
+    where = f"{about['gaussians']} Gaussians at {about['width']}x{about['height']} ({about['name']})"
+    if budget.kind == "frame":
+        kept = [p for p in front if p["forward"]["high"] <= budget.amount]
+        if not kept:
+            least = min(front, key=lambda p: p["forward"]["high"])
+            raise InputError(
+                f"--budget {budget.text}: no measured setting renders {where} that fast; the fastest is "
+                f"{least['name']} with {milliseconds(least['forward']['high'])}; fewer Gaussians or pixels cost less"
+            )
+        chosen = min(kept, key=lambda p: p["error"]["max"])
+    else:
+        kept = [p for p in front if p["error"]["max"] <= budget.amount]
+        if not kept:
+            best = min(front, key=lambda p: p["error"]["max"])
+            raise InputError(
+                f"--budget {budget.text}: no measured setting errs so little on {where}; the most accurate is "
+                f"{best['name']} with a largest error of {best['error']['max']:.2g}"
+            )
+        chosen = min(kept, key=lambda p: p["forward"]["median"])
+    return Advice(chosen, [f"{budget.text}: {chosen['name']}", *_expectation(chosen), f"measured on {where}"])
+
+
+def _expectation(point: dict[str, Any]) -> list[str]:
+    error = point["error"]
+    return [
+        f"expected error: largest {levels(error['max'])}, RMS {levels(error['rms'])}, "
+        f"worst gradient block {error['gradient']:.2g} (relative)",
+        f"expected time: {milliseconds(point['forward']['median'])} a frame, "
+        f"{milliseconds(point['both']['median'])} with the reverse pass",
+        f"as settings: {settings_words(point['setting'])}",
+    ]
+
+
+def settings_words(setting: dict[str, Any]) -> str:
+    """The options of `endotsr train` that ask for this setting."""
+    raster = setting["raster"]
+    words = [
+        f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",
+        f"--raster.transmittance-stop {raster['transmittance_stop']:.4g}",
+        f"--raster.alpha-max {raster['alpha_max']:.7g}",
+        f"--training.precision {setting['precision']}",
+    ]
+    if raster["support"] == "everywhere":
+        return f"--raster.preset exact --training.precision {setting['precision']}"
+    if setting["scale"] != 1:
+        words.append(f"--scale {setting['scale']:g}")
+    return " ".join(words)
+
+
+def training_advice(result: dict[str, Any], budget: Budget) -> Advice:
+    """The state of a measured training with the best held-out PSNR that was reached within the time.
+
+    Raises InputError with the reason when none was.
+    """
+    reached = [
+        row | {"configuration": c["name"], "change": c["change"]}
+        for c in result["configurations"]
+        for row in c["milestones"]
+        if row["psnr_full"] is not None
+    ]
+    kept = [row for row in reached if row["seconds"] <= budget.amount]
+    if not kept:
+        first = f"; the first measured state took {min(r['seconds'] for r in reached):.0f} s" if reached else ""
+        raise InputError(
+            f"--budget {budget.text}: nothing was measured within that training time on {result['sequence']}{first}"
+        )
+    chosen = max(kept, key=lambda row: row["psnr_full"])
+    lines = [
+        f"{budget.text}: {chosen['configuration']}, {chosen['iteration']} of {result['iterations']} iterations",
+        f"expected: {chosen['psnr_full']:.2f} dB on held-out frames after {chosen['seconds']:.0f} s",
+        f"as settings: {' '.join(['--preset', result['preset'], *chosen['change']])}",
+        f"measured on {result['sequence']}",
+    ]
+    return Advice(chosen, lines)

@@ -1,0 +1,63 @@
+"""Which settings are worth having: one is dominated if another costs no more and errs no more, and is not its equal."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+# Presets that are dominated and stay, with the reason. A preset that is dominated and not named here fails a test.
+KEPT = {
+    "legacy": "reproduces the released CUDA program, its three-sigma tiles and its gradients, for comparison",
+}
+
+
+class Ranked(NamedTuple):
+    """A point of a work-precision diagram."""
+
+    name: str
+    cost: float
+    errors: tuple[float, ...]
+
+
+def dominates(a: Ranked, b: Ranked) -> bool:
+    """Whether a is nowhere worse than b and somewhere better."""
+    ours, theirs = (a.cost, *a.errors), (b.cost, *b.errors)
+    return all(x <= y for x, y in zip(ours, theirs, strict=True)) and ours != theirs
+
+
+def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
+    """The front in cost and first error, cheapest first; of equal points the first."""
+    front: list[Ranked] = []
+    for point in sorted(points, key=lambda p: (p.cost, p.errors[0])):
+        if not front or point.errors[0] < front[-1].errors[0]:
+            front.append(point)
+    return front
+
+
+def dominated_by(point: Ranked, points: Sequence[Ranked]) -> list[str]:
+    """Names of the points that dominate this one, cheapest first."""
+    return [p.name for p in sorted(points, key=lambda p: (p.cost, p.errors)) if dominates(p, point)]
+
+
+def judge_presets(points: Sequence[dict[str, Any]], presets: dict[str, str]) -> dict[str, dict[str, Any]]:
+    """For every preset: by whom it is dominated, and the reason why it stays.
+
+    A preset serves rendering and training, so another setting dominates it only if it visits no more pairs and is no
+    worse in the largest error, the RMS error and every gradient block. Compared within one precision: a visit costs
+    the same arithmetic there.
+
+    points    entries of `tradeoff.json`
+    presets   name -> name of its point
+    """
+    by_name = {p["name"]: p for p in points}
+    found = {}
+    for preset, name in presets.items():
+        own = by_name[name]
+        precision, terms = own["setting"]["precision"], own["terms"]
+        peers = [_ranked(p) for p in points if p["setting"]["precision"] == precision and p["terms"] == terms]
+        better = dominated_by(_ranked(own), peers)
+        found[preset] = {"dominated_by": better, "reason": KEPT.get(preset) if better else None}
+    return found
+
+
+def _ranked(point: dict[str, Any]) -> Ranked:
+    error = point["error"]
+    return Ranked(point["name"], point["visits"], (error["max"], error["rms"], *error["gradients"].values()))

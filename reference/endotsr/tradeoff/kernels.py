@@ -1,0 +1,91 @@
+"""Variants of the compositing kernels that exist for this study alone: other exponentials, other tiles.
+
+A variant is the body of the package's kernel, compiled anew with a few of its names bound to other things, so that
+nothing is written twice.
+"""
+
+import contextlib
+import functools
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
+
+from endotsr.jit import jit, jit_inline
+from endotsr.splatting import compositing, compositing_rows
+from endotsr.tradeoff.settings import Setting
+
+COEFFICIENTS = (1.0,)  # stands for the coefficients of a variant, highest power first
+
+
+def _exp2_polynomial(x):
+    """2^x for float64 x <= 0, as `exp2_nonpositive` but with the polynomial COEFFICIENTS on (-1, 0]."""
+    x = max(x, np.float64(-1022))
+    k = np.int64(x)
+    f = x - np.float64(k)
+    p = np.float64(0)
+    for c in COEFFICIENTS:
+        p = p * f + c
+    return p * np.int64((k + np.int64(1023)) << np.int64(52)).view(np.float64)
+
+
+def exponential_coefficients(degree: int) -> tuple[float, ...]:
+    """Interpolation of 2^f at the Chebyshev nodes of [-1, 0], highest power first."""
+    found = Chebyshev.interpolate(np.exp2, degree, domain=[-1, 0]).convert(kind=Polynomial)
+    return tuple(float(c) for c in found.coef[::-1])
+
+
+def rebound(function: Callable[..., Any], variant: str, **names: Any) -> Callable[..., Any]:
+    """The same body with `names` bound to other values; `variant` tells its compiled form apart in the cache."""
+    made = types.FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__)
+    made.__qualname__ = f"{function.__qualname__}.{variant}"
+    made.__module__ = function.__module__
+    return made
+
+
+@functools.cache
+def _rows_with_exponential(degree: int) -> dict[str, Any]:
+    """The kernels of the fast path with a polynomial of this degree, by the name they have there."""
+    name, rows = f"degree{degree}", compositing_rows
+    exp2 = jit_inline(rebound(_exp2_polynomial, name, COEFFICIENTS=exponential_coefficients(degree)))
+    found = {}
+    for ending in ("", "_reverse"):
+        row = jit_inline(rebound(getattr(rows, f"_blend_row{ending}"), name, exp2_nonpositive=exp2))
+        body = rebound(getattr(rows, f"_blend{ending}"), name, **{f"_blend_row{ending}_kernel": row})
+        found[f"_blend{ending}_kernel"] = jit(body, contract=True)
+    return found
+
+
+@functools.cache
+def _definition_with_tiles(side: int) -> dict[str, Any]:
+    """Tile size and kernels of the path `definition` with square tiles of this side."""
+    found: dict[str, Any] = {"TILE_WIDTH": side, "TILE_HEIGHT": side}
+    sizes = dict(found)
+    for ending in ("", "_reverse"):
+        body = rebound(getattr(compositing, f"_composite{ending}"), f"tile{side}", **sizes)
+        found[f"_composite{ending}_kernel"] = jit(body)
+    return found
+
+
+@contextlib.contextmanager
+def kernels_of(setting: Setting) -> Iterator[None]:
+    """Within the block, rendering uses the kernels that the setting asks for."""
+    changes: list[tuple[types.ModuleType, dict[str, Any]]] = []
+    if setting.exponential is not None:
+        changes.append((compositing_rows, _rows_with_exponential(setting.exponential)))
+    if setting.tile not in (None, compositing.TILE_WIDTH):
+        changes.append((compositing, _definition_with_tiles(setting.tile)))
+    kept = [(module, {name: getattr(module, name) for name in names}) for module, names in changes]
+    try:
+        _bind(changes)
+        yield
+    finally:
+        _bind(kept)
+
+
+def _bind(changes: list[tuple[types.ModuleType, dict[str, Any]]]) -> None:
+    for module, names in changes:
+        for name, value in names.items():
+            setattr(module, name, value)

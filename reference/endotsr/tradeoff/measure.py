@@ -1,0 +1,188 @@
+"""One setting on one scene: the image, the gradients, what they cost and how far they are from the reference.
+
+Errors are taken at full resolution in float64. The gradients are those of one fixed linear functional of colour and
+depth with random weights (as the signs of an L1 loss are), so that every setting differentiates the same number.
+"""
+
+import time
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.fitting.model import SceneSaved, Spectral, scene_at, scene_reverse
+from endotsr.scene.gaussians import Gaussians
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderGrads, RenderOut, RenderSaved, render_forward, render_reverse
+from endotsr.tradeoff.kernels import kernels_of
+from endotsr.tradeoff.scenes import StudyScene, in_precision, scaled
+from endotsr.tradeoff.settings import Setting
+from endotsr.tradeoff.visits import count_visits
+
+FloatArray = NDArray[np.floating]
+
+LEVELS = 255.0
+BLOCKS = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual")  # of the deformed scene
+WEIGHT_SEED = 5
+
+
+class Prepared(NamedTuple):
+    """A setting applied to a scene: everything that is not paid for in every frame."""
+
+    scene: StudyScene
+    setting: Setting
+    gaussians: Gaussians
+    spectral: Any
+    camera: Camera
+    d_colour: FloatArray  # (3, h, w) weights of the functional
+    d_depth: FloatArray  # (h, w)
+
+
+class Frame(NamedTuple):
+    """What a setting computes, at full resolution in float64."""
+
+    colour: FloatArray  # (3, H, W) display units
+    gradients: dict[str, FloatArray]  # by block, of the parameters at this moment
+
+
+class Errors(NamedTuple):
+    """How far a frame is from the reference."""
+
+    max: float  # of the colour, display units
+    rms: float
+    gradients: dict[str, float]  # relative L2 by block
+
+    @property
+    def gradient(self) -> float:
+        """Of the worst block."""
+        return max(self.gradients.values(), default=0.0)
+
+
+def prepare(scene: StudyScene, setting: Setting) -> Prepared:
+    """Cast, leave out what the setting leaves out, and make the weights of the functional."""
+    gaussians, spectral = _reduced(scene, setting)
+    camera = scaled(scene.camera, setting.scale)
+    d_colour, d_depth = _weights(scene)
+    if setting.scale != 1:
+        rows, columns = _upsampling(camera.height, scene.camera.height), _upsampling(camera.width, scene.camera.width)
+        d_colour, d_depth = rows.T @ d_colour @ columns, rows.T @ d_depth @ columns
+    weights = (np.ascontiguousarray(w, setting.precision) for w in (d_colour, d_depth))
+    return Prepared(scene, setting, in_precision(gaussians, setting.precision), spectral, camera, *weights)
+
+
+def _weights(scene: StudyScene) -> tuple[FloatArray, FloatArray]:
+    """Standard normal over pixels and channels; for depth divided by the distance of the scene."""
+    rng = np.random.default_rng(WEIGHT_SEED)
+    height, width = scene.camera.height, scene.camera.width
+    count = 3 * height * width
+    seen = scene.camera.rotation[2] @ scene.gaussians.position + scene.camera.translation[2]
+    distance = max(float(np.median(np.abs(seen))), 1e-12)
+    return rng.normal(size=(3, height, width)) / count, rng.normal(size=(height, width)) / (count * distance)
+
+
+def _reduced(scene: StudyScene, setting: Setting) -> tuple[Gaussians, Any]:
+    """The strongest `bases` of the FDM and the lowest `frequencies`, of all Gaussians alike."""
+    g, spectral = scene.gaussians, scene.spectral
+    if setting.bases is not None and g.fdm_weight is not None:
+        strength = np.abs(g.fdm_weight).sum(axis=(0, 2), dtype=np.float64)
+        kept = np.sort(np.argsort(-strength, kind="stable")[: setting.bases])
+        names = ("fdm_weight", "fdm_centre", "fdm_width")
+        g = g._replace(**{n: np.ascontiguousarray(getattr(g, n)[:, kept]) if setting.bases else None for n in names})
+    if setting.frequencies is not None and scene.frequencies:
+        low = np.arange(setting.frequencies)
+        atoms = np.concatenate([low, low + scene.frequencies])
+        for name in ("colour_coefficients", "motion_coefficients"):
+            array = getattr(g, name)
+            if array is not None:
+                g = g._replace(**{name: np.ascontiguousarray(array[:, atoms]) if setting.frequencies else None})
+        statistics = type(spectral.statistics)(*(values[atoms] for values in spectral.statistics))
+        spectral = Spectral(spectral.omega[low], statistics, spectral.rho[low])
+    return g, spectral
+
+
+def _upsampling(small: int, large: int) -> FloatArray:
+    """(large, small): linear interpolation between pixel centres, the border repeated."""
+    at = np.clip((np.arange(large) + 0.5) * small / large - 0.5, 0, small - 1)
+    left = np.minimum(at.astype(int), max(small - 2, 0))
+    out = np.zeros((large, small))
+    out[np.arange(large), left] = 1 - (at - left)
+    if small > 1:
+        out[np.arange(large), left + 1] = at - left
+    return out
+
+
+def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
+    """One frame: the scene at its time, then the picture."""
+    p, setting = prepared, prepared.setting
+    scene, scene_saved = scene_at(p.gaussians, p.spectral, p.scene.model, p.scene.time)
+    out, saved = render_forward(scene, p.camera, setting.raster, degree=setting.degree, path=setting.path)
+    return out, saved, scene_saved
+
+
+def reverse(prepared: Prepared, saved: RenderSaved, scene_saved: SceneSaved) -> RenderGrads:
+    """The way back to the parameters (that of the FDM belongs to the optimiser's step and is not part of it)."""
+    grads = render_reverse(prepared.d_colour, prepared.d_depth, None, saved)
+    scene_reverse(grads, scene_saved)
+    return grads
+
+
+def frame(prepared: Prepared) -> tuple[Frame, int]:
+    """The frame in float64 at full resolution, and its visits."""
+    with kernels_of(prepared.setting), threads(prepared.setting.threads):
+        out, saved, scene_saved = forward(prepared)
+        visits = count_visits(saved)
+        grads = reverse(prepared, saved, scene_saved)
+    colour = out.colour.astype(np.float64)
+    full, small = prepared.scene.camera, prepared.camera
+    if small.height != full.height or small.width != full.width:
+        colour = _upsampling(small.height, full.height) @ colour @ _upsampling(small.width, full.width).T
+    found = {name: getattr(grads, name) for name in BLOCKS}
+    return Frame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
+
+
+def errors(found: Frame, reference: Frame) -> Errors:
+    """Colour: largest and root mean square difference; gradients: relative L2 of every block the reference has.
+
+    Edges: a block without gradient in the reference is left out; a block that the setting lacks counts as zeros.
+    """
+    difference = found.colour - reference.colour
+    gradients = {}
+    for name, exact in reference.gradients.items():
+        size = float(np.linalg.norm(exact))
+        if size > 0:
+            got = found.gradients.get(name, np.zeros_like(exact))
+            gradients[name] = float(np.linalg.norm(got - exact)) / size
+    return Errors(float(np.abs(difference).max()), float(np.sqrt(np.mean(difference**2))), gradients)
+
+
+def terms(prepared: Prepared) -> int:
+    """Basis terms evaluated a frame: 10 B of the FDM and 2F for each channel of the Fourier residuals, by Gaussian."""
+    g = prepared.gaussians
+    present = (g.fdm_weight, g.colour_coefficients, g.motion_coefficients)
+    return sum(a.size for a in present if a is not None)
+
+
+def seconds(prepared: Prepared) -> tuple[float, float]:
+    """(forward, forward + reverse) of one frame, by the clock."""
+    with kernels_of(prepared.setting), threads(prepared.setting.threads):
+        began = time.perf_counter()
+        _, saved, scene_saved = forward(prepared)
+        middle = time.perf_counter()
+        reverse(prepared, saved, scene_saved)
+        return middle - began, time.perf_counter() - began
+
+
+class threads:
+    """Within the block, kernels use so many threads (None = as before)."""
+
+    def __init__(self, count: int | None) -> None:
+        self._count = count
+
+    def __enter__(self) -> None:
+        self._before = numba.get_num_threads()
+        if self._count is not None:
+            numba.set_num_threads(min(self._count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+
+    def __exit__(self, *_: object) -> None:
+        numba.set_num_threads(self._before)

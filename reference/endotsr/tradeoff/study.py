@@ -1,0 +1,196 @@
+"""The whole measurement of one scene: reference and certificate, every dial, the joint sweep, the presets, the fronts.
+
+The result is one JSON-able dictionary, `tradeoff.json`; `figures`, `page` and `budget` read nothing else.
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.runs import machine, now, versions
+from endotsr.tradeoff.certificate import certify
+from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
+from endotsr.tradeoff.measure import LEVELS, Frame, Prepared, errors, frame, prepare, seconds, terms
+from endotsr.tradeoff.scenes import StudyScene
+from endotsr.tradeoff.settings import CLOSE, OMITTED, Setting, dials, joint, presets
+
+FORMAT = 1  # of tradeoff.json
+REPEATS = 7
+EXACT_PAIRS = 150e6  # Gaussians x pixels up to which the reference is the exact path itself
+COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}
+
+Progress = Callable[[int], None]  # so many steps are done
+
+
+class Plan:
+    """Every setting once, under a name, however many dials share it.
+
+    wanted   names of the dials to measure, `joint` for the sweep; None = all. The presets always are.
+    """
+
+    def __init__(self, scene: StudyScene, wanted: frozenset[str] | None = None) -> None:
+        self.names: dict[Setting, str] = {}
+        chosen = [d for d in dials(scene.degree, scene.bases, scene.frequencies, scene.near) if _in(d.name, wanted)]
+        self.presets = {n: self._add(n, s) for n, s in presets(scene.degree, scene.near).items()}
+        if not exact_is_possible(scene):
+            self.names.pop(presets(scene.degree, scene.near)["exact"])
+            self.presets.pop("exact")
+        sweep = joint(scene.degree, scene.near) if _in("joint", wanted) else {}
+        self.joint = [self._add(label, setting) for label, setting in sweep.items()]
+        self.dials = [
+            {
+                "name": d.name,
+                "title": d.title,
+                "cost": d.cost,
+                "lossless": d.lossless,
+                "points": {label: self._add(f"{d.title} {label}", s) for label, s in d.values.items()},
+            }
+            for d in chosen
+        ]
+
+    def _add(self, name: str, setting: Setting) -> str:
+        return self.names.setdefault(setting, name)
+
+
+def _in(name: str, wanted: frozenset[str] | None) -> bool:
+    return wanted is None or name in wanted
+
+
+def exact_is_possible(scene: StudyScene) -> bool:
+    """Whether the exact path visits few enough pairs to be timed; else a cutoff of 1e-14 is the reference."""
+    return scene.gaussians.count * scene.camera.width * scene.camera.height <= EXACT_PAIRS
+
+
+def reference_setting(scene: StudyScene) -> Setting:
+    """What the errors are measured against."""
+    if exact_is_possible(scene):
+        return presets(scene.degree, scene.near)["exact"]
+    return Setting(raster=CLOSE._replace(near=scene.near, alpha_cutoff=1e-14), degree=scene.degree)
+
+
+def run_study(
+    scene: StudyScene,
+    *,
+    repeats: int = REPEATS,
+    wanted: frozenset[str] | None = None,
+    images: Path | None = None,
+    begin: Callable[[int], None] = lambda steps: None,
+    step: Progress = lambda steps: None,
+) -> dict[str, Any]:
+    """Measure everything.
+
+    repeats   timed frames of every setting, after one that warms up
+    wanted    dials to measure (`joint` names the sweep); None = all
+    images    folder to keep the image and the gradients of every setting in, or None
+    begin     is told the number of steps once, `step` how many were done
+    returns   tradeoff.json without date and machine (`described` adds them)
+    """
+    plan = Plan(scene, wanted)
+    begin(1 + len(plan.names) * (1 + repeats))
+    aim = reference_setting(scene)
+    reference, reference_visits = frame(prepare(scene, aim))
+    certificate = certify(scene, reference.colour, aim.raster)
+    step(1)
+    if images is not None:
+        _keep(images, "reference", reference)
+    prepared, points = [], []
+    for number, (setting, name) in enumerate(plan.names.items()):
+        ready = prepare(scene, setting)
+        found, visits = (reference, reference_visits) if setting == aim else frame(ready)
+        prepared.append(ready)
+        points.append(_point(name, number, ready, found, reference, visits))
+        if images is not None:
+            _keep(images, points[-1]["file"], found)
+        step(1)
+    for point, times in zip(points, _timed(prepared, repeats, step), strict=True):
+        point["forward"], point["both"] = (_spread(column) for column in times.T)
+    return {
+        "format": FORMAT,
+        "scene": _about(scene),
+        "reference": {"setting": setting_dict(aim), "certificate": certificate.as_dict()},
+        "lines": {"eight_bit": 0.5 / LEVELS, "sensor_noise": scene.noise},
+        "repeats": repeats,
+        "points": points,
+        "dials": plan.dials,
+        "joint": plan.joint,
+        "presets": plan.presets,
+        "preset_verdicts": judge_presets(points, plan.presets),
+        "fronts": {cost: _front(points, {*plan.joint, *plan.presets.values()}, cost) for cost in COSTS},
+        "omitted": OMITTED,
+    }
+
+
+def described(result: dict[str, Any]) -> dict[str, Any]:
+    """The result with the date, the machine, the versions and the threads in use."""
+    return result | {"date": now(), "machine": machine(), "versions": versions(), "threads": numba.get_num_threads()}
+
+
+def _point(name: str, number: int, ready: Prepared, found: Frame, reference: Frame, visits: int) -> dict[str, Any]:
+    error = errors(found, reference)
+    return {
+        "name": name,
+        "file": f"{number:03d}",
+        "setting": setting_dict(ready.setting),
+        "error": {"max": error.max, "rms": error.rms, "gradients": error.gradients, "gradient": error.gradient},
+        "visits": visits,
+        "terms": terms(ready),
+    }
+
+
+def setting_dict(setting: Setting) -> dict[str, Any]:
+    """A setting as plain data."""
+    raster = setting.raster._asdict()
+    return setting._asdict() | {"raster": raster | {"deviations": setting.raster.deviations._asdict()}}
+
+
+def _keep(folder: Path, name: str, found: Frame) -> None:
+    np.save(folder / f"{name}.npy", found.colour)
+    np.savez(folder / f"{name}_gradients.npz", **found.gradients)  # type: ignore[arg-type]
+
+
+def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np.float64]:
+    """(settings, repeats, 2) seconds.
+
+    All settings once, then all again: a busy minute of the machine spreads over all.
+    """
+    times = np.empty((len(prepared), repeats, 2))
+    for repeat in range(repeats):
+        for i, ready in enumerate(prepared):
+            times[i, repeat] = seconds(ready)
+            step(1)
+    return times
+
+
+def _spread(values: NDArray[np.float64]) -> dict[str, float]:
+    low, median, high = np.percentile(values, [25, 50, 75])
+    return {"median": float(median), "low": float(low), "high": float(high)}
+
+
+def cost_of(point: dict[str, Any], cost: str) -> float:
+    """Seconds (median) or visits of a point."""
+    return float(point["visits"] if cost == "visits" else point[cost]["median"])
+
+
+def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> list[str]:
+    """Names of the settings of the joint sweep and of the presets that nothing among them dominates, cheapest first."""
+    ranked = [Ranked(p["name"], cost_of(p, cost), (p["error"]["max"],)) for p in points if p["name"] in candidates]
+    return [p.name for p in non_dominated(ranked)]
+
+
+def _about(scene: StudyScene) -> dict[str, Any]:
+    return {
+        "name": scene.name,
+        "about": scene.about,
+        "gaussians": scene.gaussians.count,
+        "width": scene.camera.width,
+        "height": scene.camera.height,
+        "degree": scene.degree,
+        "bases": scene.bases,
+        "frequencies": scene.frequencies,
+        "log10_pairs": math.log10(max(1, scene.gaussians.count * scene.camera.width * scene.camera.height)),
+    }

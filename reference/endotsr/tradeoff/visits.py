@@ -1,0 +1,58 @@
+"""How many pixel-Gaussian pairs a frame visits: a cost that no machine, path, tile or thread changes.
+
+A visit is a pair whose alpha has to be known: the pixel lies in the support of the Gaussian and is not yet finished
+by the Gaussians in front. The support is alpha >= cutoff (`ellipse`), the tiles of the 3-sigma square
+(`three_sigma_tiles`) or the whole picture (`everywhere`).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.jit import jit
+from endotsr.sharing import share
+from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting.compositing import _alpha_kernel
+from endotsr.splatting.render import RenderSaved
+
+
+def _count(first_tile, last_tile, records, starts, ranks, limits, in_support_only, width, height, size, counts):
+    real = records.dtype.type
+    one, half = real(1), real(0.5)
+    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]
+    tile_width, tile_height = size
+    tiles_x = (width + tile_width - 1) // tile_width
+    for tile in range(first_tile, last_tile):
+        top, left = (tile // tiles_x) * tile_height, (tile % tiles_x) * tile_width
+        found = 0
+        for row in range(top, min(height, top + tile_height)):
+            for column in range(left, min(width, left + tile_width)):
+                t = one
+                for p in range(starts[tile], starts[tile + 1]):
+                    _, _, value = _alpha_kernel(records[ranks[p]], real(column) + half, real(row) + half)
+                    alpha = min(value, alpha_max)
+                    if alpha < cutoff:
+                        found += 0 if in_support_only else 1
+                        continue
+                    found += 1
+                    behind = t * (one - alpha)
+                    if behind < stop:
+                        break
+                    t = behind
+        counts[tile] = found
+
+
+_count_kernel = jit(_count)
+
+
+def count_visits(saved: RenderSaved) -> int:
+    """Visits of the frame that `render_forward` has just rendered."""
+    composite, camera = saved.composite, saved.camera
+    module = compositing_rows if isinstance(composite, compositing_rows.RowsSaved) else compositing
+    ellipse = saved.settings.support == "ellipse" and saved.settings.alpha_cutoff > 0
+    counts: NDArray[np.int64] = np.zeros(composite.lists.starts.size - 1, np.int64)
+    share(
+        _count_kernel, counts.size,
+        composite.records, composite.lists.starts, composite.lists.ranks, composite.limits, ellipse,
+        camera.width, camera.height, (module.TILE_WIDTH, module.TILE_HEIGHT), counts,
+    )  # fmt: skip
+    return int(counts.sum())
