@@ -1,0 +1,230 @@
+"""Put every mutant of every kernel to every suite and write docs/results/discrimination.json.
+
+    python tests/mutation/discrimination.py [--jobs 2] [--only losses.similarity] [--sample 20] [--keep FOLDER]
+
+--only    kernels whose name starts so; may be given several times
+--sample  at most so many mutants of a kernel, evenly spread
+The page docs/discrimination.md is made from the result by tests/mutation/page.py.
+"""
+
+import argparse
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+os.environ["NUMBA_DISABLE_JIT"] = "1"
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+import pytest  # noqa: E402
+
+from endotsr.checking import all_pairs  # noqa: E402
+from endotsr.conformance.store import golden_folder, read_golden  # noqa: E402
+from endotsr.runs import machine, now, versions  # noqa: E402
+from mutation.checks import SLOW, SUITES, Check, forward_only, of_case, of_item, of_pair, run, surveyed  # noqa: E402
+from mutation.kernels import clear_caches, kernels, planted  # noqa: E402
+from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
+from mutation.processes import Outcome, in_processes  # noqa: E402
+from mutation.registry import DEFECT, defect_mutants  # noqa: E402
+
+FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "properties")
+FIRST = 6.0  # s of checks of one suite; a mutant that survives everything is put to the rest as well
+
+
+def recorded_pairs(keep: Path | None) -> dict[str, Any]:
+    """Finite differences of the right kernels, taken in a process where they are compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = (keep or Path(folder)) / "recorded.pickle"
+        if not target.is_file():
+            environment = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
+            subprocess.run([sys.executable, ROOT / "tests/mutation/recording.py", target], env=environment, check=True)
+        return pickle.loads(target.read_bytes())
+
+
+class Survey:
+    """Time and kernels of the checks, kept in a file so that a second run need not measure them again."""
+
+    def __init__(self, keep: Path | None):
+        path = self.path = keep / "survey.json" if keep else None
+        self.known: dict[str, Any] = json.loads(path.read_text()) if path and path.is_file() else {}
+        self.written = time.monotonic()
+
+    def of(self, check: Check, codes: dict) -> Check | str:
+        if check.name not in self.known:
+            found = surveyed(check, codes)
+            done = found if isinstance(found, str) else [found.seconds, sorted(found.kernels)]
+            self.known[check.name] = done
+            if time.monotonic() > self.written + 20:
+                self.write()
+        done = self.known[check.name]
+        return done if isinstance(done, str) else check._replace(seconds=done[0], kernels=frozenset(done[1]))
+
+    def write(self) -> None:
+        if self.path:
+            self.path.write_text(json.dumps(self.known))
+        self.written = time.monotonic()
+
+
+class Checks:
+    """All checks by the kernel they run, the best first."""
+
+    def __init__(self, items: list, keep: Path | None, say):
+        codes = {function.__code__: name for name, function in (kernels() | planted()).items()}
+        self.left_out: dict[str, str] = {}
+        self.all: list[Check] = []
+        recorded, golden = recorded_pairs(keep), read_golden(golden_folder())
+        say("finite differences taken")
+        for pair in all_pairs().values():
+            forward = surveyed(forward_only(pair, recorded[pair.name]), codes, 30.0)
+            reverse, differentiate = of_pair(pair, recorded[pair.name])
+            whole = surveyed(reverse, codes, 30.0)
+            assert isinstance(forward, Check) and isinstance(whole, Check), (pair.name, forward, whole)
+            self.all.append(whole._replace(kernels=whole.kernels - forward.kernels))
+            self.all.append(differentiate._replace(kernels=forward.kernels, seconds=20 * forward.seconds))
+        candidates = [c for case in golden.cases for c in of_case(golden, case)] + [of_item(i) for i in items]
+        known = Survey(keep)
+        for check in candidates:
+            found = known.of(check, codes)
+            if isinstance(found, str):
+                self.left_out[check.name] = found
+            else:
+                self.all.append(found)
+        known.write()
+        clear_caches()
+        say(f"{len(self.all)} checks, {len(self.left_out)} left out")
+        self.kills: dict[tuple[str, str], int] = {}
+
+    def of(self, kernel: str, suite: str) -> list[Check]:
+        found = [c for c in self.all if c.suite == suite and kernel in c.kernels]
+        return sorted(found, key=lambda c: (c.seconds + 1e-3) / (1 + self.kills.get((kernel, c.name), 0)))
+
+    def learn(self, kernel: str, outcome: Outcome) -> None:
+        for name in filter(None, outcome.killed.values()):
+            self.kills[kernel, name] = self.kills.get((kernel, name), 0) + 1
+
+
+def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
+    """Every suite until its first check that notices; the rest of the checks only if no suite did."""
+    facts: dict[str, Any] = {}
+    later: list[tuple[str, Check]] = []
+    killed = dict.fromkeys(SUITES, "")
+    with in_place(function, mutant.code):
+        for suite in SUITES:
+            spent = 0.0
+            for check in checks.of(mutant.kernel, suite):
+                if spent > FIRST:
+                    later.append((suite, check))
+                    continue
+                spent += check.seconds
+                if run(check, 2 + 10 * check.seconds, facts):
+                    killed[suite] = check.name
+                    break
+        if not any(killed.values()):
+            for suite, check in later:
+                if run(check, 2 + 10 * check.seconds, facts):
+                    killed[suite] = check.name
+                    break
+    return Outcome(killed, facts.get("change"))
+
+
+def every(found: list[Mutant], sample: int) -> list[Mutant]:
+    """At most `sample` of them, evenly spread; 0 = all."""
+    if not sample or len(found) <= sample:
+        return found
+    return [found[k * len(found) // sample] for k in range(sample)]
+
+
+class Plugin:
+    """Collects the tests as pytest does, then puts the mutants to them instead of running them once."""
+
+    def __init__(self, options: argparse.Namespace):
+        self.options, self.begin = options, time.monotonic()
+        self.result: dict[str, Any] = {}
+
+    def say(self, text: str) -> None:
+        print(f"{time.monotonic() - self.begin:7.0f} s  {text}", flush=True)
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """In place of pytest's own loop."""
+        functions = kernels() | planted()
+        checks = Checks(session.items, self.options.keep, self.say)
+        wanted = [k for k in kernels() if not self.options.only or k.startswith(tuple(self.options.only))]
+        chosen = [m for k in wanted for m in every(mutants(k, functions[k]), self.options.sample)]
+        chosen += [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
+        self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
+        work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
+        outcomes: dict[str, Outcome] = {}
+        for mutant, outcome in in_processes(work, self.options.jobs):
+            outcomes[mutant.name] = outcome
+            checks.learn(mutant.kernel, outcome)
+            if not any(outcome.killed.values()):
+                self.say(f"survivor: {mutant.name}")
+            if len(outcomes) % 200 == 0:
+                self.say(f"{len(outcomes)} of {len(chosen)}")
+        self.result = self.report(chosen, outcomes, checks)
+        return True
+
+    def report(self, chosen: list[Mutant], outcomes: dict[str, Outcome], checks: Checks) -> dict[str, Any]:
+        """What is written: checks by number, so that the file stays small."""
+        number = {c.name: k for k, c in enumerate(checks.all)} | {"": -1}
+        by_kernel: dict[str, dict[str, Any]] = {}
+        defects: dict[str, Any] = {}
+        for mutant in chosen:
+            killed, change = outcomes[mutant.name]
+            found = [number.get(killed[suite], -2) for suite in SUITES]
+            if mutant.kind == DEFECT:
+                defects[mutant.name] = [mutant.kernel, found]
+            else:
+                by_kernel.setdefault(mutant.kernel, {})[mutant.name] = [mutant.kind, found, change]
+        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+        about = {
+            "commit": commit.stdout.strip(), "started": now(), "seconds": round(time.monotonic() - self.begin),
+            "jobs": self.options.jobs, "sample": self.options.sample, "slow": SLOW, "machine": machine(),
+            "versions": versions(),
+        }  # fmt: skip
+        names = [c.name for c in checks.all]
+        return {
+            "run": about, "suites": SUITES, "checks": names, "left_out": checks.left_out, "defects": defects,
+            "kernels": by_kernel,
+        }  # fmt: skip
+
+
+def written(result: dict[str, Any]) -> str:
+    """JSON with one line a mutant."""
+    head = {key: value for key, value in result.items() if key != "kernels"}
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
+    blocks = []
+    for kernel, found in result["kernels"].items():
+        inner = ",\n".join(f"{json.dumps(name, ensure_ascii=False)}: {json.dumps(row)}" for name, row in found.items())
+        blocks.append(f"{json.dumps(kernel)}: {{\n{inner}\n}}")
+    return "{\n" + "\n".join(lines) + '\n"kernels": {\n' + ",\n".join(blocks) + "\n}\n}\n"
+
+
+def main(words: list[str]) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--sample", type=int, default=0)
+    parser.add_argument("--keep", type=Path, help="folder that keeps what was measured with the right kernels")
+    parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
+    options = parser.parse_args(words)
+    plugin = Plugin(options)
+    folders = [str(ROOT / "tests" / name) for name in FOLDERS if (ROOT / "tests" / name).is_dir()]
+    quiet = ["-q", "-s", "-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings", "-p", "no:xdist"]
+    pytest.main([f"--rootdir={ROOT}", *quiet, *folders], plugins=[plugin])
+    if not plugin.result:
+        return 1
+    options.json.write_text(written(plugin.result), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,60 @@
+"""What is mutated: every function of the numerical modules, kernels and the plain Python around them alike."""
+
+import ast
+import importlib
+import inspect
+from collections.abc import Callable
+
+ROOMS = {
+    "equations": (
+        "fourier", "atom_sums", "appearance", "motion", "matern", "pyramid", "laplacian", "calibration", "deformation",
+    ),
+    "splatting": (
+        "camera", "covariance", "projection", "harmonics", "exponential", "records", "binning", "compositing",
+        "compositing_rows", "render",
+    ),
+    "losses": ("rows", "photometric", "similarity", "depth", "smoothness"),
+    "scene": ("density_control",),
+    "fitting": ("adam", "deformation_step", "model", "objective", "schedules"),
+}  # fmt: skip
+# functions in which only a named defect is planted
+MORE = ("fitting.trainer.workshop",)
+
+
+def kernels() -> dict[str, Callable]:
+    """Plain Python functions by name, such as `losses.rows._row_total`."""
+    found: dict[str, Callable] = {}
+    for room, modules in ROOMS.items():
+        for name in modules:
+            module = importlib.import_module(f"endotsr.{room}.{name}")
+            for node in ast.parse(inspect.getsource(module)).body:
+                if isinstance(node, ast.FunctionDef):
+                    if not _for_the_compiler(node):
+                        found[f"{room}.{name}.{node.name}"] = _plain(getattr(module, node.name))
+    return found
+
+
+def planted() -> dict[str, Callable]:
+    """Functions beside the kernels that a named defect stands in."""
+    parts = [name.rsplit(".", 1) for name in MORE]
+    return {f"{m}.{f}": getattr(importlib.import_module(f"endotsr.{m}"), f) for m, f in parts}
+
+
+def _plain(function: Callable) -> Callable:
+    """Without what a compiler or a cache has put around it."""
+    function = getattr(function, "py_func", function)
+    return inspect.unwrap(function)
+
+
+def _for_the_compiler(node: ast.FunctionDef) -> bool:
+    """Functions that only tell Numba what to compile never run uncompiled."""
+    return any(isinstance(d, ast.Call) and getattr(d.func, "id", "") == "overload" for d in node.decorator_list)
+
+
+def clear_caches() -> None:
+    """Forget what unchanged functions have computed."""
+    for room, modules in ROOMS.items():
+        for name in modules:
+            for value in vars(importlib.import_module(f"endotsr.{room}.{name}")).values():
+                if hasattr(value, "cache_clear"):
+                    value.cache_clear()

@@ -1,0 +1,186 @@
+"""The named defects: mistakes that ports and published codes have made, each as a change of the source."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from mutation.mutator import Mutant, replaced
+
+DEFECT = "named defect"
+
+
+class Defect(NamedTuple):
+    """One mistake in one function; every `old` stands in its source exactly once."""
+
+    name: str
+    kernel: str
+    changes: tuple[tuple[str, str], ...]
+
+
+def _rotation_transposed() -> tuple[tuple[str, str], ...]:
+    """w -> -w in the matrix entries gives the inverse rotation."""
+    terms = (("x * y", "w * z"), ("x * z", "w * y"), ("y * z", "w * x"))
+    signs = ((" - ", " + "), (" + ", " - "), (" - ", " + "))
+    out = []
+    for (product, real_part), (upper, lower) in zip(terms, signs):
+        out.append((f"two * ({product}{upper}{real_part})", f"two * ({product}{lower} {real_part})"))
+        out.append((f"two * ({product}{lower}{real_part})", f"two * ({product}{upper} {real_part})"))
+    return tuple(out)
+
+
+D_Z = "inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))"
+PROJECT, PROJECT_REVERSE = "splatting.projection._project", "splatting.projection._project_reverse"
+COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
+ROWS_REVERSE = "splatting.compositing_rows._blend_row_reverse"
+
+DEFECTS: tuple[Defect, ...] = (
+    Defect(
+        "d covariance / d mean frozen",
+        PROJECT_REVERSE,
+        (
+            ("-fx * inverse_z2 * d_j02 if free_x else zero", "zero"),
+            ("-fy * inverse_z2 * d_j12 if free_y else zero", "zero"),
+            (D_Z, "zero"),
+        ),
+    ),
+    Defect("dJ/dz frozen", PROJECT_REVERSE, ((D_Z, "zero"),)),
+    Defect(
+        "clamped dJ/dz twice too large",
+        PROJECT_REVERSE,
+        (("power_x = two if free_x else clamp_factor", "power_x = two"),),
+    ),
+    Defect(
+        "off-diagonal gradient halved",
+        "splatting.records._gather",
+        (("factor * (a * total[SUM_SEY])", "half * factor * (a * total[SUM_SEY])"),),
+    ),
+    Defect(
+        "gradient of depth by z dropped",
+        "splatting.records._gather",
+        (("total[SUM_DEPTH] if keep_depth else zero", "zero"),),
+    ),
+    Defect("background dropped", COMPOSITE, tuple((f" + t * background[{k}]", "") for k in range(3))),
+    Defect(
+        "background dropped from the gradient",
+        COMPOSITE_REVERSE,
+        (("g0 * background[0] + g1 * background[1] + g2 * background[2]", "zero"),),
+    ),
+    Defect(
+        "quaternion gradient without its normalisation",
+        "splatting.covariance._covariance_reverse",
+        tuple((f"(g{k} - along * {k})", f"g{k}") for k in "wxyz"),
+    ),
+    Defect(
+        "alpha clamp .99 forward, .999 in reverse",
+        COMPOSITE_REVERSE,
+        (("alpha = min(value, alpha_max)", "alpha = min(value, real(0.999) if alpha_max < one else alpha_max)"),),
+    ),
+    Defect(
+        "alpha clamp .99 forward, .999 in reverse (fast path)",
+        ROWS_REVERSE,
+        (("alpha = min(value, alpha_max)", "alpha = min(value, real(0.999))"),),
+    ),
+    Defect(
+        "final T in place of T_i",
+        COMPOSITE_REVERSE,
+        (("alpha, t, e, dy = kept[j, 0], kept[j, 1]", "alpha, t, e, dy = kept[j, 0], kept[n - 1, 1]"),),
+    ),
+    Defect("sign of dy", "splatting.compositing._alpha", (("dy = y - record[V]", "dy = record[V] - y"),)),
+    Defect(
+        "sign of dy in the fast reverse pass", ROWS_REVERSE, (("se, sy = s * e, s * dy", "se, sy = s * e, -s * dy"),)
+    ),
+    Defect("rotation transposed", "splatting.covariance._covariance_forward", _rotation_transposed()),
+    Defect(
+        "fx and fy exchanged",
+        PROJECT,
+        (
+            (
+                "mean_x, mean_y = fx * slope_x + cx, fy * slope_y + cy",
+                "mean_x, mean_y = fy * slope_x + cx, fx * slope_y + cy",
+            ),
+        ),
+    ),
+    Defect(
+        "low-pass dropped",
+        PROJECT,
+        (("a, b, c, spread = low_pass, zero, low_pass, zero", "a, b, c, spread = zero, zero, zero, zero"),),
+    ),
+    Defect(
+        "determinant as a c - b b", PROJECT, (("low_pass * low_pass + low_pass * spread + areas", "a * c - b * b"),)
+    ),
+    Defect(
+        "atom statistics from all time stamps",
+        "fitting.trainer.workshop",
+        (("sequence.times[sequence.train_index]", "sequence.times"),),
+    ),
+    Defect(
+        "beta missing", "equations.appearance.appearance_forward", (("dtype.type(beta / Y00)", "dtype.type(1 / Y00)"),)
+    ),
+    Defect(
+        "1/Y00 missing", "equations.appearance.appearance_forward", (("dtype.type(beta / Y00)", "dtype.type(beta)"),)
+    ),
+    Defect(
+        "rho not normalised to mean 1",
+        "equations.matern.matern_weights",
+        (("density / (math.fsum(density) / density.size)", "density"),),
+    ),
+    Defect(
+        "mask applied before the pyramid only",
+        "equations.laplacian.support_masks",
+        (
+            ("valid & _expand_support(coarse, valid.shape, upsampling)", "valid"),
+            ("_reduce_support(valid)", "valid[::2, ::2]"),
+        ),
+    ),
+    Defect(
+        "zero padding of the pyramid",
+        "equations.pyramid._reduce_row",
+        (
+            ("inside[reflect(-2, w)]", "real(0.0)"),
+            ("inside[reflect(-1, w)]", "real(0.0)"),
+            ("inside[reflect(x, w)]", "real(0.0)"),
+        ),
+    ),
+    Defect(
+        "half-pixel up-sampling whatever is asked for",
+        "equations.pyramid.expand_weights",
+        (("return EXPAND_WEIGHTS[upsampling]", 'return EXPAND_WEIGHTS["half_pixel"]'),),
+    ),
+    Defect(
+        "L1 averaged over all pixels",
+        "losses.photometric.masked_l1_forward",
+        (("rendered.shape[0] * int(np.count_nonzero(mask))", "rendered.size"),),
+    ),
+    Defect(
+        "SSIM averaged over all pixels",
+        "losses.similarity.ssim_target",
+        (("observed.shape[0] * int(np.count_nonzero(mask))", "observed.size"),),
+    ),
+    Defect(
+        "place in the list taken for the index of the Gaussian",
+        "splatting.records._gather",
+        (("i = order[k]", "i = k"),),
+    ),
+    Defect(
+        "sum depends on the ranges of the threads",
+        "losses.photometric._absolute_difference",
+        (
+            ("for index in range(first, stop):", "totals[first:stop] = 0\n    for index in range(first, stop):"),
+            ("totals[index] = row_total(line)", "totals[first] += row_total(line)"),
+        ),
+    ),
+    Defect(
+        "equal depths in reverse index order",
+        "splatting.binning._radix_order",
+        (
+            (
+                "for i in range(key.size):\n        if visible[i]:\n            keys[m]",
+                "for i in range(key.size - 1, -1, -1):\n        if visible[i]:\n            keys[m]",
+            ),
+        ),
+    ),
+)
+
+
+def defect_mutants(functions: dict[str, Callable]) -> list[Mutant]:
+    """The defects as mutants of today's source. Raises ValueError where the source has moved on."""
+    return [Mutant(d.kernel, DEFECT, d.name, replaced(functions[d.kernel], *d.changes)) for d in DEFECTS]
