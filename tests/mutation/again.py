@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"
+os.environ["HYPOTHESIS_PROFILE"] = "ci"  # the same examples for every mutant
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
