@@ -1,7 +1,22 @@
-"""Shared fixtures; makes the helpers of the tests folder importable."""
+"""Helpers of the tests folder made importable; profiles of the property tests.
 
+quick   the default: a few examples, new ones every run
+ci      where CI is set: the same examples every run, and a blob that repeats a failure
+deep    many examples: HYPOTHESIS_PROFILE=deep pytest tests/properties, or --hypothesis-profile=deep
+"""
+
+import os
 import sys
 from pathlib import Path
 
+from hypothesis import HealthCheck, settings
+
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE / "splatting")]  # made_up_scenes is used in other folders too
+
+# No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.
+COMMON = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("quick", max_examples=15, **COMMON)
+settings.register_profile("ci", max_examples=25, derandomize=True, print_blob=True, database=None, **COMMON)
+settings.register_profile("deep", max_examples=1000, print_blob=True, **COMMON)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "quick"))
