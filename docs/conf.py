@@ -13,14 +13,16 @@ project = "endotsr"
 author = "the endotsr authors"
 copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
 
-extensions = ["myst_nb", "paper_equations"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+extensions += ["paper_equations", "book_pages", "book_links", "api_pages"]  # in _extensions
 exclude_patterns = ["_build", "_extensions", "conf.py", "results/README.md", "results/*.py", "**/*.json"]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
-# To add API pages: append "autodoc2" here and set
-#   autodoc2_packages = [{"path": "../reference/endotsr", "auto_mode": False}]
-#   autodoc2_render_plugin = "myst"
-#   autodoc2_docstring_parser_regexes = [(r".*", "myst")]
+# The types of the package's arrays say little; shapes and units stand in the docstrings.
+autodoc_typehints = "none"
+
+# Every reference inside the project must resolve.
+nitpicky = True
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
@@ -40,7 +42,9 @@ html_theme = "sphinx_book_theme"
 html_title = "endotsr"
 html_static_path = ["_static"]
 html_css_files = ["endotsr.css"]
-html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True}
+# The whole tree of pages beside every page would take most of the time of a build.
+html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True, "collapse_navigation": True}
+html_sidebars = {"_modules/**": []}
 html_show_sphinx = False
 
 MATHJAX_CDN = "https://cdn.jsdelivr.net/npm/mathjax@3/es5/tex-chtml.js"

@@ -1,0 +1,98 @@
+"""One page a room of the package under docs/api, written for autodoc; docstrings are laid out by `docstring_layout`."""
+
+import ast
+import inspect
+import re
+from typing import Any
+
+from book_map import equations
+from book_pages import NOTE, check_links, golden_links, notebook_links, reverse_links, write
+from docstring_layout import DocstringDirective
+from package_names import ROOT, definitions, modules
+from sphinx.application import Sphinx
+
+API = ROOT / "docs" / "api"
+ROLE = re.compile(r"\{([\w:]+)\}(?=`)")
+
+
+def rooms() -> dict[str, list[str]]:
+    """Modules that define something public, by the room of the package that they stand in."""
+    found: dict[str, list[str]] = {}
+    for name in dict.fromkeys(dotted.rpartition(".")[0] for dotted in definitions()):
+        parts = name.split(".")
+        room = parts[1] if len(parts) > 2 or modules()[name].name == "__init__.py" else "package"
+        found.setdefault(room, []).append(name)
+    return found
+
+
+def room_page(room: str, names: list[str]) -> str:
+    """All modules of a room on one page: few pages build fast, and a search in the browser finds a function."""
+    lines = [NOTE + f"# {room}", ""]
+    for name in names:
+        lines += [f"## {name}", "", "```{eval-rst}", f".. automodule:: {name}", "   :members:"]
+        lines += ["   :member-order: bysource", "```", ""]
+    return "\n".join(lines)
+
+
+def index_page() -> str:
+    lines = [
+        NOTE + "# API",
+        "",
+        "Every public function of `endotsr`: shapes, units, edges, errors, and its source.",
+        "",
+    ]
+    return "\n".join([*lines, "```{toctree}", ":maxdepth: 2", "", *sorted(rooms()), "```", ""])
+
+
+def write_api(app: Sphinx) -> None:
+    API.mkdir(exist_ok=True)
+    write(API / "index.md", index_page())
+    for room, names in rooms().items():
+        write(API / f"{room}.md", room_page(room, names))
+    for stale in {file.stem for file in API.glob("*.md")} - {*rooms(), "index"}:
+        (API / f"{stale}.md").unlink()
+
+
+def field_comments(dotted: str) -> list[str]:
+    """`name  comment` of the fields of a class that carry one, from its source."""
+    module, _, name = dotted.rpartition(".")
+    if module not in modules():
+        return []
+    text = modules()[module].read_text(encoding="utf-8")
+    node = next((n for n in ast.parse(text).body if isinstance(n, ast.ClassDef) and n.name == name), None)
+    body = node.body if node else []  # a name for a type is no class of its own
+    fields = [n for n in body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
+    comments = [(ast.unparse(n.target), text.splitlines()[n.end_lineno - 1].partition("#")[2].strip()) for n in fields]
+    return [f"{field}  {comment}" for field, comment in comments if comment]
+
+
+def book_line(dotted: str) -> str:
+    """Where the book derives, checks and pins a function; "" for one that implements no equation alone."""
+    for row in equations():
+        if dotted in row.functions:
+            parts = (f"reverse {reverse_links(row)}", f"check {check_links(row)}", f"golden cases {golden_links(row)}")
+            return ROLE.sub(
+                r":\1:", f"Equation {{eq}}`eq-{row.label}`; {'; '.join(parts)}; notebook {notebook_links(row)}."
+            )
+    return ""
+
+
+def process(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Hand the docstring over as it is; the directive makes the nodes."""
+    fields = field_comments(name) if what in ("class", "exception") else []
+    text = [*lines, "", *fields]
+    lines[:] = [".. docstring::", "", *(f"   {line}" for line in text), "", book_line(name)]
+
+
+def skip(app: Sphinx, what: str, name: str, found: Any, skipped: bool, options: Any) -> bool | None:
+    """Fields stand in the table of their class."""
+    is_field = what == "class" and not (inspect.isfunction(found) or isinstance(found, property | classmethod))
+    return True if is_field else None
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_directive("docstring", DocstringDirective)
+    app.connect("builder-inited", write_api)
+    app.connect("autodoc-process-docstring", process)
+    app.connect("autodoc-skip-member", skip)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,138 @@
+"""The map of the book: for each equation its functions, reverse pass, gradient check, golden cases and notebooks.
+
+Everything is read from the pair registry, `golden/cases` and the notebooks. Only what no pair can say is written here:
+the functions of equations without a derivative, why they have none, and which tests check them instead.
+"""
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from package_names import NOTEBOOKS, ROOT, equation_pages, markdown_of, notebooks_of
+
+from endotsr.checking import Pair, all_pairs
+
+GOLDEN = ROOT / "golden"
+# Displays that are parts of another equation: the blend and the recursion of compositing.
+PARTS = {"b5b": "b5", "b5c": "b5"}
+
+
+class Undifferentiated(NamedTuple):
+    """An equation without a pair."""
+
+    functions: tuple[str, ...]
+    reason: str  # why there is no reverse pass
+    tests: str  # what checks it instead
+    golden: str = ""  # family of golden cases that contains it, or why there is none; "" = its own family
+    notebook: str = ""  # why no notebook announces it; "" = one does
+
+
+UNDIFFERENTIATED = {
+    "7": Undifferentiated(
+        ("endotsr.equations.calibration.calibrate", "endotsr.fitting.objective.calibrate_on"),
+        "the weight is a constant of training",
+        "tests/equations/test_calibration.py",
+    ),
+    "b10": Undifferentiated(
+        ("endotsr.fitting.adam.adam_step", "endotsr.fitting.schedules.learning_rates"),
+        "a step is not differentiated",
+        "tests/fitting/test_adam.py",
+    ),
+    "b11": Undifferentiated(
+        ("endotsr.scene.density_control.gather_statistics", "endotsr.scene.density_control.densify"),
+        "choosing Gaussians is not differentiable",
+        "tests/scene/test_density_control.py",
+        "training",
+    ),
+    "b12": Undifferentiated(
+        ("endotsr.scene.initialisation.initialise",),
+        "it comes before training",
+        "tests/scene/test_initialisation.py",
+        "none: points are drawn at random, a port is given the Gaussians",
+    ),
+    "m1": Undifferentiated(
+        ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
+        "a metric is only reported",
+        "tests/evaluation/test_metrics.py",
+        "none: a port is judged by its renders",
+    ),
+    "m2": Undifferentiated(
+        ("endotsr.evaluation.metrics.ssim_full", "endotsr.evaluation.metrics.ssim_tissue"),
+        "a metric is only reported",
+        "tests/evaluation/test_metrics.py",
+        "none: the map is that of (B7), which has cases",
+    ),
+    "m3": Undifferentiated(
+        ("endotsr.evaluation.lpips.lpips",),
+        "a metric is only reported",
+        "tests/evaluation/test_lpips.py",
+        "none: it needs a file of weights",
+        "none: it needs a file of weights",
+    ),
+}
+# Reverse functions whose name does not follow from the forward function's.
+REVERSE_OF = {"endotsr.fitting.objective.image_loss": "endotsr.fitting.objective.image_loss"}
+
+
+class Equation(NamedTuple):
+    """One row of the map. Every tuple is non-empty, or the reason beside it is given."""
+
+    label: str
+    page: str
+    functions: tuple[str, ...]
+    reverses: tuple[str, ...]
+    pairs: tuple[Pair, ...]
+    golden: tuple[str, ...]  # families
+    notebooks: tuple[str, ...]
+    without: Undifferentiated | None
+
+    @property
+    def number(self) -> str:
+        return f"({self.label[0].upper()}{self.label[1:]})"
+
+
+@cache
+def golden_cases() -> dict[str, list[dict[str, Any]]]:
+    """Family -> its cases as stored, in the order of the manifest."""
+    families = json.loads((GOLDEN / "manifest.json").read_text(encoding="utf-8"))["families"]
+    path = lambda family, case: GOLDEN / "cases" / family / case / "case.json"
+    return {
+        family: [json.loads(path(family, case).read_text(encoding="utf-8")) for case in cases]
+        for family, cases in families.items()
+    }
+
+
+def families_of(label: str) -> tuple[str, ...]:
+    declared = UNDIFFERENTIATED[label].golden if label in UNDIFFERENTIATED else ""
+    if declared:
+        return (declared,) if declared in golden_cases() else ()
+    return tuple(name for name, cases in golden_cases().items() if cases[0]["equation"].lower() == label)
+
+
+def reverse_of(forward: str) -> str:
+    return REVERSE_OF.get(forward, re.sub("_forward$", "_reverse", forward))
+
+
+@cache
+def equations() -> tuple[Equation, ...]:
+    """All equations of the specification, in its order."""
+    rows = []
+    for label, page in equation_pages().items():
+        if label in PARTS:
+            continue
+        pairs = tuple(pair for pair in all_pairs().values() if pair.equation.lower() == label)
+        without = UNDIFFERENTIATED.get(label)
+        functions = without.functions if without else tuple(dict.fromkeys(pair.function for pair in pairs))
+        reverses = () if without else tuple(reverse_of(name) for name in functions)
+        rows.append(Equation(label, page, functions, reverses, pairs, families_of(label), notebooks_of(label), without))
+    return tuple(rows)
+
+
+def has_derivation(notebook: str) -> bool:
+    return "\n## The reverse pass" in markdown_of(NOTEBOOKS / f"{notebook}.py")
+
+
+def test_names(file: str) -> list[str]:
+    return re.findall(r"^def (test_\w+)", Path(ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)

@@ -1,0 +1,196 @@
+"""Pages that are written when the book is built: the map of the equations, the gradient checks, the golden cases.
+
+They are Markdown files beside the others, not kept in git, and rewritten only when they change.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from book_map import Equation, equations, golden_cases, has_derivation, test_names
+from package_names import PACKAGE, ROOT
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+
+from endotsr.checking import PairReport, all_pairs, check_pair, one_thread, pair_stream
+
+DOCS = ROOT / "docs"
+NOTE = "<!-- Written by docs/_extensions/book_pages.py. Do not edit. -->\n"
+
+
+# ---- cells ----
+
+
+def function_link(dotted: str) -> str:
+    return f"{{py:obj}}`{dotted.split('.')[-1]} <{dotted}>`"
+
+
+def function_links(row: Equation) -> str:
+    return ", ".join(function_link(name) for name in row.functions)
+
+
+def reverse_links(row: Equation) -> str:
+    """The derivation in a notebook, then the functions; or why there is no reverse pass."""
+    found = [f"{{ref}}`derivation <reverse-{name}>`" for name in row.notebooks if has_derivation(name)][:1]
+    found += [function_link(name) for name in row.reverses]
+    return ", ".join([*found, f"none: {row.without.reason}"] if row.without else found)
+
+
+def check_links(row: Equation) -> str:
+    if row.without:
+        return f"{{ref}}`tests <check-{row.label}>`"
+    names = [pair.name for pair in row.pairs]
+    return ", ".join(f"{{ref}}`{shown} <check-{name}>`" for name, shown in zip(names, without_repetition(names)))
+
+
+def without_repetition(names: list[str]) -> list[str]:
+    """The first name whole, then only what differs, where all start with the same stage."""
+    first = names[0]
+    stages = [pair.function.rpartition(".")[2].removesuffix("_forward") for pair in all_pairs().values()]
+    stage = next((s for s in stages if all(name.startswith(f"{s}_") for name in names)), None)
+    return [first, *(name.removeprefix(f"{stage}_") for name in names[1:])] if stage else names
+
+
+def golden_links(row: Equation) -> str:
+    found = [f"{{ref}}`{name} <golden-{name}>` ({len(golden_cases()[name])})" for name in row.golden]
+    return ", ".join(found) if found else row.without.golden if row.without else ""
+
+
+def notebook_links(row: Equation) -> str:
+    found = [f"{{doc}}`{name[:2].lstrip('0')} </notebooks/{name}>`" for name in row.notebooks]
+    return ", ".join(found) if found else row.without.notebook if row.without else ""
+
+
+def link_line(row: Equation) -> str:
+    """One line under the heading of a specification page: everything about one equation, one click away."""
+    return (
+        f"{{eq}}`eq-{row.label}`: code {function_links(row)}; reverse {reverse_links(row)}; check {check_links(row)}; "
+        f"golden {golden_links(row)}; notebook {notebook_links(row)}; {{ref}}`all equations <equation-map>`."
+    )
+
+
+# ---- pages ----
+
+
+def equation_page() -> str:
+    lines = [
+        "---",
+        "html_theme.sidebar_secondary.remove: true",
+        "---",
+        "(equation-map)=",
+        NOTE + "# Map of the equations",
+        "",
+        "Where each equation is computed, differentiated, checked, pinned by stored numbers, and explained. The table",
+        "is made from the registry of pairs, the golden cases and the notebooks; the number of cases is in brackets.",
+        "",
+        "| Equation | Function | Reverse | Check | Golden cases | Notebook |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in equations():
+        cells = (function_links(row), reverse_links(row), check_links(row), golden_links(row), notebook_links(row))
+        lines.append(f"| {{eq}}`eq-{row.label}` | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def checks_page(reports: dict[str, PairReport]) -> str:
+    lines = [
+        "# Gradient checks",
+        "",
+        "Each reverse pass against differences of its forward pass, in float64, along random directions and single",
+        "entries of each block. The numbers were measured when these pages were built; `endotsr gradcheck` measures",
+        "them again, in float32 too. A probe that cannot refuse a gradient wrong by 0.01 % counts as unresolved, one",
+        "whose two ends take different discrete decisions as refused.",
+        "",
+    ]
+    for row in equations():
+        lines += [f"## ({row.number[1:-1]})", ""]
+        lines += [f"{{eq}}`eq-{row.label}`, {{doc}}`/specification/{row.page}`.", ""]
+        if row.without:
+            lines += list(_tests(row))
+        for pair in row.pairs:
+            lines += list(_report(pair.name, pair.function, reports[pair.name]))
+    return "\n".join(lines)
+
+
+def _tests(row: Equation) -> Iterator[str]:
+    """An equation without a derivative: what tests it."""
+    assert row.without
+    yield from (f"(check-{row.label})=", f"### {row.without.tests}", "")
+    yield f"No gradient: {row.without.reason}. The tests of `{row.without.tests}`:"
+    yield from ("", "```text", *test_names(row.without.tests), "```", "")
+
+
+def _report(name: str, function: str, report: PairReport) -> Iterator[str]:
+    yield from (f"(check-{name})=", f"### {name}", "", function_link(function), "")
+    yield from (
+        "| Block | Probes | Refused | Unresolved | Worst relative error | Verdict |",
+        "|---|---|---|---|---|---|",
+    )
+    for block in report.blocks:
+        worst = f"{block.worst.relative_error:.1e}" if block.worst else "none"
+        yield f"| `{block.block}` | {block.probes} | {block.refused} | {block.unresolved} | {worst} | {block.verdict} |"
+    yield ""
+
+
+def golden_page() -> str:
+    lines = [
+        "# Golden cases",
+        "",
+        "Stored inputs and outputs that a port must reproduce; `golden/README.md` says how they are read and compared,",
+        "{doc}`guides/port` in which order to use them. A case is the folder `golden/cases/FAMILY/CASE`.",
+        "",
+    ]
+    by_family = {name: row.label for row in equations() for name in row.golden}
+    for family, cases in golden_cases().items():
+        label = by_family.get(family)
+        lines += [f"(golden-{family})=", f"## {family}", ""]
+        lines += [f"{{eq}}`eq-{label}`", ""] if label else []
+        lines += ["| Case | What | Level | Inputs | Outputs |", "|---|---|---|---|---|"]
+        for case in cases:
+            inputs, outputs = (_arrays(case[key]) for key in ("inputs", "outputs"))
+            lines.append(f"| `{case['case']}` | {case['title']} | {case['level']} | {inputs} | {outputs} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _arrays(entries: dict) -> str:
+    shape = lambda entry: "(" + ",".join(map(str, entry["shape"])) + ")"
+    return ", ".join(f"`{name}` {shape(entry)}" for name, entry in entries.items()) or "none"
+
+
+# ---- writing ----
+
+
+def source_digest() -> str:
+    """What the measured page depends on."""
+    sources = [*sorted(PACKAGE.rglob("*.py")), *sorted(Path(__file__).parent.glob("*.py"))]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
+
+
+def gradient_reports() -> dict[str, PairReport]:
+    """The check of every pair; a book with a wrong gradient is not built."""
+    with one_thread():
+        reports = {name: check_pair(pair, pair_stream(name, 0)) for name, pair in all_pairs().items()}
+    failures = [f"{name}: {reason}" for name, report in reports.items() for reason in report.failures]
+    if failures:
+        raise ExtensionError("gradient check failed\n" + "\n".join(failures))
+    return reports
+
+
+def write(file: Path, text: str) -> None:
+    """Write, but leave the date of an unchanged file alone: Sphinx reads it again otherwise."""
+    if not file.is_file() or file.read_text(encoding="utf-8") != text:
+        file.write_text(text, encoding="utf-8")
+
+
+def write_pages(app: Sphinx) -> None:
+    write(DOCS / "equations.md", equation_page())
+    write(DOCS / "golden_cases.md", NOTE + golden_page())
+    checks, stamp = DOCS / "gradient_checks.md", f"<!-- Sources {source_digest()}. -->\n"
+    if not checks.is_file() or stamp not in checks.read_text(encoding="utf-8"):
+        write(checks, NOTE + stamp + checks_page(gradient_reports()))
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("builder-inited", write_pages)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
