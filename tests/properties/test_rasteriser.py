@@ -7,7 +7,7 @@ from made_up_scenes import FIELDS, as_dtype, assert_bitwise, assert_close, asser
 from scipy.spatial.transform import Rotation
 
 from endotsr.splatting.render import Scene
-from endotsr.splatting.settings import EXACT, PAPER
+from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 from properties.strategies import CAMERA, HIDDEN, RASTER, SEEDS, Y00, scenes
 
 BACKGROUND = np.array([0.3, 0.6, 0.1])
@@ -17,14 +17,15 @@ def joined(one: Scene, two: Scene) -> Scene:
     return Scene(*(None if a is None else np.concatenate([a, b], axis=-1) for a, b in zip(one, two)))
 
 
-def single(z: float, dtype, logit: float = 1.0) -> Scene:
+def single(z: float, dtype, logit: float = 1.0, log_scale: float = -1.0) -> Scene:
     """One Gaussian on the axis of CAMERA."""
-    parts = ([[0.0], [0.0], [z]], [[1.0], [0.0], [0.0], [0.0]], [[-1.0]] * 3, [logit], [[[1.0]] * 3])
+    parts = ([[0.0], [0.0], [z]], [[1.0], [0.0], [0.0], [0.0]], [[log_scale]] * 3, [logit], [[[1.0]] * 3])
     return Scene(*(np.array(a, dtype) for a in parts))
 
 
 @given(scenes(), RASTER)
 @example(single(float(np.nextafter(0.2, 1)), np.float32, 800.0), ("rows", PAPER))
+@example(single(1.0, np.float32, log_scale=12.0), ("definition", LEGACY))  # det^2 of conic_epsilon was infinite
 def test_finite_scenes_give_finite_images_and_gradients(scene, how):
     path, settings = how
     assert_finite(*run(scene, CAMERA, settings, path, background=BACKGROUND))

@@ -105,8 +105,7 @@ def _gather(
         d_mean2d[1, i] = r * total[SUM_SY] - a * m * total[SUM_SE]
         factor = one
         if conic_epsilon > zero:
-            square = determinant[i] * determinant[i]
-            factor = square / (square + conic_epsilon)
+            factor = one / (one + conic_epsilon / determinant[i] / determinant[i])  # det^2 overflows for huge splats
         d_footprint[0, i] = factor * (-half * total[SUM_SEE])
         d_footprint[1, i] = factor * (a * total[SUM_SEY])
         d_footprint[2, i] = factor * (-half * total[SUM_SYY])
