@@ -86,6 +86,12 @@ class RasterConfig(_Section, frozen=True, kw_only=True):
     """`exact` evaluates every Gaussian at every pixel and is for small scenes"""
     near: Positive = 0.2
     """near plane, scene units"""
+    alpha_cutoff: Fraction | Literal["preset"] = "preset"
+    """a smaller alpha contributes nothing; 0 = no cutoff"""
+    transmittance_stop: Fraction | Literal["preset"] = "preset"
+    """a pixel ends before its transmittance falls below; 0 = never"""
+    alpha_max: Fraction | Literal["preset"] = "preset"
+    """clamp of alpha; 1 = none"""
 
 
 class LossConfig(_Section, frozen=True, kw_only=True):

@@ -1,6 +1,5 @@
 """`endotsr tradeoff`: what accuracy costs in time, and what a budget buys."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -48,6 +47,10 @@ class TradeoffOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
+    if words[:1] == ["train"]:
+        from endotsr.commands.tradeoff_train import run as run_training
+
+        return run_training(words[1:])
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
     budget = None
@@ -57,6 +60,8 @@ def run(words: list[str]) -> int:
         budget = parse_budget(options.budget)
         if budget.kind == "training":
             return _say_training(options.out, budget)
+    from endotsr.tradeoff.results import read_result
+
     file = options.out / RESULT
     if budget is None and file.exists():
         raise InputError(f"{options.out}: holds a measurement already; choose another --out, or ask it with --budget")
@@ -121,21 +126,9 @@ def chosen_scene(options: TradeoffOptions) -> "StudyScene":
         return scenes.simulated_scene(width=width, step=bar.step)
 
 
-def read_result(file: Path) -> dict[str, Any]:
-    """A measurement that was written before. Raises InputError if it cannot be read or is of another format."""
-    from endotsr.tradeoff.study import FORMAT
-
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
-        raise InputError(f"{file}: not a measurement of this version; measure again with another --out")
-    return found
-
-
 def _say_training(out: Path, budget: "Budget") -> int:
     from endotsr.tradeoff.budget import training_advice
+    from endotsr.tradeoff.results import read_result
 
     file = out / TRAINING
     if not file.exists():
@@ -165,6 +158,11 @@ class StepBar:
     def step(self, count: int = 1) -> None:
         """So many more are done."""
         self._bar.update(count)
+
+    def say(self, message: str) -> None:
+        """A line that does not disturb the bar."""
+        self._bar.clear()
+        print(message, flush=True)
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:

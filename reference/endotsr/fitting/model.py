@@ -61,8 +61,11 @@ def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spec
 
 
 def raster_settings(config: Config) -> RasterSettings:
-    """The rasteriser preset of a configuration with its near plane."""
-    return PRESETS[config.raster.preset]._replace(near=config.raster.near)
+    """The rasteriser preset of a configuration with its near plane and whatever else is set by itself."""
+    raster = config.raster
+    given = {name: getattr(raster, name) for name in ("alpha_cutoff", "transmittance_stop", "alpha_max")}
+    own = {name: value for name, value in given.items() if value != "preset"}
+    return PRESETS[raster.preset]._replace(near=raster.near, **own)
 
 
 def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float) -> tuple[Scene, SceneSaved]:

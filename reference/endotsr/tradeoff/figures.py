@@ -19,12 +19,12 @@ FLOOR = 1e-10  # of the error axis, in 1/255: the exact path, with error 0, stan
 
 def main_figure(result: dict[str, Any]) -> Any:
     """Every setting of the joint sweep, the front and the presets: error against time, and against visits."""
-    figure = _figure(11.0, 4.9)
+    figure = empty_figure(11.0, 4.9)
     left, right = figure.subplots(1, 2, sharey=True)
     for axes, cost in ((left, "forward"), (right, "visits")):
         _sweep(axes, result, cost)
         _levels(axes, result)
-        _frame(axes, _cost_name(cost))
+        plain_axes(axes, _cost_name(cost))
         axes.set_ylim(FLOOR / 3, 300)
         axes.set_xlim(axes.get_xlim()[0] / 6, None)
     left.set_ylabel("largest error of the image, 1/255", color=INK)
@@ -90,7 +90,7 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
     dials = [d for d in result["dials"] if cost != "visits" or d["name"] not in ("precision", "exponential", "threads")]
     columns = 4
     rows = -(-len(dials) // columns)
-    figure = _figure(3.1 * columns, 2.75 * rows)
+    figure = empty_figure(3.1 * columns, 2.75 * rows)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=cost != "visits", sharey=True).ravel()
     by_name = {p["name"]: p for p in result["points"]}
     for axes, dial in zip(panels, dials, strict=False):
@@ -98,7 +98,7 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
         if error == "max":
             _levels(axes, result, named=False)
         counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else _cost_name(cost)
-        _frame(axes, counted, small=True)
+        plain_axes(axes, counted, small=True)
         axes.set_title(dial["title"], loc="left", fontsize=9.5, color=INK)
         axes.tick_params(labelbottom=True)
     for axes in panels[len(dials) :]:
@@ -161,7 +161,8 @@ def _levels(axes: Any, result: dict[str, Any], named: bool = True) -> None:
             )  # fmt: skip
 
 
-def _figure(width: float, height: float) -> Any:
+def empty_figure(width: float, height: float) -> Any:
+    """A white figure of so many inches, drawn without a screen."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -170,9 +171,11 @@ def _figure(width: float, height: float) -> Any:
     return figure
 
 
-def _frame(axes: Any, name: str, small: bool = False) -> None:
+def plain_axes(axes: Any, name: str, small: bool = False, log_y: bool = True) -> None:
+    """Logarithmic axes with a pale grid and nothing else; `name` stands below."""
     axes.set_xscale("log")
-    axes.set_yscale("log")
+    if log_y:
+        axes.set_yscale("log")
     axes.set_xlabel(name, fontsize=8 if small else 10, color=INK)
     axes.tick_params(which="both", colors=GREY, labelsize=7.5 if small else 9, length=0)
     axes.grid(True, color=PALE, linewidth=0.5, alpha=0.6)

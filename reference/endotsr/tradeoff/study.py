@@ -16,10 +16,10 @@ from endotsr.runs import machine, now, versions
 from endotsr.tradeoff.certificate import certify
 from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
 from endotsr.tradeoff.measure import LEVELS, Frame, Prepared, errors, frame, prepare, seconds, terms
+from endotsr.tradeoff.results import FORMAT
 from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.settings import CLOSE, OMITTED, Setting, dials, joint, presets
 
-FORMAT = 1  # of tradeoff.json
 REPEATS = 7
 EXACT_PAIRS = 150e6  # Gaussians x pixels up to which the reference is the exact path itself
 COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}

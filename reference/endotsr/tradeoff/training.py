@@ -1,0 +1,254 @@
+"""What a minute of training buys: held-out quality against seconds and iterations, one setting changed at a time.
+
+Every configuration is one training, measured at milestones on the way; the clock stands still while it is measured.
+The schedule of the learning rates spans the whole training, so a milestone is what that training had reached by then;
+a training that was planned shorter ends a little higher.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numba
+import numpy as np
+
+from endotsr.config import Config, config_from_dict, config_to_toml, with_iterations
+from endotsr.errors import InputError
+from endotsr.evaluation.evaluate import evaluate_frames
+from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.fitting.model import render_at, spectral_from
+from endotsr.fitting.trainer import TrainingState, new_training, train, training_step, workshop
+from endotsr.runs import machine, now, versions, write_json
+from endotsr.sequences.sequence import Sequence
+from endotsr.tradeoff.results import FORMAT, read_result
+
+METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
+MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # shares of the iterations
+LPIPS_FROM = 1 / 2  # it takes as long as all other metrics several times over
+PROBE_WARM, PROBE = 5, 15  # iterations
+GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
+
+
+class Configuration(NamedTuple):
+    """One training of the study."""
+
+    name: str
+    dial: str  # title of the question it answers
+    changes: dict[str, dict[str, Any]]  # settings that differ from the base
+    cost: float  # estimated seconds over those of the base; plans the study, enters no result
+
+    def words(self) -> list[str]:
+        """The options of `endotsr train` that make the changes."""
+        return [
+            word
+            for section, values in self.changes.items()
+            for key, value in values.items()
+            for word in (f"--{section}.{key.replace('_', '-')}", _plain(value))
+        ]
+
+
+def _plain(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def configurations(base: Config) -> list[Configuration]:
+    """The base first, then the cheap and telling ones, so that a study that is cut short has answered something."""
+    first, other = base.initialisation.first_frame_points, base.initialisation.other_frame_points
+
+    def points(factor: float) -> dict[str, dict[str, Any]]:
+        counts = {"first_frame_points": round(first * factor), "other_frame_points": round(other * factor)}
+        return {"initialisation": counts}
+
+    return [
+        Configuration("base", "base", {}, 1.0),
+        Configuration("no residuals", "residuals", {"model": {"appearance": False, "spectral_motion": False}}, 0.85),
+        Configuration("no detail loss", "detail loss", {"model": {"laplacian": False}}, 0.9),
+        Configuration("half size", "image scale", {"sequence": {"scale": base.sequence.scale / 2}}, 0.5),
+        Configuration("N / 2", "Gaussians", points(1 / 2), 0.75),
+        Configuration("cutoff 1/64", "cutoffs", {"raster": {"alpha_cutoff": 1 / 64}}, 0.9),
+        Configuration("cutoff 1e-4", "cutoffs", {"raster": {"alpha_cutoff": 1e-4}}, 1.2),
+        Configuration("stop 1e-2", "cutoffs", {"raster": {"transmittance_stop": 1e-2}}, 1.0),
+        Configuration("quarter size", "image scale", {"sequence": {"scale": base.sequence.scale / 4}}, 0.35),
+        Configuration("N / 4", "Gaussians", points(1 / 4), 0.6),
+        Configuration("float64", "precision", {"training": {"precision": "float64"}}, 1.8),
+        Configuration("2 N", "Gaussians", points(2), 1.6),
+    ]
+
+
+def changed(base: Config, configuration: Configuration) -> Config:
+    """The settings of a configuration."""
+    data = msgspec.to_builtins(base)
+    for section, values in configuration.changes.items():
+        data[section] |= values
+    return config_from_dict(data, f"configuration {configuration.name!r}")
+
+
+def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights: LpipsWeights | None) -> int:
+    """Length of every training so that all of them, measured at their milestones, take about `seconds`.
+
+    Takes a few iterations and one evaluation to see what they cost here.
+    """
+    shop, state = workshop(sequence, base), new_training(sequence, base)
+    for _ in range(PROBE_WARM):
+        training_step(state, shop)
+    began = time.monotonic()
+    for _ in range(PROBE):
+        training_step(state, shop)
+    iteration = (time.monotonic() - began) / PROBE * GROWTH
+    chosen = configurations(base)
+    left = seconds
+    for share in MILESTONES:
+        began = time.monotonic()
+        measured(state, base, sequence, sequence, weights if share >= LPIPS_FROM else None)
+        left -= (time.monotonic() - began) * len(chosen)
+    trainings = sum(c.cost for c in chosen)
+    return int(np.clip(left / (iteration * trainings), 16, base.training.iterations))
+
+
+def measured(
+    state: TrainingState, config: Config, sequence: Sequence, full: Sequence, weights: LpipsWeights | None
+) -> dict[str, float | None]:
+    """Held-out means at full size, whatever size was trained on.
+
+    sequence   what was trained on: its training times define the atoms
+    full       the frames that are predicted
+    """
+    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+
+    def render(index: int) -> Any:
+        return render_at(state.gaussians, spectral, config, full.cameras[index], float(full.times[index])).colour
+
+    found = evaluate_frames(full, full.test_index, render, weights).mean
+    return {name: found[name] for name in METRICS}
+
+
+def run_configuration(
+    configuration: Configuration,
+    config: Config,
+    sequence: Sequence,
+    full: Sequence,
+    weights: LpipsWeights | None,
+    step: Callable[[], None],
+) -> dict[str, Any]:
+    """Train once; the entry of training.json.
+
+    Seconds count from the initialisation to the end of a milestone's iteration, evaluations left out.
+    """
+    total = config.training.iterations
+    stops = {max(1, round(share * total)) for share in MILESTONES}
+    rows: list[dict[str, Any]] = []
+    began, away = time.monotonic(), 0.0
+    state = new_training(sequence, config)
+
+    def on_iteration(entry: dict[str, Any]) -> None:
+        nonlocal away
+        step()
+        if entry["iteration"] in stops:
+            reached = time.monotonic()
+            row = {"iteration": entry["iteration"], "seconds": reached - began - away, "gaussians": entry["gaussians"]}
+            used = weights if entry["iteration"] >= LPIPS_FROM * total else None
+            rows.append(row | measured(state, config, sequence, full, used))
+            away += time.monotonic() - reached
+
+    train(state, sequence, config, on_iteration, lambda reached: None, on_message=lambda message: None)
+    return {
+        "name": configuration.name,
+        "dial": configuration.dial,
+        "change": configuration.words(),
+        "milestones": rows,
+        "seconds": rows[-1]["seconds"],
+        "evaluation_seconds": away,
+        "lambda_lap": state.lambda_lap,
+    }
+
+
+def run_training_study(
+    file: Path,
+    base: Config,
+    load: Callable[[Config], Sequence],
+    name: str,
+    *,
+    minutes: float,
+    iterations: int | None = None,
+    weights: LpipsWeights | None = None,
+    say: Callable[[str], None] = print,
+    begin: Callable[[int], None] = lambda steps: None,
+    step: Callable[[], None] = lambda: None,
+) -> dict[str, Any]:
+    """Train every configuration that the time allows, writing `file` after each; those it holds already are kept.
+
+    load         settings -> sequence, which depends on the image scale
+    iterations   of every training; None = as many as fill the minutes (a study that goes on keeps its number)
+    returns      training.json
+    """
+    full = load(base)
+    result = _begun(file, base, full, name, minutes, iterations, weights)
+    base = with_iterations(base, result["iterations"])
+    done = {entry["name"]: entry for entry in result["configurations"]}
+    chosen = configurations(base)
+    left = [c for c in chosen if c.name not in done]
+    begin(len(left) * base.training.iterations)
+    ends = time.monotonic() + 60 * minutes
+    result["left_out"] = {}
+    for configuration in left:
+        like = done.get("base", {"seconds": 0.0, "evaluation_seconds": 0.0})
+        expected = configuration.cost * like["seconds"] + like["evaluation_seconds"]
+        if time.monotonic() + expected > ends:
+            result["left_out"][configuration.name] = "no time left for it"
+            continue
+        config = changed(base, configuration)
+        sequence = full if config.sequence == base.sequence else load(config)
+        entry = run_configuration(configuration, config, sequence, full, weights, step)
+        done[configuration.name] = entry
+        result |= {"configurations": list(done.values()), "date": now()}
+        write_json(file, result)
+        say(summary_line(entry))
+    write_json(file, result)
+    return result
+
+
+def _begun(
+    file: Path,
+    base: Config,
+    full: Sequence,
+    name: str,
+    minutes: float,
+    iterations: int | None,
+    weights: LpipsWeights | None,
+) -> dict[str, Any]:
+    """The study that `file` holds if it is of the same sequence and settings, else a new one without trainings."""
+    digest = hashlib.sha256(config_to_toml(base).encode() + full.images.tobytes() + full.depth.tobytes()).hexdigest()
+    if file.exists():
+        found = read_result(file)
+        if found.get("input_sha256") == digest and iterations in (None, found["iterations"]):
+            return found
+        raise InputError(f"{file}: holds trainings of another sequence, length or settings; choose another --out")
+    length = iterations or planned_iterations(base, full, 60 * minutes, weights)
+    return {
+        "format": FORMAT,
+        "sequence": name,
+        "frames": full.count,
+        "width": full.width,
+        "height": full.height,
+        "preset": base.preset,
+        "iterations": length,
+        "input_sha256": digest,
+        "configurations": [],
+        "left_out": {},
+        "date": now(),
+        "machine": machine(),
+        "versions": versions(),
+        "threads": numba.get_num_threads(),
+    }
+
+
+def summary_line(entry: dict[str, Any]) -> str:
+    """One training in one line."""
+    last = entry["milestones"][-1]
+    return (
+        f"{entry['name']:<16} {last['psnr_full']:6.2f} dB, SSIM {last['ssim_full']:.4f} after "
+        f"{last['seconds']:6.1f} s, {last['gaussians']} Gaussians"
+    )

@@ -1,0 +1,113 @@
+"""What `training.json` says to a person: a table of decibels by minute, and held-out quality against time."""
+
+from pathlib import Path
+from typing import Any
+
+from endotsr.commands.progress import duration
+from endotsr.tradeoff.figures import BLUE, GREEN, GREY, INK, ORANGE, PINK, empty_figure, plain_axes, save
+
+METRICS = {"psnr_full": "PSNR, dB", "ssim_full": "SSIM", "lpips": "LPIPS"}
+ALONG = {"seconds": "minutes of training", "iteration": "iterations"}
+COLOURS = (BLUE, ORANGE, GREEN, PINK)
+
+
+def training_lines(result: dict[str, Any]) -> list[str]:
+    """Every training at its end beside the base, then what each further stretch of time bought."""
+    by_name = {c["name"]: c for c in result["configurations"]}
+    if "base" not in by_name:
+        return ["no training was finished"]
+    base = by_name["base"]["milestones"][-1]
+    lines = [f"{'training':<16}{'PSNR':>9}{'to base':>9}{'SSIM':>8}{'time':>8}{'to base':>9}{'Gaussians':>11}"]
+    for c in result["configurations"]:
+        last = c["milestones"][-1]
+        gain = last["psnr_full"] - base["psnr_full"]
+        lines.append(
+            f"{c['name']:<16}{last['psnr_full']:9.2f}{gain:+9.2f}{last['ssim_full']:8.4f}"
+            f"{duration(last['seconds']):>8}{last['seconds'] / base['seconds']:8.2f}x{last['gaussians']:11d}"
+        )
+    lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
+    return lines + decibels_by_minute(result)
+
+
+def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """The measured states that no other state reached sooner and better, earliest first."""
+    rows = [
+        row | {"name": c["name"], "change": c["change"]}
+        for c in result["configurations"]
+        for row in c["milestones"]
+        if row["psnr_full"] is not None
+    ]
+    found: list[dict[str, Any]] = []
+    for row in sorted(rows, key=lambda r: (r["seconds"], -r["psnr_full"])):
+        if not found or row["psnr_full"] > found[-1]["psnr_full"]:
+            found.append(row)
+    return found
+
+
+def decibels_by_minute(result: dict[str, Any]) -> list[str]:
+    """Along the best measured states: from when to when, which training, what it gained a minute."""
+    lines, before = [], None
+    for row in best_by_time(result):
+        reached = f"{row['name']} at iteration {row['iteration']}: {row['psnr_full']:.2f} dB"
+        if before is None:
+            lines.append(f"after {duration(row['seconds'])}: {reached}")
+        else:
+            minutes = (row["seconds"] - before["seconds"]) / 60
+            gain = row["psnr_full"] - before["psnr_full"]
+            lines.append(f"after {duration(row['seconds'])}: {reached}, {gain / max(minutes, 1e-9):.2f} dB a minute")
+        before = row
+    return lines
+
+
+def training_figure(result: dict[str, Any], along: str, metrics: dict[str, str]) -> Any:
+    """One column a question, the base in grey beside the trainings that answer it; one row a metric."""
+    by_name = {c["name"]: c for c in result["configurations"]}
+    dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"]
+    rows, columns = (len(metrics), len(dials)) if len(metrics) > 1 else (-(-len(dials) // 3), min(3, len(dials)))
+    figure = empty_figure(3.0 * columns, 2.5 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey="row").ravel()
+    shown = [(metric, dial) for metric in metrics for dial in dials]
+    for axes, (metric, dial) in zip(panels, shown, strict=False):
+        lines = [("base", by_name["base"], GREY)] if "base" in by_name else []
+        same = [c for c in result["configurations"] if c["dial"] == dial]
+        lines += [(c["name"], c, COLOURS[i % len(COLOURS)]) for i, c in enumerate(same)]
+        _lines(axes, lines, along, metric)
+        plain_axes(axes, ALONG[along], small=True, log_y=False)
+        axes.set_ylabel(metrics[metric], fontsize=8, color=INK)
+        axes.label_outer()
+        axes.set_title(dial, loc="left", fontsize=9.5, color=INK)
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def _lines(axes: Any, lines: list[tuple[str, dict[str, Any], str]], along: str, metric: str) -> None:
+    ends = []
+    for name, configuration, colour in lines:
+        rows = [r for r in configuration["milestones"] if r[metric] is not None]
+        xs = [r[along] / (60 if along == "seconds" else 1) for r in rows]
+        ys = [r[metric] for r in rows]
+        axes.plot(xs, ys, color=colour, linewidth=1.5, marker="o", markersize=3)
+        if rows:
+            ends.append((ys[-1], xs[-1], name, colour))
+    for place, (_, _, name, colour) in enumerate(sorted(ends, key=lambda e: e[0])):
+        axes.annotate(
+            name, (0.97, 0.05 + 0.1 * place), xycoords="axes fraction", ha="right", va="bottom", fontsize=8,
+            color=colour, weight="bold",
+        )  # fmt: skip
+
+
+def draw_training(result: dict[str, Any], folder: Path, name: str) -> list[str]:
+    """PSNR against time, and all metrics against time and iterations; returns the stems that were written."""
+    if not result["configurations"]:
+        return []
+    last = result["configurations"][0]["milestones"][-1]
+    metrics = {k: v for k, v in METRICS.items() if last[k] is not None}
+    pictures = {
+        name: training_figure(result, "seconds", {"psnr_full": METRICS["psnr_full"]}),
+        f"{name}_seconds": training_figure(result, "seconds", metrics),
+        f"{name}_iterations": training_figure(result, "iteration", metrics),
+    }
+    for stem, figure in pictures.items():
+        save(figure, folder / stem)
+    return list(pictures)
