@@ -48,6 +48,54 @@ def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
     _save(figure, path)
 
 
+CURVE_COLOURS = {
+    "iteration": INK,
+    "splat": "#b8480f",
+    "blending": "#e8762c",
+    "binning": "#7f2704",
+    "time bases": "#0b6e99",
+    "Fourier": "#8a4fa3",
+    "losses": "#5b8c2a",
+}
+
+
+def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
+    """A panel for each size: measured times as points, the fitted power of the upper decade as a line."""
+    columns = min(3, len(axes))
+    rows = -(-len(axes) // columns)
+    figure, panels = _figure(3.9 * columns, 3.5 * rows, columns, rows)
+    panels = list(panels.flat) if hasattr(panels, "flat") else [panels]
+    for panel, axis in zip(panels, axes.values()):
+        for name, times in axis["median_ms"].items():
+            _power(panel, axis["size"], times, name, axis["exponent"][name])
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        low, high = panel.get_ylim()
+        panel.set_ylim(low / 1.2, high * 9.0 ** (len(axis["median_ms"]) / 6.0))  # room for the legend above the curves
+        panel.set_xlabel(axis["unit"], color=INK, fontsize=9)
+        panel.set_ylabel("ms", color=INK, fontsize=9)
+        panel.legend(frameon=False, fontsize=8, labelcolor=INK, loc="upper left")
+        _finish(panel)
+    for empty in panels[len(axes) :]:
+        empty.set_visible(False)
+    _save(figure, path)
+
+
+def _power(panel: Any, size: Sequence[float], times: Sequence[float], name: str, power: float | None) -> None:
+    import numpy as np
+
+    from endotsr.bench.scaling import upper_decade
+
+    colour = CURVE_COLOURS[name]
+    label = name if power is None else f"{name}, exponent {power:.2f}"
+    panel.plot(size, times, "o", color=colour, markersize=3.5, label=label)
+    if power is not None:
+        chosen = upper_decade(size)
+        x, y = np.array(size)[chosen], np.array(times)[chosen]
+        factor = np.exp(np.mean(np.log(y) - power * np.log(x)))
+        panel.plot(x, factor * x**power, color=colour, linewidth=1.2)
+
+
 def _label(case: Mapping[str, Any]) -> str:
     what = case["scene"] or f"{case['gaussians'] / 1000:g}k"
     return f"{what}, {case['precision']}, {case['threads']} thread{'s' if case['threads'] > 1 else ''}"

@@ -1,61 +1,22 @@
-"""`endotsr bench`: where the time goes, how it grows, how it compares. One options class for each thing to measure."""
+"""`endotsr bench`: where the time goes, how it grows, and how it compares."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-import tyro
-
+from endotsr.commands.bench_options import (
+    AllOptions,
+    IterationOptions,
+    PageOptions,
+    PeersOptions,
+    ScalingOptions,
+    StagesOptions,
+    StartOptions,
+)
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
 
-JsonFile = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
-Precision = Literal["float32", "float64"]
-
-
-@dataclass
-class IterationOptions:
-    """Time one full training iteration on the common workload: render, all losses, reverse passes, optimiser."""
-
-    gaussians: int = 60_000
-    """number of Gaussians"""
-    width: int = 640
-    """columns of the picture"""
-    height: int = 512
-    """rows of the picture"""
-    repeats: int = 15
-    """timed iterations"""
-    threads: int = 2
-    """threads, 0 = all cores"""
-    precision: Precision = "float32"
-    """arithmetic"""
-    json: JsonFile = None
-    """also write the figures as JSON"""
-
-
-@dataclass
-class StagesOptions:
-    """Time every stage of an iteration, beside the limit that the measured peaks of this machine set it."""
-
-    gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
-    """numbers of Gaussians of the common workload; none with an empty list"""
-    scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
-    """trained scenes (npz) to time as well"""
-    precisions: tuple[Precision, ...] = ("float32", "float64")
-    """arithmetic"""
-    threads: tuple[int, ...] = (1, 2)
-    """numbers of threads"""
-    width: int = 640
-    """columns of the picture"""
-    height: int = 512
-    """rows of the picture"""
-    repeats: int = 11
-    """timed iterations a case"""
-    json: JsonFile = None
-    """also write the figures as JSON"""
-    plot: JsonFile = None
-    """also draw the stacked bars as a picture (png or svg)"""
+LEAST = {"gaussians": 4, "largest": 1000, "repeats": 1, "width": 16, "height": 16, "threads": 0}
 
 
 def run(words: list[str]) -> int:
@@ -74,7 +35,14 @@ def run(words: list[str]) -> int:
 
 
 def _refuse_nothing(options: Any) -> None:
-    for name, least in (("gaussians", 4), ("repeats", 1), ("width", 16), ("height", 16), ("threads", 0)):
+    for name, least in (
+        ("gaussians", 4),
+        ("largest", 1000),
+        ("repeats", 1),
+        ("width", 16),
+        ("height", 16),
+        ("threads", 0),
+    ):
         values = getattr(options, name, least)
         for value in values if isinstance(values, tuple) else (values,):
             if value < least:
@@ -90,11 +58,11 @@ def _overview() -> str:
 
 
 def _record(path: Path | None, result: dict[str, Any]) -> None:
-    """The figures as JSON, dated, with the machine and the versions."""
-    from endotsr.runs import machine, now, versions, write_json
+    from endotsr.bench.suite import dated
+    from endotsr.runs import write_json
 
     if path:
-        write_json(path, {"date": now(), "machine": machine(), "versions": versions()} | result)
+        write_json(path, dated(result))
 
 
 def _iteration(options: IterationOptions) -> None:
@@ -131,7 +99,52 @@ def _stages(options: StagesOptions) -> None:
         charts.stage_bars(result["cases"], options.plot)
 
 
+def _scaling(options: ScalingOptions) -> None:
+    from endotsr.bench import charts, scaling
+
+    result = scaling.measure_scaling(options.largest, options.axes, print)
+    print(scaling.table(result))
+    _record(options.json, result)
+    if options.plot:
+        charts.scaling_curves(result["axes"], options.plot)
+
+
+def _peers(options: PeersOptions) -> None:
+    from endotsr.bench import peers
+
+    result = peers.measure_peers(options.gaussians, options.precisions, options.threads, options.repeats)
+    print(peers.table(result))
+    _record(options.json, result)
+
+
+def _start(options: StartOptions) -> None:
+    from endotsr.bench import start
+
+    result = start.measure_start(options.repeats)
+    print(start.table(result))
+    _record(options.json, result)
+
+
+def _all(options: AllOptions) -> None:
+    from endotsr.bench import page, suite
+
+    suite.run_all(options.out, options.scenes, print)
+    if options.page:
+        page.write_page(options.out, options.page)
+
+
+def _page(options: PageOptions) -> None:
+    from endotsr.bench.page import write_page
+
+    write_page(options.results, options.page)
+
+
 MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
     "iteration": (IterationOptions, _iteration),
     "stages": (StagesOptions, _stages),
+    "scaling": (ScalingOptions, _scaling),
+    "peers": (PeersOptions, _peers),
+    "start": (StartOptions, _start),
+    "all": (AllOptions, _all),
+    "page": (PageOptions, _page),
 }

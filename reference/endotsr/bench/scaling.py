@@ -1,0 +1,146 @@
+"""`endotsr bench scaling`: how cost grows with each size alone, with fitted exponents.
+
+Every point is measured in a process of its own, so its peak memory is that of its size. An exponent is the slope of
+log time against log size, least squares over the upper decade: below it, fixed costs flatten the curve.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.bench.case import Case, apart, measure
+from endotsr.bench.clock import REST, SPLAT, STAGES
+from endotsr.bench.stages import Say, line
+
+# Stages that grow together, in the order of the legend.
+CURVES: dict[str, tuple[str, ...]] = {
+    "iteration": (*STAGES, REST),
+    "splat": SPLAT,
+    "blending": ("blend forward", "blend reverse"),
+    "binning": ("binning",),
+    "time bases": ("FDM", "FDM reverse + Adam"),
+    "Fourier": ("Fourier",),
+    "losses": ("L1 and SSIM", "pyramid", "depth and smoothness"),
+}
+BASE = Case(gaussians=20_000, repeats=7, densifications=0)
+LARGE = 100_000  # Gaussians from which fewer repeats are enough: an iteration is long against any disturbance
+
+
+class Axis(NamedTuple):
+    """One size that is varied."""
+
+    unit: str
+    cases: tuple[Case, ...]
+    curves: tuple[str, ...]  # that depend on this size, or should not
+    along: Callable[[dict[str, Any]], float]  # the size of a measured case
+
+
+def axes(largest: int) -> dict[str, Axis]:
+    """Every axis; `largest` ends that of the Gaussians."""
+    counts = [n for n in (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000) if n <= largest]
+    sizes = ((192, 108), (384, 216), (640, 360), (960, 540), (1440, 810), (1920, 1080))
+    of_case = lambda name: lambda result: float(result["case"][name])
+    vary = lambda name, values: tuple(replace(BASE, **{name: value}) for value in values)
+    return {
+        "gaussians": Axis(
+            "Gaussians",
+            tuple(replace(BASE, gaussians=n, repeats=3 if n >= LARGE else BASE.repeats) for n in counts),
+            ("iteration", "splat", "blending", "binning", "time bases", "Fourier"),
+            of_case("gaussians"),
+        ),
+        "pairs": Axis(
+            "blended pairs",
+            tuple(replace(BASE, gaussians=60_000, size=size) for size in (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)),
+            ("splat", "blending", "binning"),
+            lambda result: float(result["view"]["blended"]),
+        ),
+        "pixels": Axis(
+            "pixels",
+            tuple(replace(BASE, width=width, height=height) for width, height in sizes),
+            ("iteration", "blending", "losses"),
+            lambda result: float(result["case"]["width"] * result["case"]["height"]),
+        ),
+        "bases": Axis("time bases B", vary("bases", (4, 8, 17, 34)), ("iteration", "time bases"), of_case("bases")),
+        "frequencies": Axis(
+            "frequencies F", vary("frequencies", (4, 8, 16, 32)), ("iteration", "Fourier"), of_case("frequencies")
+        ),
+        "frames": Axis("frames", vary("frames", (8, 16, 32, 64)), ("iteration",), of_case("frames")),
+    }
+
+
+def measure_scaling(largest: int, names: Sequence[str], say: Say) -> dict[str, Any]:
+    """{"axes": {name: of `summary`}, "memory": of `memory`} for the named axes."""
+    chosen = {name: axis for name, axis in axes(largest).items() if name in names}
+    found = {}
+    for name, axis in chosen.items():
+        results = []
+        for case in axis.cases:
+            results.append(apart(measure, case))
+            say(f"{name}: {line(results[-1])}")
+        found[name] = summary(axis, results)
+    return {"axes": found, "memory": memory(found)}
+
+
+def summary(axis: Axis, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Sizes, times of each curve, their exponents and the peak memory along one axis."""
+    size = [axis.along(result) for result in results]
+    curves = {name: [_total(result, CURVES[name]) for result in results] for name in axis.curves}
+    return {
+        "unit": axis.unit,
+        "size": size,
+        "median_ms": curves,
+        "exponent": {name: exponent(size, times) for name, times in curves.items()},
+        "peak_memory_bytes": [result["peak_memory_bytes"] for result in results],
+        "state_bytes": [_state_bytes(result) for result in results],
+    }
+
+
+def _total(result: dict[str, Any], stages: tuple[str, ...]) -> float:
+    return sum(result["stages"][name]["median_ms"] for name in stages)
+
+
+def _state_bytes(result: dict[str, Any]) -> int:
+    """Parameters and their two moments."""
+    case = result["case"]
+    return 3 * result["parameters"] * case["gaussians"] * (8 if case["precision"] == "float64" else 4)
+
+
+def upper_decade(size: Sequence[float]) -> np.ndarray:
+    """Which sizes are at least a tenth of the largest."""
+    return np.array(size) >= max(size) / 10.0
+
+
+def exponent(size: Sequence[float], times: Sequence[float]) -> float | None:
+    """p of times ~ size^p over the upper decade; None with fewer than two sizes or a time that is not positive."""
+    chosen = upper_decade(size)
+    x, y = np.array(size)[chosen], np.array(times)[chosen]
+    if len(set(x)) < 2 or not (y > 0).all():
+        return None
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def memory(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Bytes a Gaussian and bytes a frame: slopes of the peak memory over the upper decade; None if not known."""
+    return {f"bytes_per_{name[:-1]}": _slope(found.get(name)) for name in ("gaussians", "frames")}
+
+
+def _slope(axis: dict[str, Any] | None) -> float | None:
+    if axis is None or None in axis["peak_memory_bytes"] or len(set(axis["size"])) < 2:
+        return None
+    chosen = upper_decade(axis["size"])
+    return float(np.polyfit(np.array(axis["size"])[chosen], np.array(axis["peak_memory_bytes"])[chosen], 1)[0])
+
+
+def table(result: dict[str, Any]) -> str:
+    """For a person: exponents of every curve, then memory."""
+    lines = [f"{'along':<16}{'range':>22}  exponents over the upper decade"]
+    for axis in result["axes"].values():
+        fits = ", ".join(f"{name} {p:.2f}" for name, p in axis["exponent"].items() if p is not None)
+        ends = f"{min(axis['size']):,.0f} - {max(axis['size']):,.0f}"
+        lines.append(f"{axis['unit']:<16}{ends:>22}  {fits}")
+    for name, slope in result["memory"].items():
+        if slope is not None:
+            lines.append(f"{name.replace('_', ' ')}: {slope:,.0f}")
+    return "\n".join(lines)

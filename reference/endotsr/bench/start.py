@@ -1,0 +1,77 @@
+"""`endotsr bench start`: from the call of the interpreter to the end of the first training iteration.
+
+Cold: the folder of compiled kernels is empty. Warm: the same again. Each in a fresh process, with the initialisation
+of a real run; then one iteration of the schedule after which everything runs, which needs the remaining kernels.
+As a module (`python -m endotsr.bench.start`) this is what the fresh process runs.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from endotsr.errors import InputError
+
+MOMENTS = ("imported", "sequence made", "initialised", "first iteration", "first iteration with everything")
+
+
+def measure_start(warm_repeats: int) -> dict[str, Any]:
+    """{"cold": seconds by moment, "warm": medians of `warm_repeats` processes}, counted from the call."""
+    with tempfile.TemporaryDirectory() as cache:
+        cold = fresh_process(cache)
+        warm = [fresh_process(cache) for _ in range(warm_repeats)]
+    return {
+        "cold": cold,
+        "warm": {moment: statistics.median(w[moment] for w in warm) for moment in MOMENTS},
+        "warm_repeats": warm_repeats,
+    }
+
+
+def fresh_process(cache: str) -> dict[str, float]:
+    """Seconds from the call to each moment, with compiled kernels looked for in the folder `cache`."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": cache}
+    began = time.perf_counter()
+    with subprocess.Popen(
+        [sys.executable, "-u", "-m", __spec__.name], env=environment, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        seconds = {json.loads(line): time.perf_counter() - began for line in process.stdout}
+    if process.returncode or set(seconds) != set(MOMENTS):
+        raise InputError(f"bench start: the fresh process ended with {process.returncode} after {list(seconds)}")
+    return seconds
+
+
+def _first_iterations() -> None:
+    """Say each moment as it is reached; the parent takes the time."""
+    from endotsr.bench import workload
+    from endotsr.bench.case import representative
+    from endotsr.config import PAPER
+    from endotsr.fitting.trainer import new_training, training_step, workshop
+
+    say = lambda moment: print(json.dumps(moment), flush=True)
+    say(MOMENTS[0])
+    shop = workshop(workload.sequence(), PAPER)
+    say(MOMENTS[1])
+    state = new_training(shop.sequence, PAPER)
+    say(MOMENTS[2])
+    training_step(state, shop)
+    say(MOMENTS[3])
+    for iteration in (PAPER.training.residual_activation, representative(PAPER)):
+        state.iteration = iteration  # the residuals are born at the first of the two
+        training_step(state, shop)
+    say(MOMENTS[4])
+
+
+def table(result: dict[str, Any]) -> str:
+    """For a person."""
+    lines = [f"{'seconds from the call to':<36}{'cold':>8}{'warm':>8}"]
+    lines += [f"{moment:<36}{result['cold'][moment]:>8.2f}{result['warm'][moment]:>8.2f}" for moment in MOMENTS]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    _first_iterations()

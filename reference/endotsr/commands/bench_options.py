@@ -1,0 +1,119 @@
+"""What each measurement of `endotsr bench` can be told."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from endotsr.bench.case import Precision
+
+File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+
+
+@dataclass
+class IterationOptions:
+    """Time one full training iteration on the common workload: render, all losses, reverse passes, optimiser."""
+
+    gaussians: int = 60_000
+    """number of Gaussians"""
+    width: int = 640
+    """columns of the picture"""
+    height: int = 512
+    """rows of the picture"""
+    repeats: int = 15
+    """timed iterations"""
+    threads: int = 2
+    """threads, 0 = all cores"""
+    precision: Precision = "float32"
+    """arithmetic"""
+    json: File = None
+    """also write the figures as JSON"""
+
+
+@dataclass
+class StagesOptions:
+    """Time every stage of an iteration, beside the limit that the measured peaks of this machine set it."""
+
+    gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
+    """numbers of Gaussians of the common workload; none with an empty list"""
+    scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
+    """trained scenes (npz) to time as well"""
+    precisions: tuple[Precision, ...] = ("float32", "float64")
+    """arithmetic"""
+    threads: tuple[int, ...] = (1, 2)
+    """numbers of threads"""
+    width: int = 640
+    """columns of the picture"""
+    height: int = 512
+    """rows of the picture"""
+    repeats: int = 11
+    """timed iterations a case"""
+    json: File = None
+    """also write the figures as JSON"""
+    plot: File = None
+    """also draw the stacked bars as a picture (png or svg)"""
+
+
+@dataclass
+class ScalingOptions:
+    """Cost against each size alone, with fitted exponents, and memory a Gaussian."""
+
+    axes: tuple[Literal["gaussians", "pairs", "pixels", "bases", "frequencies", "frames"], ...] = (
+        "gaussians", "pairs", "pixels", "bases", "frequencies", "frames",
+    )  # fmt: skip
+    """which sizes to vary"""
+    largest: int = 1_000_000
+    """Gaussians of the largest scene; a million takes about 10 GB"""
+    json: File = None
+    """also write the figures as JSON"""
+    plot: File = None
+    """also draw the curves as a picture (png or svg)"""
+
+
+@dataclass
+class PeersOptions:
+    """gsplat's pure-torch reference on the same arrays in the same run: time, ratio, agreement. Needs torch."""
+
+    gaussians: tuple[int, ...] = (60_000,)
+    """numbers of Gaussians of the common workload"""
+    precisions: tuple[Precision, ...] = ("float32", "float64")
+    """arithmetic"""
+    threads: int = 2
+    """threads of both"""
+    repeats: int = 2
+    """timed repeats of the peer"""
+    json: File = None
+    """also write the figures as JSON"""
+
+
+@dataclass
+class StartOptions:
+    """Seconds from the call to the end of the first iteration: without compiled kernels, and with them."""
+
+    repeats: int = 3
+    """warm starts"""
+    json: File = None
+    """also write the figures as JSON"""
+
+
+@dataclass
+class AllOptions:
+    """Everything above in one go, for a quiet machine: JSON, pictures, and the page that shows them."""
+
+    out: Path
+    """folder for the results"""
+    scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
+    """trained scenes (npz) to time as well"""
+    page: File = None
+    """page whose marked parts are then written anew"""
+
+
+@dataclass
+class PageOptions:
+    """Write the marked parts of the performance page anew from results that exist."""
+
+    results: Path = Path("docs/results")
+    """folder of the results"""
+    page: Path = Path("docs/performance.md")
+    """the page"""

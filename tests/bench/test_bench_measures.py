@@ -1,0 +1,163 @@
+"""What the benchmarks count and fit; no test looks at a time."""
+
+import numpy as np
+import pytest
+
+from endotsr.bench import clock, pairs, peaks, scaling, timing, workload
+from endotsr.bench.case import Case, measure, representative
+from endotsr.bench.limits import limits, work
+from endotsr.bench.stages import ns_per_pair
+from endotsr.bench.stages import table as stage_table
+from endotsr.config import PAPER
+from endotsr.fitting import trainer
+from endotsr.fitting.schedules import densify_now
+from endotsr.splatting import render
+from endotsr.splatting.render import Scene
+from endotsr.splatting.settings import PAPER as PAPER_RULES
+
+TINY = Case(gaussians=60, width=48, height=32, repeats=2, threads=1, densifications=1)
+PEAKS = {"flop_per_second": {"float32": 1e11, "float64": 5e10}, "bytes_per_second": {"triad": 1e10, "update": 2e10}}
+
+
+@pytest.fixture(scope="module")
+def result():
+    return measure(TINY)
+
+
+def test_every_stage_takes_time(result):
+    assert set(result["stages"]) == {*clock.STAGES, clock.REST}
+    idle = [name for name, spread in result["stages"].items() if not spread["median_ms"] > 0]
+    assert not idle, f"no time was counted for {idle}: did their modules move?"
+    assert result["densification"]["gaussians"] > 0 and result["view"]["blended"] > 0
+    assert result["parameters"] == 665  # of a Gaussian at B = 17, F = 8, degree 3
+
+
+def test_what_is_not_in_a_stage_is_little(result):
+    """Glue of the trainer, not a stage that the clock does not know; small pictures have much glue."""
+    assert result["stages"][clock.REST]["median_ms"] < 0.5 * result["iteration"]["median_ms"]
+
+
+def test_functions_are_put_back():
+    before = trainer.render_forward, trainer.adam_update, render.tile_lists
+    with pytest.raises(ZeroDivisionError), clock.StageClock().watching():
+        assert render.tile_lists is not before[2]
+        raise ZeroDivisionError
+    assert (trainer.render_forward, trainer.adam_update, render.tile_lists) == before
+
+
+def test_nested_stages_are_counted_once(monkeypatch):
+    now = iter([0.0, 1.0, 3.0, 7.0, 15.0, 31.0])
+    monkeypatch.setattr(clock.time, "perf_counter", lambda: next(now))
+    watch = clock.StageClock()
+    inner = watch.counted(lambda: None, "binning")
+    outer = watch.counted(lambda: inner(), "projection")
+    with watch.iteration():
+        outer()
+    found = watch.repeats[0]
+    assert (found["projection"], found["binning"], found[clock.REST]) == (2.0 + 8.0, 4.0, 1.0 + 16.0)
+
+
+def test_representative_iteration_has_everything_but_densification():
+    iteration = representative(PAPER) + 1
+    assert iteration > max(PAPER.training.residual_activation, PAPER.loss.detail_full)
+    assert not densify_now(iteration, PAPER)
+
+
+def pairs_by_loops(scene: Scene, camera) -> int:
+    """Pairs of isotropic Gaussians straight from the rule of compositing."""
+    count = 0
+    order = np.argsort(scene.position[2], kind="stable")
+    for row in range(camera.height):
+        for column in range(camera.width):
+            through = 1.0
+            for i in order:
+                x, y, z = scene.position[:, i]
+                variance = (np.exp(scene.log_scale[0, i]) * camera.fx / z) ** 2 + PAPER_RULES.low_pass
+                dx, dy = column + 0.5 - camera.fx * x / z - camera.cx, row + 0.5 - camera.fy * y / z - camera.cy
+                alpha = np.exp(-(dx * dx + dy * dy) / (2 * variance)) / (1 + np.exp(-scene.opacity_logit[i]))
+                alpha = min(alpha, PAPER_RULES.alpha_max)
+                if alpha < PAPER_RULES.alpha_cutoff:
+                    continue
+                if through * (1 - alpha) < PAPER_RULES.transmittance_stop:
+                    break
+                through *= 1 - alpha
+                count += 1
+    return count
+
+
+def test_pairs_are_those_of_the_rule():
+    """Small Gaussians near the axis, so that the projected ellipse is a circle to far below the margin of a pair."""
+    camera = workload.camera(32, 24)._replace(fx=4000.0, fy=4000.0)
+    rng = np.random.default_rng(5)
+    position = np.stack([rng.uniform(-0.012, 0.012, 40), rng.uniform(-0.009, 0.009, 40), rng.uniform(3, 5, 40)])
+    quaternion = np.repeat([[1.0], [0], [0], [0]], 40, axis=1)
+    scene = Scene(position, quaternion, np.full((3, 40), np.log(0.002)), rng.uniform(-1, 6, 40), np.zeros((16, 3, 40)))
+    found = pairs.count_pairs(scene, camera, PAPER_RULES, 0)
+    assert found["blended"] == pairs_by_loops(scene, camera)
+    assert found["visible"] == 40 and found["listed"] >= 40
+
+
+def test_exponent_is_that_of_the_upper_decade():
+    size = [1.0, 3, 10, 30, 100]
+    times = [7.0 if x < 10 else 0.02 * x**1.5 for x in size]
+    assert scaling.exponent(size, times) == pytest.approx(1.5)
+    assert scaling.exponent([5.0, 5.0], [1.0, 2.0]) is None
+    assert scaling.exponent([1.0, 2.0], [0.0, 1.0]) is None
+
+
+def test_memory_is_a_slope():
+    axis = {"size": [1.0, 10, 40, 100], "peak_memory_bytes": [5e8, 1e8 + 80, 1e8 + 320, 1e8 + 800]}
+    assert scaling.memory({"gaussians": axis})["bytes_per_gaussian"] == pytest.approx(8)
+    axis["peak_memory_bytes"][0] = None
+    assert scaling.memory({"gaussians": axis})["bytes_per_gaussian"] is None
+
+
+def test_every_axis_varies_its_size_alone():
+    for name, axis in scaling.axes(10_000).items():
+        assert len(axis.cases) > 2
+        varied = [
+            n for n in Case.__dataclass_fields__ if n != "repeats" and len({getattr(c, n) for c in axis.cases}) > 1
+        ]
+        assert varied == {"pairs": ["size"], "pixels": ["width", "height"]}.get(name, [name])
+
+
+def test_limit_is_the_longer_of_arithmetic_and_traffic(result):
+    blend = work(result)["blend forward"]
+    found = limits(result, PEAKS)["blend forward"]
+    assert found["limit_ms"] == pytest.approx(1e3 * max(blend.flop / 1e11, blend.bytes / 2e10))
+    assert set(limits(result, PEAKS)) == set(clock.STAGES)
+    double = result | {"case": result["case"] | {"precision": "float64"}}
+    assert work(double)["FDM"].bytes == 2 * work(result)["FDM"].bytes
+
+
+def test_table_shows_every_stage(result):
+    shown = stage_table(result | {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)})
+    assert all(name in shown for name in clock.STAGES) and "blended pairs" in shown
+
+
+def test_peaks_are_positive_numbers():
+    found = peaks.bandwidths(repeats=1, array_bytes=1 << 20)
+    assert set(found) == {"triad", "update"} and min(found.values()) > 0
+    assert peaks.fma_peak("float32", repeats=1) > 0
+
+
+def test_memory_kernels_do_what_they_say():
+    out, left, right = np.full(5, 2.0), np.arange(5.0), np.arange(5.0) + 1
+    peaks._triad(0, 1, out, left, right, 0.5)
+    assert np.array_equal(out, left + 0.5 * right)
+    peaks._update(0, 1, out, left, right, 2.0)
+    assert np.array_equal(out, right + 2.0 * (left + 0.5 * right))
+
+
+def test_median_and_quartiles():
+    found = timing.spread([0.001, 0.002, 0.003, 0.004, 0.1])
+    assert [found["median_ms"], *found["quartiles_ms"]] == pytest.approx([3.0, 2.0, 4.0])
+    calls = []
+    assert len(timing.repeated(lambda: calls.append(1), 3, warm_up=2)) == 3 and len(calls) == 5
+
+
+def test_workload_is_seeded_and_grows_with_its_factor():
+    first, second = workload.gaussians(50, PAPER), workload.gaussians(50, PAPER, size=2.0)
+    assert np.array_equal(first.position, second.position)
+    assert np.allclose(second.log_scale - first.log_scale, np.log(2), atol=1e-6)
+    assert workload.sequence(16, 16, frames=3).count == 3

@@ -1,0 +1,148 @@
+"""The generated page, the pictures and the refusals of `endotsr bench`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from endotsr.bench import charts, page, peers, scaling, start, suite, trained
+from endotsr.bench.case import Case, measure
+from endotsr.bench.limits import limits
+from endotsr.bench.stages import grid, ns_per_pair
+from endotsr.cli import main
+from endotsr.commands.bench_options import StagesOptions
+from endotsr.config import PAPER
+from endotsr.errors import InputError
+
+PEAKS = {
+    "threads": 1,
+    "flop_per_second": {"float32": 1e11, "float64": 5e10},
+    "bytes_per_second": {"triad": 1e10, "update": 2e10},
+}
+ERRORS = {"colour": 1e-6, "position": 4e-4}
+
+
+@pytest.fixture(scope="module")
+def results():
+    """What the four measurements return, at the smallest sizes."""
+    small = [Case(gaussians=n, width=48, height=32, repeats=1, threads=1, densifications=1) for n in (60, 30, 90)]
+    measured = [measure(case) for case in small]
+    for result in measured:
+        result |= {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)}
+    axis = scaling.axes(1000)["gaussians"]
+    grown = {"gaussians": scaling.summary(axis, measured)}
+    spread = {"median_ms": 2.0, "quartiles_ms": [1.0, 3.0]}
+    compared = {
+        "gaussians": 60, "precision": "float32", "threads": 1, "ours": spread, "gsplat": spread, "pair_lists": spread,
+        "ratio": 1.0, "errors": ERRORS, "versions": {"torch": "2", "gsplat": "1"},
+    }  # fmt: skip
+    moments = {moment: 1.5 for moment in start.MOMENTS}
+    return {
+        suite.STAGES_FILE: {"peaks": [PEAKS], "cases": measured},
+        suite.SCALING_FILE: {"axes": grown, "memory": scaling.memory(grown)},
+        suite.PEERS_FILE: {"cases": [compared]},
+        suite.START_FILE: {"cold": moments, "warm": moments, "warm_repeats": 1},
+    }
+
+
+@pytest.fixture
+def folder(results, tmp_path):
+    for name, result in results.items():
+        (tmp_path / name).write_text(json.dumps(suite.dated(result)))
+    return tmp_path
+
+
+def test_page_is_filled_and_keeps_its_words(folder):
+    target = folder / "performance.md"
+    original = (Path(__file__).parents[2] / "docs" / "performance.md").read_text(encoding="utf-8")
+    target.write_text(original, encoding="utf-8")
+    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 0
+    once = target.read_text(encoding="utf-8")
+    assert "blend reverse" in once and "4.0e-04 (position), within 1e-03" in once and "1.5" in once
+    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 0
+    assert target.read_text(encoding="utf-8") == once
+    without = lambda text: page.re.sub(r"(:start -->).*?(<!-- bench)", r"\1\2", text, flags=page.re.DOTALL)
+    assert without(once) == without(original)
+
+
+def test_every_part_of_the_page_is_made(folder):
+    text = (Path(__file__).parents[2] / "docs" / "performance.md").read_text(encoding="utf-8")
+    made = page.fragments({n: json.loads((folder / f).read_text()) for n, f in page.FILES.items()}, {})
+    assert sorted(page.re.findall(r"<!-- bench:(\w+):start -->", text)) == sorted(made)
+
+
+def test_target_that_is_missed_says_so(results):
+    found = {name: suite.dated(results[file]) for name, file in page.FILES.items()}
+    slow = {moment: 99.0 for moment in start.MOMENTS}
+    text = page.fragments(found | {"start": found["start"] | {"cold": slow}}, {})["targets"]
+    line = next(line for line in text.splitlines() if "cold start" in line)
+    assert "99 s" in line and "**not met**" in line
+    assert "not measured" in next(line for line in text.splitlines() if "6000" in line)
+
+
+def test_page_names_what_is_missing(folder, capsys):
+    target = folder / "page.md"
+    target.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
+    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 2
+    assert "bench:colour has no end or no meaning" in capsys.readouterr().err
+    (folder / suite.PEERS_FILE).unlink()
+    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 2
+    assert "endotsr bench all" in capsys.readouterr().err
+
+
+def test_pictures_are_drawn(results, tmp_path):
+    charts.stage_bars(results[suite.STAGES_FILE]["cases"], tmp_path / "bars.png")
+    charts.scaling_curves(results[suite.SCALING_FILE]["axes"], tmp_path / "curves.svg")
+    assert (tmp_path / "bars.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (tmp_path / "curves.svg").read_text()
+
+
+def test_grid_is_every_combination():
+    cases = grid(StagesOptions(gaussians=(10, 20), scenes=(Path("a.npz"),), threads=(1, 2)))
+    assert len(cases) == 3 * 2 * 2 and len(set(cases)) == 12
+    assert [c.scene for c in cases[-4:]] == ["a.npz"] * 4
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["everything"], "allowed: iteration, stages, scaling, peers, start, all, page"),
+        (["stages", "--gaussians", "3"], "--gaussians 3 is not allowed"),
+        (["scaling", "--largest", "10"], "--largest 10 is not allowed"),
+        (["start", "--repeats", "0"], "--repeats 0 is not allowed"),
+        (["stages", "--precisions", "float16"], "float16"),
+    ],
+)
+def test_refusals(words, said, capsys):
+    assert main(["bench", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_peers_without_torch_say_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(peers, "apart", lambda function: "ModuleNotFoundError: No module named 'torch'")
+    assert main(["bench", "peers"]) == 2
+    said = capsys.readouterr().err
+    assert "No module named 'torch'" in said and all(line in said for line in peers.PIP_LINES)
+
+
+def test_error_beyond_the_limit_is_said():
+    case = {"precision": "float64", "errors": {"colour": 1e-12, "position": 2e-9}}
+    assert peers.verdict(case) == "2.0e-09 (position), BEYOND 1e-09"
+    assert peers.relative_error(np.array([3.0, 4.5]), np.array([3.0, 4.0])) == pytest.approx(0.1)
+
+
+def test_trained_scene_fills_the_picture(tmp_path):
+    rng, file = np.random.default_rng(2), tmp_path / "scene.npz"
+    found = {name: rng.uniform(0.1, 0.9, (50, *rest)).astype(np.float32) for name, rest in trained.ARRAYS.items()}
+    found["xyz"] *= 30
+    np.savez(file, allow_pickle=False, **found)
+    scene = trained.trained_gaussians(file, PAPER)
+    column = 570 * scene.position[0] / trained.DEPTH
+    assert scene.position[2].mean() == pytest.approx(trained.DEPTH, abs=1)
+    assert 150 < np.abs(column).max() <= 400 and scene.position.dtype == np.float32
+    np.savez(file, allow_pickle=False, **(found | {"rgb": found["rgb"][:7]}))
+    with pytest.raises(InputError, match=r"rgb has shape \(7, 3\)"):
+        trained.trained_gaussians(file, PAPER)
+    with pytest.raises(InputError, match="not a trained scene"):
+        trained.trained_gaussians(tmp_path / "none.npz", PAPER)
