@@ -5,7 +5,7 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.equations.deformation import BASES, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import BASES, PIECE, deformation_forward, deformation_reverse
 from endotsr.fitting.adam import AdamState, adam_state, adam_step, adam_update, add_array
 from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
 from oracle.adam import adam_scalar
@@ -160,28 +160,28 @@ def test_bad_arguments_are_refused():
         adam_step(one, one.copy(), one.copy(), one.copy(), 0, 0.1, *BETAS)
 
 
-def _deformation(rng, dtype, count):
-    shape = (10, 3, count)
+def _deformation(rng, dtype, bases, count):
+    shape = (10, bases, count)
     values = (rng.normal(size=shape), rng.uniform(0, 1, shape), rng.uniform(0.02, 0.3, shape))
     return {name: v.astype(dtype) for name, v in zip(NAMES, values, strict=True)}
 
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dtype):
-    count = 1500  # more than one piece of a row
-    separate = _deformation(rng, dtype, count)
+@pytest.mark.parametrize(("bases", "count", "steps"), [(3, 7, 3), (1, PIECE + 6, 1)])
+def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dtype, bases, count, steps):
+    separate = _deformation(rng, dtype, bases, count)
     fused = {name: a.copy() for name, a in separate.items()}
     states = [adam_state(separate), adam_state(fused)]
     rates = dict.fromkeys(NAMES, 1.6e-3) | {"fdm_weight": ((slice(0, 3), 4e-3), (slice(3, 10), 1.6e-3))}
-    for k in range(3):
+    for k in range(steps):
         d_offsets = rng.normal(size=(10, count)).astype(dtype)
         _, saved = deformation_forward(*separate.values(), t=0.3 * k, basis=basis)
         grads = deformation_reverse(d_offsets, saved)
         adam_update(states[0], separate, dict(zip(NAMES, grads[:3], strict=True)), rates, *BETAS)
         _, saved = deformation_forward(*fused.values(), t=0.3 * k, basis=basis)
         deformation_adam_step(d_offsets, saved, states[1], rates, *BETAS)
-    assert states[0].step == states[1].step == dict.fromkeys(NAMES, 3)
+    assert states[0].step == states[1].step == dict.fromkeys(NAMES, steps)
     for name in NAMES:
         np.testing.assert_array_equal(separate[name], fused[name])
         np.testing.assert_array_equal(states[0].first[name], states[1].first[name])
@@ -189,7 +189,7 @@ def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dty
 
 
 def test_fused_step_refuses_arrays_that_disagree(rng):
-    parameters = _deformation(rng, np.float64, 4)
+    parameters = _deformation(rng, np.float64, 3, 4)
     out, saved = deformation_forward(*parameters.values(), t=0.5)
     state = adam_state(parameters)
     rates = dict.fromkeys(NAMES, 1e-3)
