@@ -15,6 +15,7 @@
 #
 # Correct on random input is not correct. Each section below is an input that a plausible program gets wrong, named after the
 # mistake, with what must come out. It ends with the question that matters most: could our gradient check have failed?
+# The full list, with a bound and a test for each, and the naive formulas executed in both precisions: {doc}`/hard_cases`.
 #
 # Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears once more, because its **form** is what saves the first case.
 

@@ -99,9 +99,9 @@ def test_colour_channels_do_not_mix(scene, how, order):
     np.testing.assert_array_equal(other["depth"], images["depth"])
 
 
-@given(scenes(tame=True, depths=st.floats(1.0, 9.0), dtype=np.float64), SEEDS)
+@given(scenes(tame=True, distinct=True, dtype=np.float64), SEEDS)
 def test_moving_scene_and_camera_together_moves_gradients_along(scene, seed):
-    """Images equal, gradients by position turned, all others equal."""
+    """Images equal, gradients by position turned, all others equal. Equal depths would part by rounding: distinct."""
     rng = np.random.default_rng(seed)
     turn, shift = Rotation.random(random_state=rng), rng.normal(0, 3, 3)
     matrix = turn.as_matrix()

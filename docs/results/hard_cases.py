@@ -1,0 +1,82 @@
+"""The gallery of hard cases: naive formula, truth and endotsr, in float64 and float32.
+
+python docs/results/hard_cases.py     rewrites hard_cases.json and the gallery in docs/hard_cases.md, in a few seconds
+
+Every naive formula is executed, on the same rounded inputs as ours; the truth is exact or has 60 digits (mpmath).
+"""
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gallery import CASES, DTYPES
+
+from endotsr.runs import machine, now, versions, write_json
+
+RECORD = Path(__file__).with_suffix(".json")
+PAGE = Path(__file__).parents[1] / "hard_cases.md"
+START, END = "<!-- gallery:start (made by docs/results/hard_cases.py) -->", "<!-- gallery:end -->"
+
+
+def error(value: float, truth: float) -> float:
+    """Relative, or absolute where the truth is 0."""
+    return abs(value - truth) / (abs(truth) or 1.0)
+
+
+def measure() -> list[dict[str, Any]]:
+    """All cases with the values and errors of both precisions."""
+    rows = []
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the naive formulas overflow and divide by zero: that is the point
+        for entry in CASES:
+            row: dict[str, Any] = {**entry._asdict(), "run": entry.run.__name__}
+            for label, dtype in DTYPES.items():
+                truth, naive, ours = (float(x) for x in entry.run(dtype))
+                row[label] = {"truth": truth, "naive": naive, "ours": ours}
+                row[label] |= {"naive_error": error(naive, truth), "ours_error": error(ours, truth)}
+            rows.append(row)
+    return rows
+
+
+def cell(value: float, miss: float) -> str:
+    """A value and its error."""
+    return f"{value:.7g} ({f'{miss:.0e}' if miss else 'exact'})" if math.isfinite(value) else f"**{value}**"
+
+
+def gallery(rows: list[dict[str, Any]], about: str) -> str:
+    """The gallery as Markdown."""
+    lines = []
+    for row in rows:
+        lines += [f"### {row['name']}: {row['title']}", "", row["why"], "", "| | float64 | float32 |", "|---|---|---|"]
+        lines.append("| right | " + " | ".join(f"{row[d]['truth']:.7g}" for d in DTYPES) + " |")
+        for label, key in ((row["naive"], "naive"), ("endotsr", "ours")):
+            lines.append(f"| {label} | " + " | ".join(cell(row[d][key], row[d][f"{key}_error"]) for d in DTYPES) + " |")
+        lines.append("")
+    return "\n".join([*lines, about])
+
+
+def plain(data: Any) -> Any:
+    """The same with words in place of numbers that JSON does not have."""
+    if isinstance(data, dict):
+        return {key: plain(value) for key, value in data.items()}
+    return str(data) if isinstance(data, float) and not math.isfinite(data) else data
+
+
+def main() -> None:
+    """The command."""
+    rows, computer, made = measure(), machine(), now()
+    libraries = {name: version for name, version in versions().items() if name in ("python", "numpy", "numba")}
+    about = (
+        f"Made by `python docs/results/hard_cases.py` on {made[:10]}, {computer['processor']} "
+        f"({computer['cores']} cores), {', '.join(f'{name} {v}' for name, v in libraries.items())}."
+    )
+    head, tail = PAGE.read_text(encoding="utf-8").split(START)[0], PAGE.read_text(encoding="utf-8").split(END)[1]
+    PAGE.write_text(f"{head}{START}\n\n{gallery(rows, about)}\n{END}{tail}", encoding="utf-8")
+    record = {"made": made, "machine": computer, "versions": libraries, "cases": [plain(row) for row in rows]}
+    write_json(RECORD, record)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""The gallery of docs/hard_cases.md: ours is right to its bound, the naive formula is not, the page is up to date."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RESULTS, PAGE = ROOT / "docs" / "results", ROOT / "docs" / "hard_cases.md"
+sys.path.insert(0, str(RESULTS))
+from gallery import CASES, DTYPES  # noqa: E402
+from hard_cases import END, START, gallery, measure, plain  # noqa: E402
+
+UNITS = {"float64": 2.0**-53, "float32": 2.0**-24}
+IDS = [case.run.__name__ for case in CASES]
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return {row["run"]: row for row in measure()}
+
+
+@pytest.mark.parametrize("case", CASES, ids=IDS)
+def test_ours_is_right_and_the_naive_formula_is_not(case, rows):
+    row = rows[case.run.__name__]
+    for dtype in DTYPES:
+        assert row[dtype]["ours_error"] <= case.bound * UNITS[dtype], dtype
+    lost, rounding = row["float32"]["naive_error"], UNITS["float32"]
+    assert not lost <= 10 * max(row["float32"]["ours_error"], rounding)  # NaN counts as lost
+
+
+def test_the_page_shows_what_the_command_computes(rows):
+    """Up to the last digits, which may differ between machines: titles, sentences, values that are not finite."""
+    number = re.compile(r"-?\d[\d.]*(?:e[+-]\d+)?(?: \((?:exact|\de[+-]\d+)\))?")
+    shape = lambda text: number.sub("#", text.partition("Made by")[0]).strip()
+    shown = PAGE.read_text(encoding="utf-8").partition(START)[2].partition(END)[0]
+    assert shape(shown) == shape(gallery(list(rows.values()), "Made by"))
+    stored = json.loads((RESULTS / "hard_cases.json").read_text(encoding="utf-8"))["cases"]
+    for old, new in zip(stored, rows.values(), strict=True):
+        for dtype in DTYPES:
+            truth, again = old[dtype]["truth"], plain(new)[dtype]["truth"]
+            assert truth == pytest.approx(again, rel=1e-6, abs=1e-12), old["title"]
+
+
+def test_every_case_of_the_gallery_is_in_the_catalogue():
+    catalogue = PAGE.read_text(encoding="utf-8")
+    for case in CASES:
+        assert f"\n| {case.name} |" in catalogue, case.name
