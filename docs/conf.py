@@ -20,6 +20,7 @@ source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
 # The types of the package's arrays say little; shapes and units stand in the docstrings.
 autodoc_typehints = "none"
+add_module_names = False
 
 # Every reference inside the project must resolve.
 nitpicky = True
@@ -27,11 +28,13 @@ nitpicky = True
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 
-# The notebooks (docs/notebooks -> ../notebooks) are pages. Running all of them at full size takes minutes, so pages
-# carry their pictures only when asked for: ENDOTSR_DOCS_EXECUTE=1 runs each notebook once and keeps the results.
+# The notebooks (docs/notebooks -> ../notebooks) are pages, and run when the book is built: at the small size of the
+# tests, or with ENDOTSR_NOTEBOOK_SIZE=full at the size of the text. ENDOTSR_DOCS_EXECUTE=0 leaves the pictures out.
+os.environ.setdefault("ENDOTSR_NOTEBOOK_SIZE", "small")
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
-nb_execution_mode = "cache" if os.environ.get("ENDOTSR_DOCS_EXECUTE") else "off"
+nb_execution_mode = "off" if os.environ.get("ENDOTSR_DOCS_EXECUTE") == "0" else "force"
 nb_execution_raise_on_error = True
+nb_execution_show_tb = True
 nb_execution_timeout = 1200
 
 # The label is the number: `eq-b5` is displayed as (B5), see _extensions/paper_equations.py.

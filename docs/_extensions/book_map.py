@@ -105,10 +105,10 @@ def golden_cases() -> dict[str, list[dict[str, Any]]]:
 
 
 def families_of(label: str) -> tuple[str, ...]:
+    """Families made for the equation; without one, the declared family that contains it."""
+    own = tuple(name for name, cases in golden_cases().items() if cases[0]["equation"].lower() == label)
     declared = UNDIFFERENTIATED[label].golden if label in UNDIFFERENTIATED else ""
-    if declared:
-        return (declared,) if declared in golden_cases() else ()
-    return tuple(name for name, cases in golden_cases().items() if cases[0]["equation"].lower() == label)
+    return own or ((declared,) if declared in golden_cases() else ())
 
 
 def reverse_of(forward: str) -> str:

@@ -17,10 +17,10 @@ from sphinx.util.docutils import SphinxDirective
 KEYS = ("Reverse", "Edges", "Raises", "Oracle", "Source", "Draws", "Its mask")
 NOTE = re.compile(rf"^({'|'.join(KEYS)}):\s*(.*)$")
 ROW = re.compile(r"^(\S.*?)\s{2,}(\S.*)$")
-SHAPE = re.compile(r"^(\(.*?\)(?: [a-z]+)?)\s{2,}(\S.*)$")
+SHAPE = re.compile(r"^(\([^()]*\)(?: bool)?)(?:\s{2,}(\S.*))?$")
 # `code`, or an equation number after the words that announce one, or a number of the base model standing alone
 INLINE = re.compile(
-    r"`(?P<code>[^`]+)`"
+    r"`(?P<code>[^`]+)`|(?P<bare>\b[a-z]+_\w+\b)"
     r"|(?:(?<=quation )|(?<=quations ))\((?P<paper>\d+[a-z]?)\)"
     r"|\((?P<alone>[BM]\d+)\)|(?P<base>\b[BM]\d+\b)"
 )
@@ -112,7 +112,7 @@ def table(entries: list[list[str]], env: BuildEnvironment) -> nodes.table:
     for first, *more in entries:
         name, rest = ROW.match(first).groups()  # type: ignore[union-attr]
         shape = SHAPE.match(rest)
-        text = shape.group(2) if shape else rest
+        text = (shape.group(2) or "") if shape else rest
         rows.append((name, shape.group(1) if shape else "", " ".join([text, *(line.strip() for line in more)])))
     columns = (0, 1, 2) if any(row[1] for row in rows) else (0, 2)
     group = nodes.tgroup(
@@ -149,7 +149,12 @@ def inline(text: str, env: BuildEnvironment) -> list[nodes.Node]:
         found.append(nodes.Text(text[end : match.start()]))
         end = match.end()
         number = match["paper"] or match["alone"] or match["base"]
-        found.append(equation(number, match[0], env) if number else code(match["code"], env))
+        if number:
+            found.append(equation(number, match[0], env))
+        elif match["code"] or match["bare"] in linkable():
+            found.append(code(match["code"] or match["bare"], env))
+        else:
+            found.append(nodes.Text(match["bare"]))
     return [*found, nodes.Text(text[end:])]
 
 
