@@ -36,7 +36,8 @@ from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
 
 FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "hard", "properties", "checking/test_ranges.py")
-FIRST = 6.0  # s of checks of one suite; a mutant that survives everything is put to the rest as well
+FIRST = 2.0  # s of checks of one suite
+LATER = 30.0  # s of further checks for a mutant that no suite has noticed by then
 
 
 def recorded_pairs(keep: Path | None) -> dict[str, Any]:
@@ -128,7 +129,11 @@ def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
                     killed[suite] = check.name
                     break
         if not any(killed.values()):
+            spent = 0.0
             for suite, check in later:
+                spent += check.seconds
+                if spent > LATER:
+                    break
                 if run(check, 2 + 10 * check.seconds, facts):
                     killed[suite] = check.name
                     break
@@ -169,8 +174,16 @@ class Plugin:
                 self.say(f"survivor: {mutant.name}")
             if len(outcomes) % 200 == 0:
                 self.say(f"{len(outcomes)} of {len(chosen)}")
-        self.result = self.report(chosen, outcomes, checks)
+        alarms = self.false_alarms(outcomes, checks)
+        outcomes = {name: _without(outcome, alarms) for name, outcome in outcomes.items()}
+        self.result = self.report(chosen, outcomes, checks) | {"false_alarms": sorted(alarms)}
         return True
+
+    def false_alarms(self, outcomes: dict[str, Outcome], checks: Checks) -> set[str]:
+        """Checks that noticed something, and also fail with the right kernels."""
+        used = {name for outcome in outcomes.values() for name in outcome.killed.values() if name}
+        work = [(Mutant("", "", c.name, kernels.__code__), partial(_alone, c)) for c in checks.all if c.name in used]
+        return {m.name for m, outcome in in_processes(work, self.options.jobs) if any(outcome.killed.values())}
 
     def report(self, chosen: list[Mutant], outcomes: dict[str, Outcome], checks: Checks) -> dict[str, Any]:
         """What is written: checks by number, so that the file stays small."""
@@ -197,6 +210,15 @@ class Plugin:
         }  # fmt: skip
 
 
+def _alone(check: Check) -> Outcome:
+    """The check with the right kernels."""
+    return Outcome({check.suite: run(check, 2 + 10 * check.seconds, {})}, None)
+
+
+def _without(outcome: Outcome, alarms: set[str]) -> Outcome:
+    return outcome._replace(killed={s: "" if name in alarms else name for s, name in outcome.killed.items()})
+
+
 def written(result: dict[str, Any]) -> str:
     """JSON with one line a mutant."""
     head = {key: value for key, value in result.items() if key != "kernels"}
@@ -215,10 +237,11 @@ def main(words: list[str]) -> int:
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder that keeps what was measured with the right kernels")
+    parser.add_argument("--tests", nargs="+", default=FOLDERS, help="folders and files of tests")
     parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
     options = parser.parse_args(words)
     plugin = Plugin(options)
-    folders = [str(ROOT / "tests" / name) for name in FOLDERS if (ROOT / "tests" / name).exists()]
+    folders = [str(ROOT / "tests" / name) for name in options.tests if (ROOT / "tests" / name).exists()]
     quiet = ["-q", "-s", "-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings", "-p", "no:xdist"]
     pytest.main([f"--rootdir={ROOT}", *quiet, *folders], plugins=[plugin])
     if not plugin.result:

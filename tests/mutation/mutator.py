@@ -3,7 +3,7 @@
 A mutant is put in place by exchanging the code object of the function, so every name under which the function is
 known runs the wrong code. This needs the functions uncompiled (NUMBA_DISABLE_JIT=1).
 
-Left alone: docstrings, annotations, messages, and checks of arguments that only raise.
+Left alone: docstrings, annotations, messages, checks of arguments that only raise, and whether an array is copied.
 """
 
 import ast
@@ -157,7 +157,7 @@ def _walk(statement: ast.stmt, node: ast.AST, place: Place) -> Iterator[tuple[as
         statement = node
         if _only_checks(node):
             return
-    if isinstance(node, ast.JoinedStr):
+    if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.keyword) and node.arg == "copy"):
         return
     yield statement, place, node
     for field, value in ast.iter_fields(node):
