@@ -134,5 +134,5 @@ def has_derivation(notebook: str) -> bool:
     return "\n## The reverse pass" in markdown_of(NOTEBOOKS / f"{notebook}.py")
 
 
-def test_names(file: str) -> list[str]:
+def names_of_tests(file: str) -> list[str]:
     return re.findall(r"^def (test_\w+)", Path(ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)

@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from book_map import Equation, equations, golden_cases, has_derivation, test_names
+from book_map import Equation, equations, golden_cases, has_derivation, names_of_tests
 from package_names import PACKAGE, ROOT
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -117,7 +117,7 @@ def _tests(row: Equation) -> Iterator[str]:
     assert row.without
     yield from (f"(check-{row.label})=", f"### {row.without.tests}", "")
     yield f"No gradient: {row.without.reason}. The tests of `{row.without.tests}`:"
-    yield from ("", "```text", *test_names(row.without.tests), "```", "")
+    yield from ("", "```text", *names_of_tests(row.without.tests), "```", "")
 
 
 def _report(name: str, function: str, report: PairReport) -> Iterator[str]:

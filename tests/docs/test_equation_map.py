@@ -1,0 +1,72 @@
+"""The map of the equations: no empty cell, and everything that it points to exists."""
+
+from importlib import import_module
+
+import pytest
+from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_derivation, names_of_tests
+from package_names import NOTEBOOKS, ROOT, definitions, equation_pages, linkable
+
+from endotsr.checking import all_pairs
+
+PAPER = ["1", "1b", *"234567"]
+ROWS = {row.label: row for row in equations()}
+
+
+def test_every_label_of_the_specification_has_a_row():
+    assert set(ROWS) | {"b5b", "b5c"} == set(equation_pages())
+    assert list(ROWS)[: len(PAPER)] == PAPER
+
+
+@pytest.mark.parametrize("row", ROWS.values(), ids=lambda row: row.label)
+def test_no_cell_is_empty(row: Equation):
+    """An equation that has nothing to differentiate, store or show says why."""
+    assert row.functions, "no function"
+    if row.without is None:
+        assert row.pairs, "no gradient check"
+        assert row.reverses, "no reverse pass"
+    else:
+        assert not row.pairs, "has a pair: take it out of UNDIFFERENTIATED"
+        assert row.without.reason and names_of_tests(row.without.tests), "neither check nor tests"
+    assert row.golden or (row.without and row.without.golden.startswith("none: ")), "no golden case"
+    assert row.notebooks or (row.without and row.without.notebook.startswith("none: ")), "no notebook"
+
+
+@pytest.mark.parametrize("label", PAPER)
+def test_the_paper_has_all_of_it(label):
+    """The seven equations: code, golden case, notebook with a derivation; no reason counts instead."""
+    row = ROWS[label]
+    assert row.functions and row.golden and row.notebooks
+    assert any(has_derivation(name) for name in row.notebooks)
+
+
+@pytest.mark.parametrize("row", ROWS.values(), ids=lambda row: row.label)
+def test_everything_named_exists(row: Equation):
+    for dotted in (*row.functions, *row.reverses):
+        assert dotted in definitions(), f"{dotted} is not defined"
+        module, _, name = dotted.rpartition(".")
+        assert callable(getattr(import_module(module), name))
+    assert all(name in golden_cases() for name in row.golden)
+    assert all((NOTEBOOKS / f"{name}.py").is_file() for name in row.notebooks)
+    if row.without:
+        assert (ROOT / row.without.tests).is_file()
+
+
+def test_every_pair_stands_in_the_map():
+    assert {pair.name for row in ROWS.values() for pair in row.pairs} == set(all_pairs())
+
+
+def test_every_reason_belongs_to_an_equation():
+    assert set(UNDIFFERENTIATED) <= set(ROWS)
+
+
+def test_a_golden_case_of_an_equation_stands_in_the_map():
+    shown = {name for row in ROWS.values() for name in row.golden}
+    labels = set(ROWS)
+    missing = {name for name, cases in golden_cases().items() if cases[0]["equation"].lower() in labels} - shown
+    assert not missing, f"golden families that the map leaves out: {sorted(missing)}"
+
+
+def test_short_names_are_linked_only_where_they_are_unique():
+    assert linkable()["matern_weights"] == "endotsr.equations.matern.matern_weights"
+    short = [dotted.rpartition(".")[2] for dotted in definitions()]
+    assert all(name not in linkable() for name in short if short.count(name) > 1)
