@@ -4,11 +4,13 @@ Colours are those of Okabe and Ito, which people with any common colour blindnes
 """
 
 import io
+import math
 from pathlib import Path
 from typing import Any
 
 from endotsr.evaluation.curves import UNSIGNED
 from endotsr.runs import replace_file
+from endotsr.tradeoff.labels import Label, place_labels
 from endotsr.tradeoff.measure import LEVELS
 from endotsr.tradeoff.study import cost_of
 
@@ -19,21 +21,25 @@ FLOOR = 1e-10  # of the error axis, in 1/255: the exact path, with error 0, stan
 
 def main_figure(result: dict[str, Any]) -> Any:
     """Every setting of the joint sweep, the front and the presets: error against time, and against visits."""
-    figure = empty_figure(11.0, 4.9)
+    figure = empty_figure(11.0, 5.0)
     left, right = figure.subplots(1, 2, sharey=True)
+    labels = []
     for axes, cost in ((left, "forward"), (right, "visits")):
-        _sweep(axes, result, cost)
+        labels += _sweep(axes, result, cost)
         _levels(axes, result)
         plain_axes(axes, _cost_name(cost))
-        axes.set_ylim(FLOOR / 3, 300)
-        axes.set_xlim(axes.get_xlim()[0] / 6, None)
+        axes.set_ylim(FLOOR / 10, 1000)
+        low, high = axes.get_xlim()
+        axes.set_xlim(low / 4, high * 2)
     left.set_ylabel("largest error of the image, 1/255", color=INK)
     left.set_title("What a frame costs in time", loc="left", color=INK, fontsize=11)
     right.set_title("and in work that no machine changes", loc="left", color=INK, fontsize=11)
+    place_labels(figure, labels)
     return figure
 
 
-def _sweep(axes: Any, result: dict[str, Any], cost: str) -> None:
+def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
+    """Draws the points; returns what has to be written beside them, presets first."""
     by_name = {p["name"]: p for p in result["points"]}
     factor = _factor(cost)
 
@@ -44,41 +50,25 @@ def _sweep(axes: Any, result: dict[str, Any], cost: str) -> None:
         chosen = [at(n) for n in result["joint"] if by_name[n]["setting"]["precision"] == precision]
         if chosen:
             axes.scatter(*zip(*chosen, strict=True), s=16, marker=marker, color=PALE, linewidths=0, zorder=2)
-    front = [at(n) for n in result["fronts"][cost] if n not in result["presets"].values()]
-    if front:
-        axes.plot(*zip(*front, strict=True), color=BLUE, linewidth=1.8, marker="o", markersize=4, zorder=3)
-    for name, point in _spaced([n for n in result["fronts"][cost] if n in result["joint"]], at):
-        axes.annotate(
-            _short(by_name[name]), point, xytext=(-7, -3), textcoords="offset points", ha="right", va="top",
-            fontsize=7.5, color=BLUE,
-        )  # fmt: skip
+    swept = [n for n in result["fronts"][cost] if n in result["joint"]]
+    if swept:
+        axes.plot(*zip(*map(at, swept), strict=True), color=BLUE, linewidth=1.8, marker="o", markersize=4, zorder=3)
+    labels = []
     for preset, name in result["presets"].items():
-        x, y = at(name)
-        axes.plot(x, y, marker="D", color=ORANGE, markersize=7, zorder=4)
-        low = preset == "exact"
-        axes.annotate(
-            f"{preset} (error 0 by definition)" if low else preset, (x, y), xytext=(-9, 0) if low else (8, 5),
-            textcoords="offset points", ha="right" if low else "left", va="center" if low else "bottom",
-            fontsize=9, color=ORANGE, weight="bold",
-        )  # fmt: skip
+        axes.plot(*at(name), marker="D", color=ORANGE, markersize=7, zorder=4)
+        text = f"{preset} (error 0 by definition)" if by_name[name]["error"]["max"] == 0 else preset
+        labels.append(Label(axes, text, *at(name), ORANGE, 9, "bold"))
+    return labels + [Label(axes, _short(by_name[name], cost), *at(name), BLUE) for name in swept]
 
 
-def _spaced(names: list[str], at: Any, gap: float = 8.0) -> list[tuple[str, tuple[float, float]]]:
-    """Points whose errors lie a factor `gap` apart, so that their labels do not touch."""
-    found: list[tuple[str, tuple[float, float]]] = []
-    for name in names:
-        point = at(name)
-        if not found or found[-1][1][1] / point[1] > gap:
-            found.append((name, point))
-    return found
-
-
-def _short(point: dict[str, Any]) -> str:
+def _short(point: dict[str, Any], cost: str) -> str:
+    """Precision (it costs no visit), cutoff, and what else is coarse."""
     raster, scale = point["setting"]["raster"], point["setting"]["scale"]
-    cut = raster["alpha_cutoff"]
-    name = f"1/{round(1 / cut)}" if cut > 5e-4 else f"{cut:.0e}".replace("e-0", "e-").replace("e-", "e−")
-    half = ", half size" if scale != 1 else ""
-    return f"{point['setting']['precision']}, cutoff {name}{half}"
+    cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
+    words = [] if cost == "visits" else [point["setting"]["precision"]]
+    words.append(f"cutoff 1/{round(1 / cut)}" if cut > 5e-4 else f"cutoff {cut:.0e}".replace("e-0", "e-"))
+    words += [f"stop {stop:.0e}".replace("e-0", "e-")] if stop >= 1e-3 else []
+    return ", ".join(words + (["half size"] if scale != 1 else []))
 
 
 def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
@@ -91,47 +81,52 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
     columns = 4
     rows = -(-len(dials) // columns)
     figure = empty_figure(3.1 * columns, 2.75 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=cost != "visits", sharey=True).ravel()
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
     by_name = {p["name"]: p for p in result["points"]}
+    labels = []
     for axes, dial in zip(panels, dials, strict=False):
-        _dial(axes, dial, by_name, cost, error)
+        labels += _dial(axes, dial, by_name, cost, error)
         if error == "max":
             _levels(axes, result, named=False)
         counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else _cost_name(cost)
         plain_axes(axes, counted, small=True)
+        _room(axes)
         axes.set_title(dial["title"], loc="left", fontsize=9.5, color=INK)
-        axes.tick_params(labelbottom=True)
     for axes in panels[len(dials) :]:
         axes.set_axis_off()
     name = "largest error, 1/255" if error == "max" else "worst gradient block, relative"
     figure.supylabel(name, fontsize=10, color=INK)
+    place_labels(figure, labels)
     return figure
 
 
-def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, error: str) -> None:
+def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, error: str) -> list[Label]:
+    """Draws one curve; returns the values to write beside its points."""
     factor = _factor(cost)
-    xs, ys = [], []
-    for name in dial["points"].values():
-        point = by_name[name]
-        terms = cost == "visits" and dial["cost"] == "terms"
-        xs.append(max(point["terms"], 1) if terms else cost_of(point, cost) * factor)
-        ys.append(_height(point, error))
-    spreads = [by_name[n][cost] for n in dial["points"].values()] if cost != "visits" else []
-    if spreads:
-        bars = [
-            [(s["median"] - s["low"]) * factor for s in spreads],
-            [(s["high"] - s["median"]) * factor for s in spreads],
-        ]
-        axes.errorbar(xs, ys, xerr=bars, fmt="none", ecolor=PALE, elinewidth=2.2, zorder=1)
+    points = [by_name[name] for name in dial["points"].values()]
+    terms = cost == "visits" and dial["cost"] == "terms"
+    xs = [max(p["terms"], 1) if terms else cost_of(p, cost) * factor for p in points]
+    ys = [_height(p, error) for p in points]
+    if cost != "visits":
+        spreads = [p[cost] for p in points]
+        below = [(s["median"] - s["low"]) * factor for s in spreads]
+        above = [(s["high"] - s["median"]) * factor for s in spreads]
+        axes.errorbar(xs, ys, xerr=[below, above], fmt="none", ecolor=PALE, elinewidth=2.2, zorder=1)
     axes.plot(xs, ys, color=GREEN if dial["lossless"] else BLUE, marker="o", markersize=4, linewidth=1.2, zorder=3)
-    for position, (label, x, y) in enumerate(zip(dial["points"], xs, ys, strict=True)):
-        right = position % 2 == 0
-        axes.annotate(
-            label, (x, y), xytext=(5 if right else -5, 4 if right else -4), textcoords="offset points", fontsize=7.5,
-            ha="left" if right else "right", va="bottom" if right else "top", color=INK,
-        )  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    return [Label(axes, label, x, y, INK) for label, x, y in zip(dial["points"], xs, ys, strict=True)]
+
+
+def _room(axes: Any) -> None:
+    """At least two decades of cost around the points, so that curves can be compared and labels find a place."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    low, high = axes.get_xlim()
+    middle, reach = math.sqrt(low * high), max(10.0, math.sqrt(high / low) * 3)
+    axes.set_xlim(middle / reach, middle * reach)
+    axes.set_ylim(FLOOR, 1000)
+    axes.xaxis.set_major_locator(LogLocator())
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.tick_params(labelleft=True)
 
 
 def _height(point: dict[str, Any], error: str = "max") -> float:

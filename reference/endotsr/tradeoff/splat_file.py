@@ -22,6 +22,7 @@ FloatArray = NDArray[np.floating]
 
 SIDE = 320  # pixels of the picture
 FOCAL = 1.2  # image widths
+MARGIN = 1.1  # of the picture around the Gaussians
 OPACITY_STEP = 1 / 255  # of 8-bit files: an opacity of 0 or 1 means half a step from it
 PLY_TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1", "uint8": "u1",
              "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2", "uint16": "<u2",
@@ -33,11 +34,12 @@ def splat_scene(path: Path, side: int = SIDE) -> StudyScene:
     path = Path(path)
     gaussians = read_splats(path)
     camera = facing_camera(gaussians.position, side)
+    distance = float(camera.translation[2] + np.median(gaussians.position[2]))
     return StudyScene(
         path.stem.removesuffix("_splats"),
         f"{path.name}, {gaussians.count} trained Gaussians seen from the front",
         gaussians, None, ModelConfig(appearance=False, spectral_motion=False, deformation=False), 0.0, camera,
-        near=0.01 * float(camera.translation[2]), noise=None,
+        near=0.01 * distance, noise=None,
     )  # fmt: skip
 
 
@@ -107,10 +109,9 @@ def _ply_vertices(path: Path) -> NDArray[np.void]:
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:
-    """Looks along +z at the median of the positions, from where nine tenths of them fill the picture."""
-    centre = np.median(position, axis=1).astype(np.float64)
-    reach = np.quantile(np.linalg.norm(position[:2] - centre[:2, None], axis=0), 0.9)
-    depth = np.quantile(np.abs(position[2] - centre[2]), 0.9)
-    distance = 2 * FOCAL * max(float(reach), 1e-6) + float(depth)
-    translation = -centre + np.array([0, 0, distance])
+    """Looks along +z at the middle of the positions, from where all but a few per cent of them are in the picture."""
+    low, high = np.quantile(position.astype(np.float64), [0.02, 0.98], axis=1)
+    reach = max(float((high - low)[:2].max()) / 2, 1e-6)
+    distance = MARGIN * 2 * FOCAL * reach + float(high[2] - low[2]) / 2
+    translation = -(low + high) / 2 + np.array([0, 0, distance])
     return Camera(np.eye(3), translation, FOCAL * side, FOCAL * side, side / 2, side / 2, side, side)
