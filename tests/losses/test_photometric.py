@@ -54,6 +54,12 @@ def test_hard_L5_no_tissue_is_zero():
     assert not masked_l1_reverse(1.0, saved).any()
 
 
+def test_one_value_is_an_image():
+    loss, saved = masked_l1_forward(np.full((1, 1, 1), 0.75), np.full((1, 1, 1), 0.25), np.ones((1, 1), bool))
+    assert loss == 0.5
+    assert masked_l1_reverse(3.0, saved) == 3.0
+
+
 def test_nan_on_tissue_is_not_hidden():
     rendered, observed = images()
     rendered[0, 0, 0] = np.nan
