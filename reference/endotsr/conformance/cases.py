@@ -6,8 +6,14 @@ from typing import Any, NamedTuple
 from endotsr.conformance.generator import Made, uniform
 from endotsr.conformance.operation import Operation
 
-OPERATION_MODULES = ("operations_equations", "operations_losses", "operations_splatting", "operations_scene")
-CASE_MODULES = ("cases_equations", "cases_losses", "cases_splatting", "cases_scene")
+OPERATION_MODULES = (
+    "operations_equations",
+    "operations_losses",
+    "operations_splatting",
+    "operations_fitting",
+    "operations_scene",
+)
+CASE_MODULES = ("cases_equations", "cases_losses", "cases_splatting", "cases_fitting", "cases_scene")
 
 
 class Spec(NamedTuple):
@@ -24,6 +30,7 @@ class Spec(NamedTuple):
     without: tuple[str, ...] = ()  # outputs that this case does not ask for
     band: int = 0  # flip budget of the images, for a case that stands on the cutoff
     own: tuple[str, ...] = ()  # outputs for which the oracle has no answer here: the truth is the reference
+    either: tuple[dict[str, Any], ...] = ()  # settings with which the reference gives the other legal answers
 
     @property
     def name(self) -> str:

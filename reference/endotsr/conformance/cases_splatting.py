@@ -1,5 +1,6 @@
 """Golden cases of the rasteriser: covariance, projection, harmonics, compositing, the whole render."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -208,7 +209,23 @@ def _composite() -> list[Spec]:
     out.append(Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha at 1/255: each may be drawn or not",
                     ("cutoff_missing",), paper, inputs, ("opacity_logit", "mean2d", "covariance2d"),
                     reverse, 5))  # fmt: skip
-    return out
+    return [*out, _one_on_the_cutoff(paper)]
+
+
+def _one_on_the_cutoff(settings: dict[str, Any]) -> Spec:
+    """One decision that rounding may take either way, and with it the whole answer, gradients included."""
+    inputs = _screen(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0)
+    inputs["mean2d"] = changed(inputs["mean2d"], (slice(None), 1), [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")
+    inputs["covariance2d"] = changed(
+        inputs["covariance2d"], (slice(None), 1), [1.5, 0.25, 2.0], "[:, 1] is 1.5, 0.25, 2"
+    )
+    inputs["opacity_logit"] = changed(
+        inputs["opacity_logit"], 1, -math.log(254.0), "[1] is -log 254, rounded: opacity 1/255 - 7e-10"
+    )
+    drawn = settings | {"raster": settings["raster"] | {"alpha_cutoff": (1 - 1e-5) / 255}}
+    title = "One peak of alpha at 1/255: drawn or not, but the same in image and gradient"
+    return Spec("composite", "one_on_the_cutoff", "composite", title, ("cutoff_decided_twice",), settings, inputs,
+                ("opacity_logit", "mean2d", "covariance2d"), either=(drawn,))  # fmt: skip
 
 
 def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made], small: float = -1.2) -> dict[str, Made]:

@@ -1,11 +1,12 @@
 """Distances between arrays in units of a scale, and whether a rule allows them. Used by generator and judge alike."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.conformance.format import Rule
+from endotsr.conformance.format import LEVELS, Rule
 from endotsr.conformance.generator import signs
 
 COLUMN_FLOOR = 1e-3  # of the largest magnitude: the least scale of a slice under "last"
@@ -78,6 +79,14 @@ def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdi
         return _refusal(f"{beyond} entries beyond {tolerance:.0e}, {rule.flips} may flip by {rule.flip_size:.0e}",
                         got, expected, worst, found)  # fmt: skip
     return _refusal(f"{found:.1e} > {tolerance:.0e} of scale, {beyond} entries", got, expected, worst, found)
+
+
+def misses(verdicts: Iterable[tuple[int, bool]]) -> tuple[int, ...]:
+    """Outputs that did not pass, counted by level, from (level, passed): the least is the answer that a port meant."""
+    counts = [0] * len(LEVELS)
+    for level, passed in verdicts:
+        counts[level] += not passed
+    return tuple(counts)
 
 
 def _refusal(reason: str, got: NDArray, expected: NDArray, worst, distance: float | None) -> Verdict:

@@ -30,9 +30,10 @@ class Rule(_Strict, frozen=True, kw_only=True):
     relative   |got - expected| <= tolerance x scale, every entry
     band       relative, but up to `flips` entries may be off by up to `flip_size` x scale
     identical  relative, and bitwise equal to the output named in `to`
+    either-of  relative, to `file` or to one of `others`; the same one for all outputs of the case
     """
 
-    kind: Literal["exact", "relative", "band", "identical"]
+    kind: Literal["exact", "relative", "band", "identical", "either-of"]
     scale: Literal["", "max", "last"] = ""
     """max: largest magnitude of the array; last: of each column [..., n], at least 1/1000 of max (one axis: max)"""
     float64: float = 0.0
@@ -40,6 +41,8 @@ class Rule(_Strict, frozen=True, kw_only=True):
     flips: int = 0
     flip_size: float = 0.0
     to: str = ""
+    others: tuple[str, ...] = ()
+    """either-of: files of the other legal answers, in the same order for every output of the case"""
 
 
 class Because(_Strict, frozen=True, kw_only=True):
@@ -83,6 +86,10 @@ class Output(_Strict, frozen=True, kw_only=True):
     because: Because | None
     truth: Truth
 
+    def answer(self, number: int) -> str:
+        """File of a legal answer of the case; 0 = `file`, which is also that of outputs with one answer only."""
+        return self.compare.others[number - 1] if number and self.compare.others else self.file
+
 
 class Mistake(_Strict, frozen=True, kw_only=True):
     """What a known mistake does to the output that shows it best."""
@@ -115,6 +122,11 @@ class Case(_Strict, frozen=True, kw_only=True):
     def name(self) -> str:
         """family/case"""
         return f"{self.family}/{self.case}"
+
+    @property
+    def answers(self) -> int:
+        """Number of legal answers to the whole case."""
+        return 1 + max(len(output.compare.others) for output in self.outputs.values())
 
 
 class FileEntry(_Strict, frozen=True, kw_only=True):

@@ -56,8 +56,8 @@ def moved(folder: Path, one: Solved) -> list[str]:
     """Which expected values of a case differ from the folder's, and by how much."""
     root = folder / "cases" / one.case.family / one.case.case
     lines = []
-    for name, value in one.expected.items():
-        old = plain_or_none(root / "expected" / f"{name}.npy")
+    for name, file, value in one.files():
+        old = plain_or_none(root / file)
         if old is None or old.shape != value.shape:
             lines.append(f"{one.case.name}/{name}: new")
         elif old.tobytes() != value.tobytes():

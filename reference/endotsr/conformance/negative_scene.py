@@ -17,7 +17,9 @@ def _loss(**changes: Any) -> dict[str, Wrong]:
 
 
 def _config(**changes: Any) -> dict[str, Wrong]:
-    return {"training": setting(**{f"config__{key}": value for key, value in changes.items()})}
+    """In training, and in the schedules alone."""
+    wrong = setting(**{f"config__{key}": value for key, value in changes.items()})
+    return {"training": wrong, "schedule": wrong}
 
 
 def _offsets(request: Request) -> NDArray:
@@ -134,7 +136,7 @@ NEGATIVES = [
     Negative("calibration_of_half_ratio", "Calibration with another ratio", "r / 2; right: r",
              _config(loss__gradient_ratio=lambda r: r / 2)),
     Negative("densify_threshold_in_pixels", "Screen gradient in pixels", "per px; right: times half the image size",
-             _config(density__gradient_threshold=lambda v: v * 12.0)),
+             _config(density__gradient_threshold=lambda v: v * 12.0) | {"density": setting(width=2, height=2)}),
     Negative("statistics_over_test_frames_in_training", "Training statistics over test frames too",
              "all stamps; right: training stamps", {"objective": swapped(
                  lambda i: {"train_index": np.arange(i["times"].size)})}),

@@ -152,6 +152,15 @@ def _half_off_diagonal(request: Request) -> dict[str, NDArray]:
     return {"d_covariance2d": d}
 
 
+def _two_minds(request: Request) -> dict[str, NDArray]:
+    """What stands on the cutoff is in the image, but gets no gradient."""
+    image, gradient = (_raster(("composite",), alpha_cutoff=lambda v, s=s: v * s)["composite"](request)
+                       for s in (1 - 1e-5, 1 + 1e-5))  # fmt: skip
+    if image is None or gradient is None:
+        return {}
+    return {**image, **{name: a for name, a in gradient.items() if name.startswith("d_")}}
+
+
 def _stop_after(request: Request) -> dict[str, NDArray]:
     """The Gaussian that brings T below the limit is still blended: flat images only."""
     if request.inputs["covariance2d"].min(axis=1)[0] < 1e5:
@@ -303,6 +312,8 @@ NEGATIVES = [
              _raster(("composite", "render", "objective"), alpha_cutoff=lambda v: 1e-9 if v > 0 else v)),
     Negative("cutoff_1_over_256", "Alpha cutoff of 1/256", "1/256; right: 1/255",
              _raster(("composite",), alpha_cutoff=lambda v: 1 / 256 if v > 0 else v)),
+    Negative("cutoff_decided_twice", "Cutoff decided anew in the reverse pass", "in the image, but without gradient; "
+             "right: one decision", {"composite": _two_minds}),
     Negative("cutoff_added", "Alpha cutoff in preset exact", "1/255; right: none",
              _raster(("composite", "render", "objective"), alpha_cutoff=lambda v: v if v > 0 else 1 / 255)),
     Negative("alpha_clamp_999", "Alpha clamped at 0.999", "0.999; right: 0.99",

@@ -30,7 +30,7 @@ class Operation(NamedTuple):
     text: str
     compute: Compute
     asked: Mapping[str, Asked]
-    pairs: tuple[str, ...] = ()
+    pairs: Callable[[Settings], tuple[str, ...]] = lambda settings: ()  # registered pairs that a case exercises
 
 
 def real_of(inputs: Inputs) -> np.dtype:

@@ -79,12 +79,14 @@ def _atoms(inputs: Inputs, settings: Settings) -> dict[str, NDArray]:
 def _appearance(inputs: Inputs, settings: Settings) -> dict[str, NDArray]:
     residual, saved = appearance_forward(inputs["colour_coefficients"], inputs["phi_bar"], settings["beta"])
     grads = appearance_reverse(inputs["d_residual"], saved)
+    assert grads.phi_bar is not None
     return {"residual": residual, "d_colour_coefficients": grads.colour_coefficients, "d_phi_bar": grads.phi_bar}
 
 
 def _motion(inputs: Inputs, settings: Settings) -> dict[str, NDArray]:
     translation, saved = motion_forward(inputs["motion_coefficients"], inputs["phi"])
     grads = motion_reverse(inputs["d_translation"], saved)
+    assert grads.phi is not None
     return {"translation": translation, "d_motion_coefficients": grads.motion_coefficients, "d_phi": grads.phi}
 
 
@@ -168,26 +170,26 @@ OPERATIONS = [
     Operation("dictionary", "1", "atoms at one time and the way back", _dictionary, {
         "phi": Asked(1, oracle="fourier_oracle.dictionary"), "d_t": Asked(2, "loss"),
         "d_omega": Asked(2, "loss per cycle"),
-    }, ("dictionary",)),
+    }, lambda s: ("dictionary",)),
     Operation("atoms", "1b", "statistics over the training stamps and normalised atoms", _atoms, {
         "mean": Asked(1), "rms": Asked(1), "dead": Asked(1, scale="exact"),
         "phi_bar": Asked(1, oracle="fourier_oracle.normalised"), "d_phi": Asked(2, "loss"),
-    }, ("normalise",)),
+    }, lambda s: ("normalise",)),
     Operation("appearance", "2", "bounded colour residual", _appearance, {
         "residual": Asked(1, "display / Y00", oracle="residuals_oracle.colour_residual"),
         "d_colour_coefficients": Asked(2, "loss", "last", "residuals_oracle.colour_gradients"),
         "d_phi_bar": Asked(2, "loss", oracle="residuals_oracle.colour_gradients"),
-    }, ("appearance",)),
+    }, lambda s: ("appearance",)),
     Operation("motion", "3", "translation residual", _motion, {
         "translation": Asked(1, "scene unit", oracle="residuals_oracle.linear"),
         "d_motion_coefficients": Asked(2, "loss per scene unit", "last", "residuals_oracle.linear_gradients"),
         "d_phi": Asked(2, "loss", oracle="residuals_oracle.linear_gradients"),
-    }, ("motion",)),
+    }, lambda s: ("motion",)),
     Operation("matern", "4", "Matern weights and penalty", _matern, {
         "rho": Asked(1, oracle="matern_oracle.weights"),
         "penalty": Asked(1, "scene unit^2", oracle="matern_oracle.penalty"),
         "d_motion_coefficients": Asked(2, "loss per scene unit", oracle="matern_oracle.penalty_gradient"),
-    }, ("matern_penalty",)),
+    }, lambda s: ("matern_penalty",)),
     Operation("laplacian", "5", "pyramid of the observed image, valid pixels, loss", _laplacian, {
         "band_1": Asked(1, "display", oracle="laplacian_oracle.pyramid"),
         "band_2": Asked(1, "display", oracle="laplacian_oracle.pyramid"),
@@ -197,7 +199,7 @@ OPERATIONS = [
         "valid_3": Asked(1, scale="exact", oracle="laplacian_oracle.masks_by_impulse_response"),
         "loss": Asked(1, "display", oracle="laplacian_oracle.loss"),
         "d_rendered": Asked(2, "loss per display unit", oracle="laplacian_oracle.loss_gradient"),
-    }, ("laplacian_loss_co_sited", "laplacian_loss_half_pixel")),
+    }, lambda s: (f"laplacian_loss_{s['upsampling']}",)),
     Operation("calibration", "7", "detail weight from gradient images", _calibration, {
         "g_rgb": Asked(1, "loss per display unit"), "g_lap": Asked(1, "loss per display unit"),
         "lambda_lap": Asked(1, oracle="calibration_oracle.view_median_weight"), "refused": Asked(1, scale="exact"),
@@ -208,7 +210,7 @@ OPERATIONS = [
         "d_fdm_centre": Asked(2, "loss", "last", "deformation.derivative"),
         "d_fdm_width": Asked(2, "loss", "last", "deformation.derivative"),
         "d_t": Asked(2, "loss", oracle="deformation.derivative_by_time"),
-    }, ("deformation_quartic", "deformation_gaussian")),
+    }, lambda s: (f"deformation_{s['basis']}",)),
     Operation("adam", "B10", "optimiser steps with given gradients", _adam, {
         "parameter_after": Asked(1, oracle="adam.adam_scalar"), "first": Asked(1), "second": Asked(1),
     }),

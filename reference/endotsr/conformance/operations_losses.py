@@ -40,18 +40,18 @@ PER_DISPLAY, PER_LENGTH = "loss per display unit", "loss per scene unit"
 OPERATIONS = [
     Operation("masked_l1", "B6", "masked L1", _l1, {
         "loss": Asked(1, "display", oracle="losses.masked_l1"), "d_rendered": Asked(2, PER_DISPLAY),
-    }, ("masked_l1",)),
+    }, lambda s: ("masked_l1",)),
     Operation("masked_ssim", "B7", "masked SSIM", _ssim, {
         "ssim": Asked(1, oracle="losses.masked_ssim", least32=TEXTBOOK),
         "d_rendered": Asked(2, PER_DISPLAY, oracle="losses.masked_ssim_gradient", least32=TEXTBOOK),
-    }, ("masked_ssim",)),
+    }, lambda s: ("masked_ssim",)),
     Operation("normalised_depth", "B8", "normalised depth", _depth, {
         "loss": Asked(1, oracle="losses.normalised_depth"),
         "d_rendered_depth": Asked(2, PER_LENGTH, oracle="losses.normalised_depth"),
-    }, ("normalised_depth",)),
+    }, lambda s: ("normalised_depth",)),
     Operation("smoothness", "B9", "smoothness with given edges", _smoothness, {
         "loss": Asked(1, "scene unit^2", oracle="losses.smoothness"),
         "d_rendered": Asked(2, PER_DISPLAY, oracle="losses.smoothness"),
         "d_rendered_depth": Asked(2, PER_LENGTH, oracle="losses.smoothness"),
-    }, ("smoothness",)),
+    }, lambda s: ("smoothness",)),
 ]  # fmt: skip

@@ -101,7 +101,7 @@ def _objective(inputs: Inputs, settings: Settings) -> Found:
     }
 
 
-class _Tape:
+class Tape:
     """Stands in for the random generator of a run: frames and split noise come from the inputs, in order."""
 
     def __init__(self, frames: NDArray, noise: NDArray) -> None:
@@ -119,8 +119,8 @@ class _Tape:
         return np.ascontiguousarray(self.noise[:, :, : shape[2]], np.float64)
 
 
-def _sequence(inputs: Inputs, settings: Settings) -> Sequence:
-    lens = settings["camera"]
+def sequence_of(inputs: Inputs, lens: dict[str, float], near: float) -> Sequence:
+    """The frames of a request; without stamps, frame k of n is at k / n."""
     poses = zip(inputs["rotation_matrices"], inputs["translations"])
     count = len(inputs["images"])
     train = inputs["train_index"].astype(np.intp)
@@ -128,10 +128,10 @@ def _sequence(inputs: Inputs, settings: Settings) -> Sequence:
         images=inputs["images"].astype(np.uint8),
         masks=inputs["masks"],
         depth=inputs["prior_depths"].astype(np.float32),
-        times=inputs["times"].astype(np.float64),
-        cameras=[Camera(r.astype(np.float64), d.astype(np.float64), **lens) for r, d in poses],
+        times=np.asarray(inputs.get("times", np.arange(count) / count), np.float64),
+        cameras=[Camera(r.astype(np.float64), d.astype(np.float64), **lens) for r, d in poses],  # type: ignore[arg-type]
         names=[str(k) for k in range(count)],
-        near=settings["config"]["raster"]["near"],
+        near=near,
         unit="scene unit",
         static_camera=False,
         train_index=train,
@@ -149,11 +149,12 @@ def config_of(settings: Settings, dtype: np.dtype) -> Config:
 def _training(inputs: Inputs, settings: Settings) -> Found:
     """Calibrate on the first Gaussians, then train; component A and S are born on the way, densification happens."""
     dtype = real_of({"position": inputs["position"]})
-    config, sequence = config_of(settings, dtype), _sequence(inputs, settings)
+    config = config_of(settings, dtype)
+    sequence = sequence_of(inputs, settings["camera"], config.raster.near)
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
     shop = workshop(sequence, config)
     weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap
-    tape: Any = _Tape(inputs["frame_order"], inputs["split_noise"])
+    tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
     log = [training_step(state, shop) for _ in range(config.training.iterations)]
     found: Found = {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
@@ -192,7 +193,7 @@ OPERATIONS = [
         "term_penalty": Asked(3, "scene unit^2", oracle="matern_oracle.penalty"),
         "objective": Asked(3, "loss", oracle="losses.masked_l1"),
         **{f"d_{name}": Asked(3, UNITS.get(name, "loss"), "last") for name in FIELDS},
-    }, ("objective",)),
+    }, lambda s: ("objective",)),
     Operation("training", "6", "calibration and twenty iterations", _training, {
         "lambda_lap": Asked(4), "loss": Asked(4, "loss"), "count": Asked(4, scale="exact"),
         **{f"final_{name}": Asked(4, "raw parameter", "max") for name in FIELDS},

@@ -170,11 +170,23 @@ IMAGES = {
     "opacity_image": ("1", "splatting_oracle.render"),
 }
 
+
+def _preset(settings: Settings) -> str:
+    """Which of the two registered rasterisers a case is nearer to."""
+    return "exact" if settings["raster"]["support"] == "everywhere" else "paper"
+
+
+def _compositing_pairs(stage: str, settings: Settings) -> tuple[str, ...]:
+    """The definition, and the fast path where it answers too."""
+    rows = (f"{stage}_rows",) if compositing_rows.supports(raster_of(settings)) else ()
+    return (f"{stage}_{_preset(settings)}", *rows)
+
+
 OPERATIONS = [
     Operation("covariance", "B2", "rotation and semi-axes", _covariance, {
         "rotation": Asked(1, "1", "last", "splatting_oracle.rotation"), "scale": Asked(1, "scene unit", "last"),
         "d_quaternion": Asked(2, "loss", "last"), "d_log_scale": Asked(2, "loss", "last"),
-    }, ("covariance",)),
+    }, lambda s: ("covariance",)),
     Operation("projection", "B3", "screen mean, covariance and depth", _projection, {
         "visible": Asked(1, scale="exact"),
         "mean2d": Asked(1, "px", "last", "splatting_oracle.project"),
@@ -183,12 +195,12 @@ OPERATIONS = [
         "d_position": Asked(2, "loss per scene unit", "last"), "d_rotation": Asked(2, "loss", "last"),
         "d_scale": Asked(2, "loss per scene unit", "last"), "d_rotation_matrix": Asked(2, "loss"),
         "d_translation": Asked(2, "loss per scene unit"),
-    }, ("projection_exact", "projection_paper")),
+    }, lambda s: (f"projection_{_preset(s)}",)),
     Operation("harmonics", "B4", "colour from harmonics", _harmonics, {
         "colour": Asked(1, "display", oracle="splatting_oracle.colour"),
         "d_harmonics": Asked(2, "loss"), "d_residual": Asked(2, "loss"),
         "d_position": Asked(2, "loss per scene unit"), "d_centre": Asked(2, "loss per scene unit"),
-    }, tuple(f"harmonics_degree_{d}" for d in range(4))),
+    }, lambda s: (f"harmonics_degree_{s['degree']}",)),
     Operation("composite", "B5", "blend screen Gaussians", _composite, {
         **{name: Asked(1, unit, oracle="splatting_oracle.composite") for name, (unit, _) in IMAGES.items()},
         "d_mean2d": Asked(2, "loss per px", "last", "splatting_oracle.composite_reverse"),
@@ -197,7 +209,7 @@ OPERATIONS = [
         "d_colour": Asked(2, "loss per display unit", "last", "splatting_oracle.composite_reverse"),
         "d_depth": Asked(2, "loss per scene unit", "last", "splatting_oracle.composite_reverse"),
         "d_background": Asked(2, "loss per display unit", oracle="splatting_oracle.composite_reverse"),
-    }, ("composite_exact", "composite_paper", "composite_rows")),
+    }, lambda s: _compositing_pairs("composite", s)),
     Operation("render", "B5", "one view of deformed Gaussians", _render, {
         **{name: Asked(3, unit, oracle=oracle) for name, (unit, oracle) in IMAGES.items()},
         "d_position": Asked(3, "loss per scene unit", "last"), "d_quaternion": Asked(3, "loss", "last"),
@@ -205,5 +217,5 @@ OPERATIONS = [
         "d_harmonics": Asked(3, "loss", "last"), "d_residual": Asked(3, "loss", "last"),
         "d_mean2d": Asked(3, "loss per px", "last"), "d_background": Asked(3, "loss per display unit"),
         "d_rotation_matrix": Asked(3, "loss"), "d_translation": Asked(3, "loss per scene unit"),
-    }, ("render_exact", "render_paper", "render_rows")),
+    }, lambda s: _compositing_pairs("render", s)),
 ]  # fmt: skip

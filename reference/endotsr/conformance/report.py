@@ -72,7 +72,7 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
                 continue
             picture = ""
             if o.status == "refused" and pictures < MOST_PICTURES:
-                picture = _pictures(golden, outputs, case.name, o.name)
+                picture = _pictures(golden, outputs, case, o.name)
                 pictures += bool(picture)
             details.append(f"<li><b>{e(o.name)}</b> (level {o.level}) {e(_line(o))}{picture}</li>")
         body = f"<ul>{''.join(details)}</ul>" if details else ""
@@ -107,9 +107,9 @@ figcaption{{color:#5a6675;font-size:13px}}</style></head><body><h1>{claim}</h1><
 """
 
 
-def _pictures(golden: Golden, outputs: Path, case_name: str, name: str) -> str:
+def _pictures(golden: Golden, outputs: Path, report: CaseReport, name: str) -> str:
     """Expected, got and magnitude of the difference of an image-shaped output, or nothing."""
-    case = next((c for c in golden.cases if c.name == case_name), None)
+    case = next((c for c in golden.cases if c.name == report.name), None)
     if case is None or name not in case.outputs:
         return ""
     asked = case.outputs[name]
@@ -119,7 +119,7 @@ def _pictures(golden: Golden, outputs: Path, case_name: str, name: str) -> str:
         got = read_plain(outputs / case.family / case.case / f"{name}.npy", outputs, 8 * int(np.prod(asked.shape)))
     except Refused:
         return ""
-    expected = golden.array(case, asked.file)
+    expected = golden.array(case, asked.answer(report.answer))
     if got.shape != expected.shape:
         return ""
     planes = [_plane(a) for a in (expected, got)]

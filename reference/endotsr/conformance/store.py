@@ -77,8 +77,7 @@ def rendered_files(solved: list[Solved], negatives: dict[str, Negative], version
         files[f"{root}/case.json"] = to_json(one.case).encode()
         for name, array in one.inputs.items():
             files[f"{root}/inputs/{name}.npy"] = npy_bytes(array)
-        for name, array in one.expected.items():
-            files[f"{root}/expected/{name}.npy"] = npy_bytes(array)
+        files |= {f"{root}/{path}": npy_bytes(array) for _, path, array in one.files()}
     files |= {f"schemas/{name}.schema.json": schema_text(kind).encode() for name, kind in SCHEMAS.items()}
     files["negative/flags.json"] = _flags_text(solved, negatives).encode()
     families: dict[str, tuple[str, ...]] = {}
