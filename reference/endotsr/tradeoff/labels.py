@@ -69,6 +69,7 @@ def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox]) -> Bbox |
                 ha="left" if right > 0 else "right" if right < 0 else "center",
                 va="bottom" if up > 0.5 else "top" if up < -0.5 else "center",
                 fontsize=label.size, color=label.colour, weight=label.weight,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.4},
                 arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.4} if radius > RADII[0] else None,
             )  # fmt: skip
             box = _text_box(text, renderer)

@@ -5,6 +5,7 @@ from typing import Any
 
 from endotsr.commands.progress import duration
 from endotsr.tradeoff.figures import BLUE, GREEN, GREY, INK, ORANGE, PINK, empty_figure, plain_axes, save
+from endotsr.tradeoff.labels import Label, place_labels
 
 METRICS = {"psnr_full": "PSNR, dB", "ssim_full": "SSIM", "lpips": "LPIPS"}
 ALONG = {"seconds": "minutes of training", "iteration": "iterations"}
@@ -62,39 +63,50 @@ def decibels_by_minute(result: dict[str, Any]) -> list[str]:
 def training_figure(result: dict[str, Any], along: str, metrics: dict[str, str]) -> Any:
     """One column a question, the base in grey beside the trainings that answer it; one row a metric."""
     by_name = {c["name"]: c for c in result["configurations"]}
-    dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"]
+    dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"] or ["base"]
     rows, columns = (len(metrics), len(dials)) if len(metrics) > 1 else (-(-len(dials) // 3), min(3, len(dials)))
-    figure = empty_figure(3.0 * columns, 2.5 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey="row").ravel()
+    figure = empty_figure(3.1 * columns, 2.6 * rows)
+    share = "row" if len(metrics) > 1 else True
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=share).ravel()
     shown = [(metric, dial) for metric in metrics for dial in dials]
+    labels = []
     for axes, (metric, dial) in zip(panels, shown, strict=False):
-        lines = [("base", by_name["base"], GREY)] if "base" in by_name else []
-        same = [c for c in result["configurations"] if c["dial"] == dial]
-        lines += [(c["name"], c, COLOURS[i % len(COLOURS)]) for i, c in enumerate(same)]
-        _lines(axes, lines, along, metric)
+        same = [c for c in result["configurations"] if c["dial"] == dial and dial != "base"]
+        lines = [(c, COLOURS[i % len(COLOURS)]) for i, c in enumerate(same)]
+        lines += [(by_name["base"], GREY)] if "base" in by_name else []
+        labels += [_line(axes, configuration, colour, along, metric) for configuration, colour in lines]
         plain_axes(axes, ALONG[along], small=True, log_y=False)
         axes.set_ylabel(metrics[metric], fontsize=8, color=INK)
         axes.label_outer()
         axes.set_title(dial, loc="left", fontsize=9.5, color=INK)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
+    _room(panels[: len(shown)])
+    place_labels(figure, labels)
     return figure
 
 
-def _lines(axes: Any, lines: list[tuple[str, dict[str, Any], str]], along: str, metric: str) -> None:
-    ends = []
-    for name, configuration, colour in lines:
-        rows = [r for r in configuration["milestones"] if r[metric] is not None]
-        xs = [r[along] / (60 if along == "seconds" else 1) for r in rows]
-        ys = [r[metric] for r in rows]
-        axes.plot(xs, ys, color=colour, linewidth=1.5, marker="o", markersize=3)
-        if rows:
-            ends.append((ys[-1], xs[-1], name, colour))
-    for place, (_, _, name, colour) in enumerate(sorted(ends, key=lambda e: e[0])):
-        axes.annotate(
-            name, (0.97, 0.05 + 0.1 * place), xycoords="axes fraction", ha="right", va="bottom", fontsize=8,
-            color=colour, weight="bold",
-        )  # fmt: skip
+def _line(axes: Any, configuration: dict[str, Any], colour: str, along: str, metric: str) -> Label:
+    """Draws one curve; returns its name at its end."""
+    rows = [r for r in configuration["milestones"] if r[metric] is not None]
+    xs = [r[along] / (60 if along == "seconds" else 1) for r in rows]
+    ys = [r[metric] for r in rows]
+    axes.plot(xs, ys, color=colour, linewidth=1.4, marker="o", markersize=3)
+    return Label(axes, configuration["name"], xs[-1], ys[-1], colour, 8, "bold")
+
+
+def _room(panels: Any) -> None:
+    """Plain numbers along the common axis, and a place for the names at the right."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    low, high = panels[0].get_xlim()
+    panels[0].set_xlim(low, high * (high / low) ** 0.25)
+    bottom, top = panels[0].get_ylim()
+    panels[0].set_ylim(bottom, top + 0.12 * (top - bottom))
+    for axes in panels:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 200 * low else (1,)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def draw_training(result: dict[str, Any], folder: Path, name: str) -> list[str]:
