@@ -60,7 +60,15 @@ def test_ranges_make_up_the_whole(threads):
     ranges = sorted(recorder.ranges)
     assert ranges[0][0] == 0 and ranges[-1][1] == 37
     assert all(a[1] == b[0] for a, b in pairwise(ranges))
-    assert len(ranges) == (1 if threads == 1 else threads * sharing.PIECES)
+    assert ranges == ([(0, 37)] if threads == 1 else sharing.ranges(37, threads))
+
+
+def test_ranges_shrink_and_are_few():
+    for tasks in (1, 2, 7, 320, 60_000):
+        found = sharing.ranges(tasks, 2)
+        sizes = [stop - first for first, stop in found]
+        assert sum(sizes) == tasks and sizes == sorted(sizes[:-1], reverse=True) + sizes[-1:]
+        assert max(sizes) <= max(1, tasks // 4) and len(found) <= 2 * sharing.SMALLEST
 
 
 def test_errors_reach_the_caller_and_the_threads_live_on(threads):

@@ -12,13 +12,12 @@ halves leave both threads waiting for the slower one when the machine has other 
 import os
 import threading
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 import numba
 
-PIECES = 4  # ranges per thread: enough that a delayed thread holds up nobody, few enough to cost nothing
+SMALLEST = 16  # no range is shorter than tasks / (threads SMALLEST), so that there are few of them
 
 
 class _Job(NamedTuple):
@@ -49,15 +48,25 @@ def share(kernel: Callable[..., Any], tasks: int, *arguments: Any) -> None:
             kernel(0, tasks, *arguments)
         return
     _hire(threads - 1)
-    pieces = min(tasks, threads * PIECES)
-    bounds = [tasks * piece // pieces for piece in range(pieces + 1)]
-    job = _Job(kernel, arguments, iter(list(pairwise(bounds))), SimpleQueue())
+    pieces = ranges(tasks, threads)
+    job = _Job(kernel, arguments, iter(pieces), SimpleQueue())
     for _ in range(threads - 1):
         _jobs.put(job)
     _work(job)
-    errors = [error for error in [job.done.get() for _ in range(pieces)] if error is not None]
+    errors = [error for error in [job.done.get() for _ in pieces] if error is not None]
     if errors:
         raise errors[0]
+
+
+def ranges(tasks: int, threads: int) -> list[tuple[int, int]]:
+    """Ranges of 0 ... tasks - 1, each half of a thread's share of what is left: nobody waits long for the last one."""
+    smallest = -(-tasks // (threads * SMALLEST))
+    found, first = [], 0
+    while first < tasks:
+        stop = min(tasks, first + max(smallest, (tasks - first) // (2 * threads)))
+        found.append((first, stop))
+        first = stop
+    return found
 
 
 def _work(job: _Job) -> None:

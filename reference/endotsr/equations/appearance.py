@@ -37,7 +37,7 @@ class AppearanceGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     colour_coefficients: FloatArray  # (3, 2F, N)
-    phi_bar: FloatArray  # (2F,)
+    phi_bar: FloatArray | None  # (2F,), None when not asked for
 
 
 def _exp_nonpositive(z):
@@ -116,12 +116,16 @@ def appearance_forward(
     return residual, AppearanceSaved(colour_coefficients, phi_bar, slope)
 
 
-def appearance_reverse(d_residual: FloatArray, saved: AppearanceSaved) -> AppearanceGrads:
+def appearance_reverse(
+    d_residual: FloatArray, saved: AppearanceSaved, *, atom_gradient: bool = True
+) -> AppearanceGrads:
     """Reverse of equation (2).
 
     d_residual  (3, N)  derivative of the loss by the residual (that of the degree-0 coefficient it is added to)
-    returns     derivative by A (3, 2F, N) and by phi_bar (2F,), the latter added in float64
+    returns     derivative by A (3, 2F, N) and by phi_bar (2F,): added in float64, None unless `atom_gradient`
     Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
     """
     d_argument = np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)
-    return AppearanceGrads(*spread(d_argument, saved.colour_coefficients, saved.phi_bar))
+    return AppearanceGrads(
+        *spread(d_argument, saved.colour_coefficients, saved.phi_bar, atom_gradient=atom_gradient)
+    )

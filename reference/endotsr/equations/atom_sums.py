@@ -34,7 +34,21 @@ def _combine(first, last, coefficients, atoms, out):
                     total[k] += atom * row[k]
 
 
-def _spread(first, last, d_out, coefficients, atoms, d_coefficients, partial):
+def _spread(first, last, d_out, atoms, d_coefficients):
+    axes, count, n = d_coefficients.shape
+    for block in range(first, last):
+        start = block * BLOCK
+        stop = min(n, start + BLOCK)
+        for c in range(axes):
+            upstream = d_out[c, start:stop]
+            for a in range(count):
+                atom = atoms[a]
+                row = d_coefficients[c, a, start:stop]
+                for k in range(row.size):
+                    row[k] = atom * upstream[k]
+
+
+def _atom_totals(first, last, d_out, coefficients, partial):
     axes, count, n = coefficients.shape
     lanes = np.empty(LANES)
     for block in range(first, last):
@@ -42,16 +56,11 @@ def _spread(first, last, d_out, coefficients, atoms, d_coefficients, partial):
         stop = min(n, start + BLOCK)
         strips = (stop - start) // LANES
         for a in range(count):
-            atom = atoms[a]
             for k in range(LANES):
                 lanes[k] = 0.0
             rest = 0.0
             for c in range(axes):
-                upstream = d_out[c, start:stop]
-                row = coefficients[c, a, start:stop]
-                d_row = d_coefficients[c, a, start:stop]
-                for k in range(upstream.size):
-                    d_row[k] = atom * upstream[k]
+                upstream, row = d_out[c, start:stop], coefficients[c, a, start:stop]
                 for s in range(strips):
                     x, y = upstream[s * LANES :], row[s * LANES :]
                     for k in range(LANES):
@@ -69,6 +78,7 @@ def _blocks(n: int) -> int:
 
 _combine_kernel = jit(_combine)
 _spread_kernel = jit(_spread)
+_atom_totals_kernel = jit(_atom_totals)
 
 
 def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
@@ -82,15 +92,18 @@ def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
     return out
 
 
-def spread(d_out: FloatArray, coefficients: FloatArray, atoms: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Reverse of `combine`: (derivative by the coefficients (3, 2F, N), derivative by the atoms (2F,))."""
+def spread(
+    d_out: FloatArray, coefficients: FloatArray, atoms: FloatArray, *, atom_gradient: bool = True
+) -> tuple[FloatArray, FloatArray | None]:
+    """Reverse of `combine`: derivative by the coefficients (3, 2F, N) and by the atoms (2F,), None unless asked for."""
     dtype = coefficients.dtype
-    coefficients = np.ascontiguousarray(coefficients)
     if d_out.shape != (coefficients.shape[0], coefficients.shape[2]):
         raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")
-    d_coefficients = np.empty(coefficients.shape, dtype)
-    partial = np.zeros((_blocks(coefficients.shape[2]), coefficients.shape[1]))
     d_out = np.ascontiguousarray(d_out, dtype)
-    atoms = np.ascontiguousarray(atoms, dtype)
-    share(_spread_kernel, partial.shape[0], d_out, coefficients, atoms, d_coefficients, partial)
+    d_coefficients, tasks = np.empty(coefficients.shape, dtype), _blocks(coefficients.shape[2])
+    share(_spread_kernel, tasks, d_out, np.ascontiguousarray(atoms, dtype), d_coefficients)
+    if not atom_gradient:
+        return d_coefficients, None
+    partial = np.zeros((tasks, coefficients.shape[1]))
+    share(_atom_totals_kernel, tasks, d_out, np.ascontiguousarray(coefficients), partial)
     return d_coefficients, partial.sum(axis=0).astype(dtype)

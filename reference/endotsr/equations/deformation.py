@@ -29,7 +29,7 @@ CHANNELS = 10
 WIDTH_FLOOR = 1e-4  # added to width^2; keeps u finite at width 0
 SMALLEST_EXPONENT = -60.0  # a basis value below 2^-60 (below float64 rounding of 1) is exactly 0: no subnormal numbers
 LARGEST_U = 128.0  # above it the basis value is 0 for either basis; keeps u^2 finite far from the centre
-PIECE = 1024  # Gaussians in one piece of a row
+PIECE = 4096  # Gaussians in one piece of a row: long enough for the memory to be read ahead
 
 
 class DeformationSaved(NamedTuple):
@@ -145,8 +145,8 @@ def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre
         u = far if u > far else u
         v = u * slope + constant
         exponent = scale * (u * v)
-        value = exp2_nonpositive(exponent) * d_offset[i]
-        value = real(0) if exponent < cut else value
+        value = exp2_nonpositive(exponent)
+        value = (real(0) if exponent < cut else value) * d_offset[i]
         ratio = real(0) if exponent < cut else ratio
         common = factor * weight[i] * value * v
         d_weight[i] = value

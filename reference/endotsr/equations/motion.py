@@ -26,7 +26,7 @@ class MotionGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     motion_coefficients: FloatArray  # (3, 2F, N)
-    phi: FloatArray  # (2F,)
+    phi: FloatArray | None  # (2F,), None when not asked for
 
 
 def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[FloatArray, MotionSaved]:
@@ -43,10 +43,10 @@ def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[Fl
     return combine(motion_coefficients, phi), MotionSaved(motion_coefficients, phi)
 
 
-def motion_reverse(d_translation: FloatArray, saved: MotionSaved) -> MotionGrads:
+def motion_reverse(d_translation: FloatArray, saved: MotionSaved, *, atom_gradient: bool = True) -> MotionGrads:
     """Reverse of equation (3).
 
     d_translation  (3, N)  derivative of the loss by the translation, loss / scene unit
-    returns        derivative by C (3, 2F, N) and by phi (2F,), the latter added in float64
+    returns        derivative by C (3, 2F, N) and by phi (2F,), the latter added in float64, None unless `atom_gradient`
     """
-    return MotionGrads(*spread(d_translation, saved.motion_coefficients, saved.phi))
+    return MotionGrads(*spread(d_translation, saved.motion_coefficients, saved.phi, atom_gradient=atom_gradient))

@@ -101,9 +101,11 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved) -> SceneGrads:
     by_field["harmonics"] = grads.harmonics
     if saved.appearance is not None:
         assert grads.residual is not None
-        by_field["colour_coefficients"] = appearance_reverse(grads.residual, saved.appearance).colour_coefficients
+        appearance = appearance_reverse(grads.residual, saved.appearance, atom_gradient=False)
+        by_field["colour_coefficients"] = appearance.colour_coefficients
     if saved.motion is not None:
-        by_field["motion_coefficients"] = motion_reverse(grads.position, saved.motion).motion_coefficients
+        motion = motion_reverse(grads.position, saved.motion, atom_gradient=False)
+        by_field["motion_coefficients"] = motion.motion_coefficients
     offsets = None
     if saved.deformation is not None:
         offsets = np.concatenate([grads.position, grads.quaternion, grads.log_scale])

@@ -7,6 +7,8 @@ Used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` 
   result is bitwise that of visiting every pixel.
 * The planes of a tile (T, red, green, blue, depth) stand in one flat buffer at constant offsets and are
   indexed with unsigned integers: no alias or wrap-around checks, so the lane loop becomes vector code.
+* The records of a batch of pairs are copied together before they are used: depth order is random order in
+  memory, and waits for memory overlap only while nothing depends on them.
 * log2(opacity) and log2(e) are folded into the exponent: alpha is a bare 2^x.
 * The sign of T marks a finished pixel; selects, no branches, in the lane loop.
 * The reverse pass replays front to back: what lies behind a pair is <g, image> minus the running sum, one
@@ -34,6 +36,7 @@ from endotsr.splatting.records import (
     INVERSE_C,
     LOG2_OPACITY,
     PRECISION,
+    RECORD,
     RED,
     SLOPE,
     U,
@@ -47,8 +50,8 @@ TILE_WIDTH = 32
 TILE_HEIGHT = 16
 LANES = 16
 PITCH = TILE_WIDTH + LANES  # a chunk may start at the last column: the rest of it lands in the padding
-PLANE = PITCH * TILE_HEIGHT
-_CHECK_EVERY = 32  # pairs between tests whether the whole tile is finished
+PLANE = PITCH * TILE_HEIGHT + LANES  # not a multiple of 4 KiB between any two planes: they would share cache sets
+BATCH = 32  # pairs fetched at once; before each batch comes the test whether the whole tile is finished
 
 _U64 = np.uint64
 
@@ -59,7 +62,6 @@ class RowsSaved(NamedTuple):
     records: FloatArray
     lists: TileLists
     limits: FloatArray
-    background: FloatArray
     out: Composite
 
 
@@ -81,14 +83,16 @@ def _rows(record, top):
     reach += (reach + abs(record[V])) * real(1e-5) + real(1e-3)
     low = max(record[V] - reach - half - real(top), zero)
     high = min(record[V] + reach - half - real(top), real(TILE_HEIGHT - 1))
-    return math.ceil(low), math.floor(high)
+    first = np.int32(low)  # library calls for ceil and floor would cost more than the rest
+    first += np.int32(real(first) < low)
+    return first, np.int32(high) if high >= zero else np.int32(-1)
 
 
-def _spans(record, top, left, log2_cutoff, rows, columns):
+def _spans(record, top, left, log2_cutoff, lines):
     """Of all rows of a tile at once (vector code): dy, exponent and shift of the centre line, and the columns to visit.
 
-    rows     (3, TILE_HEIGHT) filled with dy, log2 alpha on the centre line, shift m dy
-    columns  (2, TILE_HEIGHT) int32, first and last tile column, first > last where the row is not reached
+    lines  (5 TILE_HEIGHT,) filled with dy, log2 alpha on the centre line, shift m dy, first and last tile column
+           (first > last where the row is not reached)
 
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
     beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm.
@@ -100,7 +104,6 @@ def _spans(record, top, left, log2_cutoff, rows, columns):
     spread, margin = one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * relative + real(1e-3)
     first_row, right = real(top) + half - v, real(TILE_WIDTH - 1)
     offset = u - half - real(left)
-    dys, exponents, shifts, firsts, lasts = rows[0], rows[1], rows[2], columns[0], columns[1]
     for y in range(TILE_HEIGHT):
         k = _U64(y)
         dy = first_row + real(y)
@@ -109,13 +112,23 @@ def _spans(record, top, left, log2_cutoff, rows, columns):
         width = math.sqrt(max(spread * (exponent - log2_cutoff), zero))
         width += (width + abs(shift)) * relative + margin
         low, high = offset + shift - width, min(offset + shift + width, right)
-        dys[k], exponents[k], shifts[k] = dy, exponent, shift
-        firsts[k] = np.int32(min(max(low, zero), real(TILE_WIDTH)))
-        lasts[k] = np.int32(high) if high >= zero else np.int32(-1)
+        lines[k] = dy
+        lines[k + _U64(TILE_HEIGHT)] = exponent
+        lines[k + _U64(2 * TILE_HEIGHT)] = shift
+        lines[k + _U64(3 * TILE_HEIGHT)] = min(max(low, zero), real(TILE_WIDTH))
+        lines[k + _U64(4 * TILE_HEIGHT)] = high if high >= zero else -one
+
+
+def _line(lines, y):
+    """Row y of what `_spans` filled: dy, exponent, shift, first and last column."""
+    k = _U64(y)
+    dy, exponent, shift = lines[k], lines[k + _U64(TILE_HEIGHT)], lines[k + _U64(2 * TILE_HEIGHT)]
+    return dy, exponent, shift, np.int32(lines[k + _U64(3 * TILE_HEIGHT)]), np.int32(lines[k + _U64(4 * TILE_HEIGHT)])
 
 
 _rows_kernel = jit_inline(_rows)
 _spans_kernel = jit_inline(_spans)
+_line_kernel = jit_inline(_line)
 
 
 def _finished(buffer):
@@ -128,6 +141,17 @@ def _finished(buffer):
 
 
 _finished_kernel = jit(_finished, contract=True)
+
+
+def _fetch(records, ranks, start, stop, batch):
+    """Copy the records of pairs start ... stop - 1: one by one, each would be waited for alone."""
+    for p in range(start, stop):
+        record, copy = records[ranks[p]], batch[p - start]
+        for j in range(RECORD):
+            copy[_U64(j)] = record[_U64(j)]
+
+
+_fetch_kernel = jit_inline(_fetch)
 
 
 def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max):
@@ -156,42 +180,68 @@ def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max)
 _blend_row_kernel = jit_inline(_blend_row)
 
 
+def _write_row(buffer, t_at, at, factor, out):
+    """One row of a plane, plus what shines through: out = plane + T factor."""
+    for x in range(out.size):
+        k = _U64(x)
+        out[k] = buffer[at + k] + abs(buffer[t_at + k]) * factor
+
+
+_write_row_kernel = jit(_write_row, contract=True)
+
+
+def _write_tile(buffer, top, left, background, colour, depth, opacity, transmittance):
+    """The finished tile to the images; row by row and plane by plane, which is vector code."""
+    one = buffer.dtype.type(1)
+    right = min(left + TILE_WIDTH, depth.shape[1])
+    for y in range(top, min(top + TILE_HEIGHT, depth.shape[0])):
+        at = _U64((y - top) * PITCH)
+        for channel in range(3):
+            plane = at + _U64((channel + 1) * PLANE)
+            _write_row_kernel(buffer, at, plane, background[channel], colour[channel, y, left:right])
+        _write_row_kernel(buffer, at, at + _U64(4 * PLANE), one - one, depth[y, left:right])
+        t_row, opacity_row = transmittance[y, left:right], opacity[y, left:right]
+        for x in range(t_row.size):
+            t_row[x] = abs(buffer[at + _U64(x)])
+        for x in range(t_row.size):
+            opacity_row[x] = one - t_row[x]
+
+
+_write_tile_kernel = jit(_write_tile, contract=True)
+
+
 def _blend(first_tile, last_tile, records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
     real = records.dtype.type
     half, one = real(0.5), real(1)
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
-    height, width = depth.shape
-    tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
+    tiles_x = (depth.shape[1] + TILE_WIDTH - 1) // TILE_WIDTH
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(5 * PLANE, records.dtype)
-        rows, columns = np.empty((3, TILE_HEIGHT), records.dtype), np.empty((2, TILE_HEIGHT), np.int32)
+        lines = np.empty(5 * TILE_HEIGHT, records.dtype)
+        batch = np.empty((BATCH, RECORD), records.dtype)
         for y in range(TILE_HEIGHT):
             for x in range(TILE_WIDTH):
                 buffer[y * PITCH + x] = one
         for p in range(starts[tile], starts[tile + 1]):
-            if (p - starts[tile]) % _CHECK_EVERY == _CHECK_EVERY - 1 and _finished_kernel(buffer):
-                break
-            record = records[ranks[p]]
+            k = (p - starts[tile]) % BATCH
+            if k == 0:
+                if _finished_kernel(buffer):
+                    break
+                _fetch_kernel(records, ranks, p, min(p + BATCH, starts[tile + 1]), batch)
+            record = batch[k]
             first, last = _rows_kernel(record, top)
-            _spans_kernel(record, top, left, log2_cutoff, rows, columns)
+            _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for y in range(first, last + 1):
-                for x in range(columns[0, y], columns[1, y] + 1, LANES):
+            for y in range(first, last + np.int32(1)):
+                _, row2, shift, low, high = _line_kernel(lines, y)
+                for x in range(low, high + 1, LANES):
                     _blend_row_kernel(
-                        buffer, _U64(y * PITCH + x), real(left + x) + half - record[U] - rows[2, y], a2, rows[1, y],
+                        buffer, _U64(y * PITCH + x), real(left + x) + half - record[U] - shift, a2, row2,
                         record, log2_cutoff, stop, alpha_max,
                     )  # fmt: skip
-        for y in range(min(TILE_HEIGHT, height - top)):
-            for x in range(min(TILE_WIDTH, width - left)):
-                j = y * PITCH + x
-                t = abs(buffer[j])
-                transmittance[top + y, left + x] = t
-                opacity[top + y, left + x] = one - t
-                for channel in range(3):
-                    colour[channel, top + y, left + x] = buffer[j + (channel + 1) * PLANE] + t * background[channel]
-                depth[top + y, left + x] = buffer[j + 4 * PLANE]
+        _write_tile_kernel(buffer, top, left, background, colour, depth, opacity, transmittance)
 
 
 def _blend_row_reverse(buffer, sums, base, e0, dy, a2, row2, record, log2_cutoff, stop, alpha_max):
@@ -249,59 +299,79 @@ def _fold_lanes(sums, out):
 _fold_lanes_kernel = jit_inline(_fold_lanes)
 
 
+def _read_row(buffer, total_at, at, gradient, image):
+    """One row of an image gradient g to its plane, and g image to the running total of the pixel."""
+    for x in range(gradient.size):
+        k = _U64(x)
+        buffer[at + k] = gradient[k]
+        buffer[total_at + k] += gradient[k] * image[k]
+
+
+_read_row_kernel = jit(_read_row, contract=True)
+
+
+def _read_tile(buffer, top, left, colour, depth, transmittance, d_colour, d_depth, d_opacity):
+    """Planes T = 1, behind = <g, image>, g; the buffer comes filled with 0."""
+    one = buffer.dtype.type(1)
+    right = min(left + TILE_WIDTH, depth.shape[1])
+    for y in range(top, min(top + TILE_HEIGHT, depth.shape[0])):
+        at = _U64((y - top) * PITCH)
+        behind = at + _U64(PLANE)
+        for x in range(right - left):
+            buffer[at + _U64(x)] = one
+        for channel in range(3):
+            plane = at + _U64((2 + channel) * PLANE)
+            _read_row_kernel(buffer, behind, plane, d_colour[channel, y, left:right], colour[channel, y, left:right])
+        _read_row_kernel(buffer, behind, at + _U64(5 * PLANE), d_depth[y, left:right], depth[y, left:right])
+        if d_opacity.shape[0] > 0:  # opacity = 1 - T acts like a background of colour -1
+            for x in range(right - left):
+                buffer[behind + _U64(x)] -= d_opacity[y, left + x] * transmittance[y, left + x]
+
+
+_read_tile_kernel = jit(_read_tile, contract=True)
+
+
 def _blend_reverse(
     first_tile, last_tile,
-    records, starts, ranks, limits, background, colour, depth, transmittance, d_colour, d_depth, d_opacity,
+    records, starts, ranks, slots, limits, colour, depth, transmittance, d_colour, d_depth, d_opacity,
     pair_gradients,
 ):  # fmt: skip
     """`d_opacity` has no rows when nothing depends on the opacity image."""
     real = records.dtype.type
-    half, one, zero = real(0.5), real(1), real(0)
+    half, zero = real(0.5), real(0)
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
-    height, width = depth.shape
-    tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
+    tiles_x = (depth.shape[1] + TILE_WIDTH - 1) // TILE_WIDTH
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         buffer = np.zeros(6 * PLANE, records.dtype)
         sums = np.zeros(GRADIENT * LANES, records.dtype)
-        rows, columns = np.empty((3, TILE_HEIGHT), records.dtype), np.empty((2, TILE_HEIGHT), np.int32)
-        for y in range(min(TILE_HEIGHT, height - top)):
-            for x in range(min(TILE_WIDTH, width - left)):
-                j = y * PITCH + x
-                row, column = top + y, left + x
-                total = zero
-                for channel in range(3):
-                    g = d_colour[channel, row, column]
-                    buffer[j + (2 + channel) * PLANE] = g
-                    total += g * colour[channel, row, column]
-                gz = d_depth[row, column]
-                buffer[j + 5 * PLANE] = gz
-                total += gz * depth[row, column]
-                if d_opacity.shape[0] > 0:  # opacity = 1 - T acts like a background of colour -1
-                    total -= d_opacity[row, column] * transmittance[row, column]
-                buffer[j] = one
-                buffer[j + PLANE] = total
+        lines = np.empty(5 * TILE_HEIGHT, records.dtype)
+        batch = np.empty((BATCH, RECORD), records.dtype)
+        _read_tile_kernel(buffer, top, left, colour, depth, transmittance, d_colour, d_depth, d_opacity)
         done = False
         for p in range(starts[tile], starts[tile + 1]):
-            if (p - starts[tile]) % _CHECK_EVERY == _CHECK_EVERY - 1 and not done:
+            k = (p - starts[tile]) % BATCH
+            if k == 0 and not done:
                 done = _finished_kernel(buffer)
-            out = pair_gradients[p]
-            for j in range(GRADIENT):
-                out[j] = zero
+                _fetch_kernel(records, ranks, p, min(p + BATCH, starts[tile + 1]), batch)
+            out = pair_gradients[slots[p]]
             if done:
+                for j in range(GRADIENT):
+                    out[j] = zero
                 continue
-            record = records[ranks[p]]
+            record = batch[k]
             for j in range(GRADIENT * LANES):
                 sums[_U64(j)] = zero
             first, last = _rows_kernel(record, top)
-            _spans_kernel(record, top, left, log2_cutoff, rows, columns)
+            _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for y in range(first, last + 1):
-                for x in range(columns[0, y], columns[1, y] + 1, LANES):
+            for y in range(first, last + np.int32(1)):
+                dy, row2, shift, low, high = _line_kernel(lines, y)
+                for x in range(low, high + 1, LANES):
                     _blend_row_reverse_kernel(
-                        buffer, sums, _U64(y * PITCH + x), real(left + x) + half - record[U] - rows[2, y], rows[0, y],
-                        a2, rows[1, y], record, log2_cutoff, stop, alpha_max,
+                        buffer, sums, _U64(y * PITCH + x), real(left + x) + half - record[U] - shift, dy,
+                        a2, row2, record, log2_cutoff, stop, alpha_max,
                     )  # fmt: skip
             _fold_lanes_kernel(sums, out)
 
@@ -322,7 +392,7 @@ def composite_rows_forward(
     out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
     share(_blend_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
-    return out, RowsSaved(records, lists, limits, background, out)
+    return out, RowsSaved(records, lists, limits, out)
 
 
 def composite_rows_reverse(
@@ -334,7 +404,7 @@ def composite_rows_reverse(
     extra = np.empty((0, 0), dtype) if d_opacity is None else d_opacity
     share(
         _blend_reverse_kernel, saved.lists.starts.size - 1,
-        saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.background, saved.out.colour,
+        saved.records, saved.lists.starts, saved.lists.ranks, saved.lists.slots, saved.limits, saved.out.colour,
         saved.out.depth, saved.out.transmittance, d_colour, d_depth, extra, pair_gradients,
     )  # fmt: skip
     return pair_gradients
