@@ -101,6 +101,14 @@ def test_hard_W1_weak_atom_is_flagged():
     assert report.dead == ["sin(2 pi 16 t)"] and report.weak == []
 
 
+def test_hard_W1_a_dead_atom_adds_nothing_to_the_rank():
+    """Stamps a hair off the zeros of the sine: its RMS is 1e-7, small but far above rounding."""
+    stamps = np.arange(8) / 16 + 1e-9 * np.arange(8)
+    report = report_atoms(stamps, np.array([16.0]))
+    assert report.dead == ["sin(2 pi 16 t)", "cos(2 pi 16 t)"]
+    assert (report.rank, report.condition) == (0, 0.0)
+
+
 def test_hard_W2_one_stamp_makes_every_atom_dead():
     omega = frequencies(8, 1.0, 16.0)
     for times in ([0.3], [0.3, 0.3, 0.3]):
