@@ -32,11 +32,6 @@ def test_every_stage_takes_time(result):
     assert result["parameters"] == 665  # of a Gaussian at B = 17, F = 8, degree 3
 
 
-def test_what_is_not_in_a_stage_is_little(result):
-    """Glue of the trainer, not a stage that the clock does not know; small pictures have much glue."""
-    assert result["stages"][clock.REST]["median_ms"] < 0.5 * result["iteration"]["median_ms"]
-
-
 def test_functions_are_put_back():
     before = trainer.render_forward, trainer.adam_update, render.tile_lists
     with pytest.raises(ZeroDivisionError), clock.StageClock().watching():
@@ -91,7 +86,7 @@ def test_pairs_are_those_of_the_rule():
     rng = np.random.default_rng(5)
     position = np.stack([rng.uniform(-0.012, 0.012, 40), rng.uniform(-0.009, 0.009, 40), rng.uniform(3, 5, 40)])
     quaternion = np.repeat([[1.0], [0], [0], [0]], 40, axis=1)
-    scene = Scene(position, quaternion, np.full((3, 40), np.log(0.002)), rng.uniform(-1, 6, 40), np.zeros((16, 3, 40)))
+    scene = Scene(position, quaternion, np.full((3, 40), np.log(0.008)), rng.uniform(-1, 8, 40), np.zeros((16, 3, 40)))
     found = pairs.count_pairs(scene, camera, PAPER_RULES, 0)
     assert found["blended"] == pairs_by_loops(scene, camera)
     assert found["visible"] == 40 and found["listed"] >= 40

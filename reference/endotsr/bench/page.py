@@ -45,15 +45,15 @@ def fragments(found: Mapping[str, dict[str, Any]], runs: Mapping[str, dict[str, 
     }
 
 
-def replaced(text: str, made: Mapping[str, str], page: Path) -> str:
-    """The text with every marked part replaced."""
-    names = re.findall(r"<!-- bench:(\w+):start -->", text)
+def replaced(text: str, made: Mapping[str, str], page: Path, room: str = "bench") -> str:
+    """The text with every part between marks of `room` replaced."""
+    names = re.findall(rf"<!-- {room}:(\w+):start -->", text)
     for name in names:
-        head, rest = text.split(f"<!-- bench:{name}:start -->", 1)
-        _, end, tail = rest.partition(f"<!-- bench:{name}:end -->")
+        head, rest = text.split(f"<!-- {room}:{name}:start -->", 1)
+        _, end, tail = rest.partition(f"<!-- {room}:{name}:end -->")
         if not end or name not in made:
-            raise InputError(f"{page}: mark bench:{name} has no end or no meaning; allowed: {', '.join(made)}")
-        text = f"{head}<!-- bench:{name}:start -->\n{made[name]}\n{end}{tail}"
+            raise InputError(f"{page}: mark {room}:{name} has no end or no meaning; allowed: {', '.join(made)}")
+        text = f"{head}<!-- {room}:{name}:start -->\n{made[name]}\n{end}{tail}"
     return text
 
 

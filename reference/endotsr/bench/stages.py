@@ -95,6 +95,7 @@ def table(result: dict[str, Any]) -> str:
     if dense:
         per = f"{dense['per_iteration_ms']:.2f} ms an iteration"
         lines.append(f"{'densification':<22}{dense['median_ms']:>11.2f}  once an interval: {per}")
+    lines.append(f"first iteration, compiled code loaded or made: {result['first_iteration_s']:.1f} s")
     ns = result["ns_per_pair"]
     if ns["splat"] is not None:
         each = ", ".join(f"{name} {value:.2f}" for name, value in ns.items())

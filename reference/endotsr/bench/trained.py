@@ -16,7 +16,7 @@ from endotsr.scene.gaussians import Gaussians
 
 ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
 DEPTH = 4.0  # scene units of the middle of the scene, that of the common workload
-PERCENTILES = (5, 95)  # of the positions: what is fitted into the picture
+PERCENTILES = (1, 99)  # of the positions: what is fitted into the picture
 
 
 def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
