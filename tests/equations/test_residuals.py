@@ -91,6 +91,18 @@ def test_hard_T2_zero_coefficients_change_nothing_but_can_start(dtype):
     assert np.array_equal(translation, np.zeros((3, 9), dtype))
 
 
+def test_the_gradient_by_the_atoms_is_made_only_when_asked_for():
+    coefficients, atoms, upstream = case(9, np.float64)
+    for forward, reverse in (
+        (lambda c, a: appearance_forward(c, a, BETA), appearance_reverse),
+        (motion_forward, motion_reverse),
+    ):
+        _, saved = forward(coefficients, atoms)
+        whole, part = reverse(upstream, saved), reverse(upstream, saved, atom_gradient=False)
+        assert part[1] is None and whole[1] is not None
+        assert np.array_equal(part[0], whole[0])
+
+
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_hard_T3_bounded_odd_monotone(dtype):
     x = np.concatenate([np.linspace(0, 1, 2001), np.linspace(1, 30, 500), [1e3, 1e6]]).astype(dtype)
