@@ -28,6 +28,7 @@ import pytest  # noqa: E402
 
 from endotsr.checking import all_pairs  # noqa: E402
 from endotsr.conformance.store import golden_folder, read_golden  # noqa: E402
+from endotsr.jit import kernel_source_hash  # noqa: E402
 from endotsr.runs import machine, now, versions  # noqa: E402
 from mutation.checks import SLOW, SUITES, Check, forward_only, of_case, of_item, of_pair, run, surveyed  # noqa: E402
 from mutation.kernels import clear_caches, kernels, planted  # noqa: E402
@@ -43,7 +44,7 @@ LATER = 30.0  # s of further checks for a mutant that no suite has noticed by th
 def recorded_pairs(keep: Path | None) -> dict[str, Any]:
     """Finite differences of the right kernels, taken in a process where they are compiled."""
     with tempfile.TemporaryDirectory() as folder:
-        target = (keep or Path(folder)) / "recorded.pickle"
+        target = (keep or Path(folder)) / f"recorded-{kernel_source_hash()}.pickle"
         if not target.is_file():
             environment = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
             subprocess.run([sys.executable, ROOT / "tests/mutation/recording.py", target], env=environment, check=True)
@@ -54,7 +55,7 @@ class Survey:
     """Time and kernels of the checks, kept in a file so that a second run need not measure them again."""
 
     def __init__(self, keep: Path | None):
-        path = self.path = keep / "survey.json" if keep else None
+        path = self.path = keep / f"survey-{kernel_source_hash()}.json" if keep else None
         self.known: dict[str, Any] = json.loads(path.read_text()) if path and path.is_file() else {}
         self.written = time.monotonic()
 
@@ -160,11 +161,11 @@ class Plugin:
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """In place of pytest's own loop."""
         functions = kernels() | planted()
-        checks = Checks(session.items, self.options.keep, self.say)
         wanted = [k for k in kernels() if not self.options.only or k.startswith(tuple(self.options.only))]
-        chosen = [m for k in wanted for m in every(mutants(k, functions[k]), self.options.sample)]
-        chosen += [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
+        chosen = [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
+        chosen += [m for k in wanted for m in every(mutants(k, functions[k]), self.options.sample)]
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
+        checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
         outcomes: dict[str, Outcome] = {}
         for mutant, outcome in in_processes(work, self.options.jobs):

@@ -157,7 +157,11 @@ def _walk(statement: ast.stmt, node: ast.AST, place: Place) -> Iterator[tuple[as
         statement = node
         if _only_checks(node):
             return
-    if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.keyword) and node.arg == "copy"):
+    if (
+        isinstance(node, ast.JoinedStr)
+        or _is_call_of(node, "reshape")
+        or (isinstance(node, ast.keyword) and node.arg == "copy")
+    ):
         return
     yield statement, place, node
     for field, value in ast.iter_fields(node):
@@ -169,6 +173,11 @@ def _walk(statement: ast.stmt, node: ast.AST, place: Place) -> Iterator[tuple[as
                     yield from _walk(statement, item, (node, field, k))
         elif isinstance(value, ast.expr):
             yield from _walk(statement, value, (node, field, None))
+
+
+def _is_call_of(node: ast.AST, name: str) -> bool:
+    """Lengths of a reshape are left alone: NumPy reads any negative one as the unknown one."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
 
 
 def _only_checks(node: ast.stmt) -> bool:
