@@ -45,7 +45,11 @@ class Page(HTMLParser):
 
 def problems(root: Path) -> list[str]:
     """One sentence for each link that leads nowhere inside the book, each remote script, and each stray command."""
-    pages = {file: Page(file.read_text(encoding="utf-8")) for file in sorted(root.rglob("*.html"))}
+    pages = {
+        file: Page(file.read_text(encoding="utf-8"))
+        for file in sorted(root.rglob("*.html"))
+        if "_static" not in file.parts
+    }
     found = []
     for file, page in pages.items():
         name = file.relative_to(root)
