@@ -7,12 +7,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.conformance.compare import Verdict, fingerprint, judged, misses
+from endotsr.conformance.compare import Verdict, judged, misses
 from endotsr.conformance.format import LEVELS, Case, Output, Precision
 from endotsr.conformance.npy import Refused, read_plain, read_text
+from endotsr.conformance.recognise import Suspect, recognise, suspects_of
 from endotsr.conformance.store import Golden
-
-NEAR = 0.02  # of the way from right to wrong: a fingerprint this close to that of a mistake is that mistake
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
 
@@ -45,18 +44,6 @@ class CaseReport(msgspec.Struct, kw_only=True):
     made_for: list[str]
     answer: int = 0
     """which of several legal answers it was held against"""
-
-
-class Suspect(msgspec.Struct, kw_only=True):
-    """A mistake that explains refusals."""
-
-    flag: str
-    title: str
-    wrong: str
-    matches: int
-    """refused cases with its fingerprint"""
-    contradicted: int
-    """passed cases that it would have spoiled"""
 
 
 class Report(msgspec.Struct, kw_only=True):
@@ -132,7 +119,7 @@ def conclude(
     return Report(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
         claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
-        suspects=_suspects(golden, reports), notes=notes,
+        suspects=suspects_of(golden, {r.name: (r.status, r.looks_like) for r in reports}), notes=notes,
     )  # fmt: skip
 
 
@@ -188,7 +175,7 @@ def _held_against(
             verdict = _identical(got, taken.get(asked.compare.to), asked.compare.to)
         found.append(_report(name, asked, verdict))
         if not verdict.passed:
-            _recognise(case, name, got, expected, looks)
+            recognise(case, name, got, expected, looks)
     return found, looks
 
 
@@ -229,34 +216,6 @@ def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
 
 def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-def _recognise(case: Case, name: str, got: NDArray, expected: NDArray, looks: dict[str, float]) -> None:
-    """Mistakes of the case whose fingerprint this output has, with how far off it is."""
-    finite = bool(np.isfinite(got.astype(np.float64)).all())
-    for flag, mistake in case.mistakes.items():
-        if mistake.output != name:
-            continue
-        if mistake.fingerprint is None:
-            if not finite:
-                looks[flag] = 0.0
-            continue
-        right = fingerprint(name, expected)
-        way = abs(mistake.fingerprint - right)
-        off = abs(fingerprint(name, got) - mistake.fingerprint) if finite else np.inf
-        if off <= NEAR * way or (case.outputs[name].compare.kind == "identical" and finite):
-            looks[flag] = float(off / way) if way else 0.0
-
-
-def _suspects(golden: Golden, reports: list[CaseReport]) -> list[Suspect]:
-    status = {r.name: r.status for r in reports}
-    found = []
-    for flag, note in golden.manifest.flags.items():
-        matches = sum(flag in r.looks_like for r in reports)
-        if matches:
-            against = sum(status.get(c.name) == "passed" for c in golden.cases if flag in c.mistakes)
-            found.append(Suspect(flag=flag, title=note.title, wrong=note.wrong, matches=matches, contradicted=against))
-    return sorted(found, key=lambda s: (s.contradicted - s.matches, s.contradicted))
 
 
 def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
