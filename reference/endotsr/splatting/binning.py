@@ -3,8 +3,7 @@
 Three steps: a pixel box for every Gaussian (its support), a stable sort by view depth with ties in index
 order, and a counting sort of (tile, Gaussian) pairs. Every pair owns one slot: the reverse pass writes its
 gradient there and a gather adds the slots of a Gaussian in tile order, so no two threads share a cell and
-the sum does not depend on the number of threads. The slots of a Gaussian lie side by side: a far write is
-not waited for, a far read is.
+the sum does not depend on the number of threads.
 """
 
 import math
@@ -34,8 +33,8 @@ class TileLists(NamedTuple):
 
     starts: IntArray  # (tiles + 1,) range of each tile in `ranks`
     ranks: IntArray  # (pairs,) int32 depth rank
-    slots: IntArray  # (pairs,) row of each entry of `ranks` in the array of pair gradients
-    pair_starts: IntArray  # (n + 1,) rows of each depth rank in that array, in tile order
+    pair_starts: IntArray  # (n + 1,) range of each depth rank in `slots`
+    slots: IntArray  # (pairs,) position of the pair in `ranks`, in tile order
 
 
 def _boxes(
@@ -162,7 +161,7 @@ def _fill_lists(first, last, box, order, tile_width, tile_height, tiles_x, count
                 for tx in range(box[i, 0] // tile_width, box[i, 1] // tile_width + 1):
                     t = ty * tiles_x + tx
                     ranks[position[t]] = k
-                    slots[position[t]] = at
+                    slots[at] = position[t]
                     position[t] += 1
                     at += 1
 
@@ -214,4 +213,4 @@ def tile_lists(
     _starts_kernel(counts, starts, pair_starts)
     ranks, slots = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int32)
     share(_fill_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, counts, pair_starts, ranks, slots)
-    return TileLists(starts, ranks, slots, pair_starts)
+    return TileLists(starts, ranks, pair_starts, slots)

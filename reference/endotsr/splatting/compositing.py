@@ -134,7 +134,6 @@ def _composite_reverse(
     records,
     starts,
     ranks,
-    slots,
     limits,
     background,
     pass_clamped,
@@ -151,7 +150,7 @@ def _composite_reverse(
     for tile in range(first_tile, last_tile):
         first, length = starts[tile], starts[tile + 1] - starts[tile]
         for p in range(length):
-            pair_gradients[slots[first + p], :] = zero
+            pair_gradients[first + p, :] = zero
         hit = np.empty(length, np.int64)  # pairs that were blended, nearest first
         kept = np.empty((length, 5), records.dtype)  # alpha, T, e, dy, whether the gradient passes the clamp
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
@@ -183,7 +182,7 @@ def _composite_reverse(
                     s = kept[j, 4] * (t * (own - rest))
                     rest = alpha * own + (one - alpha) * rest
                     weight = alpha * t
-                    out = pair_gradients[slots[first + hit[j]]]
+                    out = pair_gradients[first + hit[j]]
                     out[SUM_S] += s
                     out[SUM_SE] += s * e
                     out[SUM_SY] += s * dy
@@ -229,12 +228,12 @@ def composite_forward(
 def composite_reverse(
     d_colour: FloatArray, d_depth: FloatArray, d_opacity: FloatArray, saved: CompositeSaved
 ) -> FloatArray:
-    """Pair gradients (pairs, 10) in the order of `TileLists.slots`, from those by colour, depth and opacity."""
+    """Pair gradients (pairs, 10) from dL/dcolour (3, H, W), dL/ddepth (H, W), dL/dopacity (H, W)."""
     pair_gradients = np.empty((saved.lists.ranks.size, GRADIENT), saved.records.dtype)
     share(
         _composite_reverse_kernel, saved.lists.starts.size - 1,
-        saved.records, saved.lists.starts, saved.lists.ranks, saved.lists.slots, saved.limits,
-        saved.background, saved.pass_clamped_alpha, d_colour, d_depth, d_opacity, pair_gradients,
+        saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.background,
+        saved.pass_clamped_alpha, d_colour, d_depth, d_opacity, pair_gradients,
     )  # fmt: skip
     return pair_gradients
 

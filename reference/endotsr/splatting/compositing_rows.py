@@ -333,7 +333,7 @@ _read_tile_kernel = jit(_read_tile, contract=True)
 
 def _blend_reverse(
     first_tile, last_tile,
-    records, starts, ranks, slots, limits, colour, depth, transmittance, d_colour, d_depth, d_opacity,
+    records, starts, ranks, limits, colour, depth, transmittance, d_colour, d_depth, d_opacity,
     pair_gradients,
 ):  # fmt: skip
     """`d_opacity` has no rows when nothing depends on the opacity image."""
@@ -355,7 +355,7 @@ def _blend_reverse(
             if k == 0 and not done:
                 done = _finished_kernel(buffer)
                 _fetch_kernel(records, ranks, p, min(p + BATCH, starts[tile + 1]), batch)
-            out = pair_gradients[slots[p]]
+            out = pair_gradients[p]
             if done:
                 for j in range(GRADIENT):
                     out[j] = zero
@@ -404,7 +404,7 @@ def composite_rows_reverse(
     extra = np.empty((0, 0), dtype) if d_opacity is None else d_opacity
     share(
         _blend_reverse_kernel, saved.lists.starts.size - 1,
-        saved.records, saved.lists.starts, saved.lists.ranks, saved.lists.slots, saved.limits, saved.out.colour,
+        saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.out.colour,
         saved.out.depth, saved.out.transmittance, d_colour, d_depth, extra, pair_gradients,
     )  # fmt: skip
     return pair_gradients

@@ -85,7 +85,7 @@ def pack_records(
 
 def _gather(
     first, stop,
-    order, records, pair_starts, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth,
+    order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth,
     d_mean2d, d_footprint, d_logit, d_colour, d_depth,
 ):  # fmt: skip
     """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
@@ -96,7 +96,7 @@ def _gather(
         for j in range(GRADIENT):
             total[j] = zero
         for p in range(pair_starts[k], pair_starts[k + 1]):
-            row = pair_gradients[p]
+            row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
                 total[j] += row[j]
         i = order[k]
@@ -137,7 +137,7 @@ def gather_footprint_gradients(
     )  # fmt: skip
     share(
         _gather_kernel, order.size,
-        order, records, lists.pair_starts, pair_gradients, determinant, opacity_logit,
+        order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
         dtype.type(conic_epsilon), keep_depth, *out,
     )  # fmt: skip
     return out
