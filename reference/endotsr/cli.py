@@ -1,12 +1,16 @@
 """The command `endotsr`: finds the subcommand, imports it alone, and turns a person's mistakes into one line.
 
 Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit codes: 0 done, 1 a check or
-comparison did not pass, 2 input or usage that cannot be used, 130 interrupted.
+comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM).
 """
 
+import contextlib
 import importlib
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 
 from endotsr import __version__
 from endotsr.errors import CalibrationError, InputError
@@ -18,7 +22,7 @@ COMMANDS = {
     "render": "colour, depth and opacity at any time in [0, 1]",
     "evaluate": "held-out metrics beside honest baselines, renders, and one self-contained report",
     "gradcheck": "check every reverse pass against finite differences",
-    "bench": "time one full training iteration, stage by stage",
+    "bench": "where the time goes: stages beside their limits, growth, a peer, cold start",
     "tradeoff": "what accuracy costs in time: errors beside seconds, and what a budget buys",
     "golden": "the conformance target of ports: judge outputs, run a port, check the vectors",
 }
@@ -34,7 +38,8 @@ def main(argv: list[str] | None = None) -> int:
         print(f"endotsr {__version__}")
         return 0
     try:
-        return _command(argv[0])(argv[1:])
+        with _terminate_as_interrupt():
+            return _command(argv[0])(argv[1:])
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
         print(table)
@@ -58,6 +63,23 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     except MemoryError:
         return _fail("not enough memory; a smaller --scale or fewer --frames needs less")
+
+
+@contextlib.contextmanager
+def _terminate_as_interrupt() -> Iterator[None]:
+    """Inside, SIGTERM (a batch system, a shutdown) does what Ctrl-C does: whole files, a status, a line how to go on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _command(name: str):

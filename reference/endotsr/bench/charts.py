@@ -68,10 +68,7 @@ def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     for panel, axis in zip(panels, axes.values()):
         for name, times in axis["median_ms"].items():
             _power(panel, axis["size"], times, name, axis["exponent"][name])
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        low, high = panel.get_ylim()
-        panel.set_ylim(low / 1.2, high * 9.0 ** (len(axis["median_ms"]) / 6.0))  # room for the legend above the curves
+        _logarithmic(panel, axis["size"], len(axis["median_ms"]))
         panel.set_xlabel(axis["unit"], color=INK, fontsize=9)
         panel.set_ylabel("ms", color=INK, fontsize=9)
         panel.legend(frameon=False, fontsize=8, labelcolor=INK, loc="upper left")
@@ -79,6 +76,31 @@ def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     for empty in panels[len(axes) :]:
         empty.set_visible(False)
     _save(figure, path)
+
+
+def _logarithmic(panel: Any, size: Sequence[float], curves: int) -> None:
+    """Both axes logarithmic with few plain labels: the sizes themselves where they span little."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    low, high = panel.get_ylim()
+    middle = (low * high) ** 0.5
+    low, high = min(low, middle / 4), max(high, middle * 4)  # noise of a flat curve must not fill the panel
+    panel.set_ylim(low / 1.2, high * 9.0 ** (curves / 6.0))  # room for the legend above the curves
+    if max(size) < 10 * min(size):
+        panel.set_xticks(size)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter(FuncFormatter(_short))
+        axis.set_minor_formatter(NullFormatter())
+    panel.minorticks_off()
+
+
+def _short(value: float, _: object) -> str:
+    for unit, letter in ((1e6, "M"), (1e3, "k")):
+        if value >= unit:
+            return f"{value / unit:.3g}{letter}"
+    return f"{value:g}"
 
 
 def _power(panel: Any, size: Sequence[float], times: Sequence[float], name: str, power: float | None) -> None:
