@@ -30,10 +30,12 @@ def function_links(row: Equation) -> str:
 
 
 def reverse_links(row: Equation) -> str:
-    """The derivation in a notebook, then the functions; or why there is no reverse pass."""
-    found = [f"{{ref}}`derivation <reverse-{name}>`" for name in row.notebooks if has_derivation(name)][:1]
-    found += [function_link(name) for name in row.reverses]
-    return ", ".join([*found, f"none: {row.without.reason}"] if row.without else found)
+    """The derivation in a notebook, then the functions; or why there is none, and where that is explained."""
+    anchors = [f"reverse-{name}" for name in row.notebooks if has_derivation(name)][:1]
+    if row.without:
+        return ", ".join([f"none: {row.without.reason}", *(f"{{ref}}`why <{anchor}>`" for anchor in anchors)])
+    derivations = [f"{{ref}}`derivation <{anchor}>`" for anchor in anchors]
+    return ", ".join([*derivations, *(function_link(name) for name in row.reverses)])
 
 
 def check_links(row: Equation) -> str:
