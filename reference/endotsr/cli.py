@@ -67,7 +67,7 @@ def main(argv: list[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _terminate_as_interrupt() -> Iterator[None]:
-    """Inside, SIGTERM (a batch system, a shutdown) does what Ctrl-C does: whole files, a status, a line how to go on."""
+    """Inside, SIGTERM (a batch system, a shutdown) does what Ctrl-C does: a run says how to go on."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -103,7 +103,9 @@ def test_ctrl_c_keeps_the_last_checkpoint_and_resume_is_bitwise_equal(at, finish
     assert record["status"] == "finished" and record["resumed"][0]["after_iteration"] == at // EVERY * EVERY
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
+@pytest.mark.parametrize(
+    "how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=["interrupted", "terminated", "killed"]
+)
 def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
     out = tmp_path / "run"
     process = start(train_only(out), tmp_path)
@@ -115,8 +117,9 @@ def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
     process.send_signal(how)
     said = process.communicate(timeout=120)[1]
     # a process that was through before the signal arrived has nothing to say
-    assert process.returncode in (0, 130 if how == signal.SIGINT else -how)
+    assert process.returncode in (0, -how if how == signal.SIGKILL else 130)
     if process.returncode == 130:
+        assert RunFolder(out).record()["status"] == "interrupted"
         assert "--resume" in said.strip().splitlines()[-1] and "Traceback" not in said
     assert main(resume(out)) == 0
     assert_same_run(finished_run, out)
