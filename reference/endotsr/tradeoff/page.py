@@ -31,13 +31,12 @@ def advice(result: dict[str, Any]) -> list[str]:
     """Three sentences, each with the figures of this measurement."""
     by_name = {p["name"]: p for p in result["points"]}
     paper = by_name[result["presets"]["paper"]]
-    below = [p for p in _joint(result, "float32") if p["error"]["max"] <= result["lines"]["eight_bit"]]
+    chosen = eight_bit_setting(result)
     sentences = [
         f"For pictures and for training take `paper`: it errs by {levels(paper['error']['rms'])} on average and by "
         f"{levels(paper['error']['max'])} at the worst pixel{_against_noise(paper, result)}."
     ]
-    if below:
-        chosen = min(below, key=lambda p: (p["visits"], p["error"]["max"]))
+    if chosen is not None:
         raster = chosen["setting"]["raster"]
         sentences.append(
             f"For an image that is right to the last of 8 bits, lower the cutoff to {raster['alpha_cutoff']:.2g} "
@@ -51,6 +50,12 @@ def advice(result: dict[str, Any]) -> list[str]:
             "falls with the cutoff, at most five times it; `exact` is for certifying, never for work."
         )
     return sentences
+
+
+def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
+    """The cheapest float32 setting of the sweep whose largest error is below half a step of 8 bit."""
+    kept = [p for p in _joint(result, "float32") if p["error"]["max"] <= result["lines"]["eight_bit"]]
+    return min(kept, key=lambda p: (p["visits"], p["error"]["max"]), default=None)
 
 
 def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:

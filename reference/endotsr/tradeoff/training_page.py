@@ -13,21 +13,33 @@ COLOURS = (BLUE, ORANGE, GREEN, PINK)
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
-    """Every training at its end beside the base, then what each further stretch of time bought."""
+    """For a terminal: every training at its end beside the base, then what each further stretch of time bought."""
+    rows = training_rows(result)
+    lines = ["".join(f"{cell:<16}" if i == 0 else f"{cell:>11}" for i, cell in enumerate(row)) for row in rows]
+    head = ("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
+    lines.insert(0, "".join(f"{name:<16}" if i == 0 else f"{name:>11}" for i, name in enumerate(head)))
+    lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
+    return lines + gain_by_minute(best_by_time(result))
+
+
+def training_rows(result: dict[str, Any]) -> list[list[str]]:
+    """Name, PSNR, gain on the base, SSIM, LPIPS, time, time over that of the base, Gaussians."""
     by_name = {c["name"]: c for c in result["configurations"]}
     if "base" not in by_name:
-        return ["no training was finished"]
+        return []
     base = by_name["base"]["milestones"][-1]
-    lines = [f"{'training':<16}{'PSNR':>9}{'to base':>9}{'SSIM':>8}{'time':>8}{'to base':>9}{'Gaussians':>11}"]
+    rows = []
     for c in result["configurations"]:
         last = c["milestones"][-1]
-        gain = last["psnr_full"] - base["psnr_full"]
-        lines.append(
-            f"{c['name']:<16}{last['psnr_full']:9.2f}{gain:+9.2f}{last['ssim_full']:8.4f}"
-            f"{duration(last['seconds']):>8}{last['seconds'] / base['seconds']:8.2f}x{last['gaussians']:11d}"
-        )
-    lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
-    return lines + decibels_by_minute(result)
+        cells = [
+            f"{last['psnr_full']:.2f}",
+            f"{last['psnr_full'] - base['psnr_full']:+.2f}",
+            f"{last['ssim_full']:.4f}",
+        ]
+        cells.append("-" if last["lpips"] is None else f"{last['lpips']:.4f}")
+        cells += [duration(last["seconds"]), f"{last['seconds'] / base['seconds']:.2f}x", str(last["gaussians"])]
+        rows.append([c["name"], *cells])
+    return rows
 
 
 def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
@@ -45,17 +57,23 @@ def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-def decibels_by_minute(result: dict[str, Any]) -> list[str]:
-    """Along the best measured states: from when to when, which training, what it gained a minute."""
-    lines, before = [], None
-    for row in best_by_time(result):
-        reached = f"{row['name']} at iteration {row['iteration']}: {row['psnr_full']:.2f} dB"
-        if before is None:
-            lines.append(f"after {duration(row['seconds'])}: {reached}")
-        else:
+def gain_by_minute(states: list[dict[str, Any]], least: float = 0.1) -> list[str]:
+    """Along the best states: when it was reached, by which training, and what each minute before it gained.
+
+    least   a state is told if it is so many dB better than the one told before
+    """
+    lines: list[str] = []
+    before: dict[str, Any] | None = None
+    for row in states:
+        if before is not None and row["psnr_full"] < before["psnr_full"] + least and row is not states[-1]:
+            continue
+        line = (
+            f"after {duration(row['seconds'])}: {row['psnr_full']:.2f} dB ({row['name']}, iteration {row['iteration']})"
+        )
+        if before is not None:
             minutes = (row["seconds"] - before["seconds"]) / 60
-            gain = row["psnr_full"] - before["psnr_full"]
-            lines.append(f"after {duration(row['seconds'])}: {reached}, {gain / max(minutes, 1e-9):.2f} dB a minute")
+            line += f", {(row['psnr_full'] - before['psnr_full']) / max(minutes, 1e-9):.2f} dB a minute"
+        lines.append(line)
         before = row
     return lines
 

@@ -1,0 +1,114 @@
+"""The generated parts of the documentation page: Markdown from the JSON files of docs/results.
+
+The words around them are written by hand and hold no measured number.
+"""
+
+from typing import Any
+
+from endotsr.tradeoff.page import (
+    COLUMNS,
+    advice,
+    certificate_line,
+    eight_bit_setting,
+    front_rows,
+    levels,
+    made,
+    preset_lines,
+)
+from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, training_rows
+
+TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
+
+
+def fragments(
+    result: dict[str, Any], others: dict[str, dict[str, Any]], trainings: dict[str, dict[str, Any]]
+) -> dict[str, str]:
+    """Every generated part by name; a part without its measurement says so.
+
+    result      tradeoff.json of the simulated scene
+    others      the same of trained real scenes, by name
+    trainings   training.json by name
+    """
+    parts = {
+        "advice": _numbered(advice(result)),
+        "made": made(result),
+        "front": table(COLUMNS, front_rows(result)),
+        "presets": _bullets(preset_lines(result)),
+        "certificate": certificate_line(result),
+        "omitted": _bullets([f"{what}: {why}." for what, why in result["omitted"].items()]),
+        "scenes": scenes(result, others),
+        "training": "\n\n".join(training(t) for t in trainings.values()) or "Not measured yet.",
+    }
+    return parts
+
+
+def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The advice of the simulated scene, checked on every other."""
+    columns = (
+        "Scene",
+        "Gaussians",
+        "`paper`: RMS",
+        "`paper`: largest",
+        "8-bit setting: largest",
+        "its visits",
+        "verdict",
+    )
+    rows = [_scene_row(result, result), *(_scene_row(other, result) for other in others.values())]
+    about = [f"`{name}`: {made(other)} {certificate_line(other)}" for name, other in others.items()]
+    return "\n\n".join([table(columns, rows), _bullets(about)]) if others else "Not measured yet."
+
+
+def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
+    by_name = {p["name"]: p for p in scene["points"]}
+    paper = by_name[scene["presets"]["paper"]]
+    advised = eight_bit_setting(simulated)
+    here = by_name.get(advised["name"]) if advised else None
+    row = [scene["scene"]["name"], str(scene["scene"]["gaussians"]), levels(paper["error"]["rms"])]
+    row.append(levels(paper["error"]["max"]))
+    if here is None:
+        return [*row, "-", "-", "no such setting"]
+    ratio = f"{here['visits'] / paper['visits']:.1f}x"
+    return [*row, levels(here["error"]["max"]), ratio, _verdict(scene, paper, here)]
+
+
+def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any]) -> str:
+    """Whether the first two sentences of advice hold on a scene, and if not, what to do there."""
+    wrong = []
+    if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
+        wrong.append("`paper` errs by more than half a step of 8 bit on average")
+    if here["error"]["max"] > scene["lines"]["eight_bit"]:
+        better = eight_bit_setting(scene)
+        instead = f"take {better['name']}" if better else "no float32 setting keeps it"
+        wrong.append(f"the 8-bit setting misses half a step: {instead}")
+    return "holds" if not wrong else "does not hold: " + "; ".join(wrong)
+
+
+def training(result: dict[str, Any]) -> str:
+    """One study of training: what was run, the table, and what each stretch of time bought."""
+    m = result["machine"]
+    head = (
+        f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
+        f"`{result['preset']}` stretched to {result['iterations']} iterations, measured {result['date'][:10]} on "
+        f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
+    )
+    left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
+    bought = gain_by_minute(best_by_time(result))
+    return "\n\n".join(
+        part
+        for part in (head, table(TRAINING_COLUMNS, training_rows(result)), _bullets(bought), _bullets(left))
+        if part
+    )
+
+
+def table(columns: tuple[str, ...], rows: list[list[str]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def _numbered(sentences: list[str]) -> str:
+    return "\n".join(f"{i}. {sentence}" for i, sentence in enumerate(sentences, 1))
+
+
+def _bullets(lines: list[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)

@@ -1,0 +1,105 @@
+"""Pictures whose words can be read, a page that stands alone, and the generated parts of the documentation."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from made_up import moving_scene
+
+from endotsr.bench.page import replaced
+from endotsr.tradeoff.document import fragments
+from endotsr.tradeoff.figures import dials_figure, draw, main_figure
+from endotsr.tradeoff.page import PICTURES, advice, plain, write_page
+from endotsr.tradeoff.study import described, run_study
+
+ROOT = Path(__file__).parents[2]
+COMMITTED = sorted((ROOT / "docs" / "results").glob("tradeoff*.json"))
+
+
+@pytest.fixture(scope="module")
+def result():
+    return described(run_study(moving_scene(count=24, width=24), repeats=1))
+
+
+def overlaps(figure) -> list[tuple[str, str]]:
+    """Pairs of words in one panel that cover each other."""
+    from matplotlib.text import Text
+
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    found = []
+    for axes in figure.axes:
+        boxes = [(t.get_text(), Text.get_window_extent(t, renderer)) for t in axes.texts]
+        found += [(a, b) for i, (a, one) in enumerate(boxes) for b, other in boxes[:i] if one.overlaps(other)]
+    return found
+
+
+def figures(result):
+    if result["joint"]:
+        yield main_figure(result)
+    yield dials_figure(result, "forward")
+    yield dials_figure(result, "visits")
+    yield dials_figure(result, "both", "gradient")
+
+
+def test_no_word_covers_another(result):
+    for figure in figures(result):
+        assert sum(len(axes.texts) for axes in figure.axes) > 10
+        assert overlaps(figure) == []
+
+
+@pytest.mark.parametrize("file", COMMITTED, ids=lambda file: file.stem)
+def test_no_word_covers_another_in_the_committed_pictures(file):
+    committed = json.loads(file.read_text(encoding="utf-8"))
+    if "points" in committed:
+        assert all(overlaps(figure) == [] for figure in figures(committed))
+
+
+def test_the_page_stands_alone(result, tmp_path):
+    stems = draw(result, tmp_path)
+    assert stems == [f"tradeoff{ending}" for ending in PICTURES]
+    for stem in stems:
+        assert (tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG"
+        assert "<svg" in (tmp_path / f"{stem}.svg").read_text()
+    text = write_page(result, tmp_path).read_text(encoding="utf-8")
+    assert text.count("data:image/png;base64,") == len(stems)
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert all(plain(sentence) in text for sentence in advice(result))
+
+
+def test_equal_results_give_equal_pictures(result, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        draw(result, tmp_path / name)
+    for file in (tmp_path / "a").iterdir():
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes(), file.name
+
+
+def test_three_sentences_with_the_figures_of_the_measurement(result):
+    sentences = advice(result)
+    assert len(sentences) == 3 and all(s.endswith(".") for s in sentences)
+    paper = next(p for p in result["points"] if p["name"] == "paper")
+    assert f"{paper['error']['max'] * 255:.2g}/255 at the worst pixel" in sentences[0]
+
+
+def test_every_mark_of_the_documentation_is_filled(result):
+    page = ROOT / "docs" / "accuracy_against_time.md"
+    text = page.read_text(encoding="utf-8")
+    made = fragments(result, {"other": result}, {})
+    assert set(re.findall(r"<!-- tradeoff:(\w+):start -->", text)) == set(made)
+    filled = replaced(text, made, page, "tradeoff")
+    assert made["advice"] in filled and made["scenes"] in filled
+    assert replaced(filled, made, page, "tradeoff") == filled
+
+
+def test_a_scene_on_which_the_advice_fails_is_named(result):
+    other = json.loads(json.dumps(result))
+    advised = next(p for p in other["points"] if p["name"].startswith("float32, cutoff 1e-4, stop"))
+    for p in other["points"]:
+        if p["name"].startswith("float32") and p["setting"]["raster"]["alpha_cutoff"] >= 1e-4:
+            p["error"]["max"] = 0.5
+    assert advised["error"]["max"] == 0.5
+    made = fragments(result, {"other": other}, {})["scenes"]
+    rows = [line for line in made.splitlines() if line.startswith("| made up")]
+    assert rows[0].endswith("holds |") and "does not hold" in rows[1]
