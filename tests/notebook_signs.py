@@ -8,6 +8,7 @@ import ast
 import contextlib
 import io
 import os
+import random
 import re
 import sys
 import time
@@ -84,6 +85,17 @@ def notebook_fails(file: Path) -> bool:
     cells = [body for _, body in code_cells(file)]
     lean = [body for body, keep, draw in zip(cells, *parts(file)) if keep and not draw]
     return fails(lean) or fails(cells)
+
+
+def a_flip_is_noticed(file: Path, seed: int = 0) -> tuple[bool, str]:
+    """One sign of the transcriptions, the same each time: (was its flip noticed, its line)."""
+    cells = code_cells(file)
+    places = [(k, place) for k, (formula, body) in enumerate(cells) if formula for place in signs_of(body)]
+    number, place = random.Random(f"{file.stem} {seed}").choice(places)
+    source, line = flipped(cells[number][1], place)
+    kept, draws = parts(file)
+    changed = [source if k == number else body for k, (_, body) in enumerate(cells)]
+    return fails([text for text, keep, draw in zip(changed, kept, draws) if keep and not draw]), line
 
 
 def survivors(file: Path) -> tuple[int, list[str]]:

@@ -3,14 +3,19 @@
 import os
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+import notebook_signs
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
+WITHOUT_DERIVATIVE = {"16_accuracy_against_time"}  # measures what the others derive
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
 
 
@@ -57,6 +62,33 @@ def test_notebook_is_one_for_jupyter(file):
     assert len(answers) == 1, "one exercise with a hidden answer"
     assert all(cell.metadata["jupyter"]["source_hidden"] for cell in answers)
     assert any("transcription" in cell.metadata.get("tags", []) for cell in book.cells)
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_notebook_has_all_its_parts(file):
+    text = file.read_text(encoding="utf-8")
+    assert "plt.show()" in text, "a picture"
+    assert "\n# ## Exercise\n" in text
+    assert re.search(r"^\s*(?:assert |np\.testing\.assert)", text, re.MULTILINE), "an assertion"
+    if file.stem not in WITHOUT_DERIVATIVE:
+        assert "\n# ## The reverse pass" in text, "its derivation, or why there is none"
+        assert re.search(r"print\(table\(", text), "the table of the gradient check"
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS[:12], ids=lambda file: file.stem)
+def test_a_flipped_sign_of_a_transcription_is_noticed(file):
+    """One sign a notebook; all of them: python tests/notebook_signs.py."""
+    noticed, line = notebook_signs.a_flip_is_noticed(file)
+    assert noticed, f"with the sign flipped, nothing failed: {line}"
+
+
+@pytest.mark.timeout(300)
+def test_a_flipped_sign_of_a_kernel_is_noticed():
+    """A few signs of the package; all of them: python tests/kernel_signs.py."""
+    command = [sys.executable, str(ROOT / "tests" / "kernel_signs.py"), "--sample", "3"]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert answer.stdout.count("noticed ") == 3
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
