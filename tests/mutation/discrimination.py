@@ -1,6 +1,7 @@
 """Put every mutant of every kernel to every suite and write docs/results/discrimination.json.
 
-    python tests/mutation/discrimination.py [--jobs 2] [--only losses.similarity] [--sample 20] [--keep FOLDER]
+    python tests/mutation/discrimination.py [--jobs 2] [--only losses.similarity] [--sample 20] [--minutes 30]
+                                            [--keep FOLDER]
 
 --only    kernels whose name starts so; may be given several times
 --sample  at most so many mutants of a kernel, evenly spread
@@ -10,12 +11,11 @@ The page docs/discrimination.md is made from the result by tests/mutation/page.p
 import argparse
 import json
 import os
-import pickle
 import subprocess
 import sys
-import tempfile
 import time
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -26,91 +26,17 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import pytest  # noqa: E402
 
-from endotsr.checking import all_pairs  # noqa: E402
-from endotsr.conformance.store import golden_folder, read_golden  # noqa: E402
-from endotsr.jit import kernel_source_hash  # noqa: E402
 from endotsr.runs import machine, now, versions  # noqa: E402
-from mutation.checks import SLOW, SUITES, Check, forward_only, of_case, of_item, of_pair, run, surveyed  # noqa: E402
-from mutation.kernels import clear_caches, kernels, planted  # noqa: E402
+from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
+from mutation.kernels import kernels, planted  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
+from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "hard", "properties", "checking/test_ranges.py")
 FIRST = 2.0  # s of checks of one suite
 LATER = 30.0  # s of further checks for a mutant that no suite has noticed by then
-
-
-def recorded_pairs(keep: Path | None) -> dict[str, Any]:
-    """Finite differences of the right kernels, taken in a process where they are compiled."""
-    with tempfile.TemporaryDirectory() as folder:
-        target = (keep or Path(folder)) / f"recorded-{kernel_source_hash()}.pickle"
-        if not target.is_file():
-            environment = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-            subprocess.run([sys.executable, ROOT / "tests/mutation/recording.py", target], env=environment, check=True)
-        return pickle.loads(target.read_bytes())
-
-
-class Survey:
-    """Time and kernels of the checks, kept in a file so that a second run need not measure them again."""
-
-    def __init__(self, keep: Path | None):
-        path = self.path = keep / f"survey-{kernel_source_hash()}.json" if keep else None
-        self.known: dict[str, Any] = json.loads(path.read_text()) if path and path.is_file() else {}
-        self.written = time.monotonic()
-
-    def of(self, check: Check, codes: dict) -> Check | str:
-        if check.name not in self.known:
-            found = surveyed(check, codes)
-            done = found if isinstance(found, str) else [found.seconds, sorted(found.kernels)]
-            self.known[check.name] = done
-            if time.monotonic() > self.written + 20:
-                self.write()
-        done = self.known[check.name]
-        return done if isinstance(done, str) else check._replace(seconds=done[0], kernels=frozenset(done[1]))
-
-    def write(self) -> None:
-        if self.path:
-            self.path.write_text(json.dumps(self.known))
-        self.written = time.monotonic()
-
-
-class Checks:
-    """All checks by the kernel they run, the best first."""
-
-    def __init__(self, items: list, keep: Path | None, say):
-        codes = {function.__code__: name for name, function in (kernels() | planted()).items()}
-        self.left_out: dict[str, str] = {}
-        self.all: list[Check] = []
-        recorded, golden = recorded_pairs(keep), read_golden(golden_folder())
-        say("finite differences taken")
-        for pair in all_pairs().values():
-            forward = surveyed(forward_only(pair, recorded[pair.name]), codes, 30.0)
-            reverse, differentiate = of_pair(pair, recorded[pair.name])
-            whole = surveyed(reverse, codes, 30.0)
-            assert isinstance(forward, Check) and isinstance(whole, Check), (pair.name, forward, whole)
-            self.all.append(whole._replace(kernels=whole.kernels - forward.kernels))
-            self.all.append(differentiate._replace(kernels=forward.kernels, seconds=20 * forward.seconds))
-        candidates = [c for case in golden.cases for c in of_case(golden, case)] + [of_item(i) for i in items]
-        known = Survey(keep)
-        for check in candidates:
-            found = known.of(check, codes)
-            if isinstance(found, str):
-                self.left_out[check.name] = found
-            else:
-                self.all.append(found)
-        known.write()
-        clear_caches()
-        say(f"{len(self.all)} checks, {len(self.left_out)} left out")
-        self.kills: dict[tuple[str, str], int] = {}
-
-    def of(self, kernel: str, suite: str) -> list[Check]:
-        found = [c for c in self.all if c.suite == suite and kernel in c.kernels]
-        return sorted(found, key=lambda c: (c.seconds + 1e-3) / (1 + self.kills.get((kernel, c.name), 0)))
-
-    def learn(self, kernel: str, outcome: Outcome) -> None:
-        for name in filter(None, outcome.killed.values()):
-            self.kills[kernel, name] = self.kills.get((kernel, name), 0) + 1
 
 
 def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
@@ -163,7 +89,8 @@ class Plugin:
         functions = kernels() | planted()
         wanted = [k for k in kernels() if not self.options.only or k.startswith(tuple(self.options.only))]
         chosen = [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
-        chosen += [m for k in wanted for m in every(mutants(k, functions[k]), self.options.sample)]
+        groups = [every(mutants(k, functions[k]), self.options.sample) for k in wanted]
+        chosen += [m for row in zip_longest(*groups) for m in row if m is not None]  # so that a stop is fair to all
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
         checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
@@ -173,8 +100,11 @@ class Plugin:
             checks.learn(mutant.kernel, outcome)
             if not any(outcome.killed.values()):
                 self.say(f"survivor: {mutant.name}")
-            if len(outcomes) % 200 == 0:
+            if len(outcomes) % 100 == 0:
                 self.say(f"{len(outcomes)} of {len(chosen)}")
+            if self.options.minutes and time.monotonic() - self.begin > 60 * self.options.minutes:
+                break
+        chosen = [m for m in chosen if m.name in outcomes]
         alarms = self.false_alarms(outcomes, checks)
         outcomes = {name: _without(outcome, alarms) for name, outcome in outcomes.items()}
         self.result = self.report(chosen, outcomes, checks) | {"false_alarms": sorted(alarms)}
@@ -201,8 +131,8 @@ class Plugin:
         commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
         about = {
             "commit": commit.stdout.strip(), "started": now(), "seconds": round(time.monotonic() - self.begin),
-            "jobs": self.options.jobs, "sample": self.options.sample, "slow": SLOW, "machine": machine(),
-            "versions": versions(),
+            "jobs": self.options.jobs, "sample": self.options.sample, "minutes": self.options.minutes, "slow": SLOW,
+            "machine": machine(), "versions": versions(),
         }  # fmt: skip
         names = [c.name for c in checks.all]
         return {
@@ -238,6 +168,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder that keeps what was measured with the right kernels")
+    parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long, 0 = never")
     parser.add_argument("--tests", nargs="+", default=FOLDERS, help="folders and files of tests")
     parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
     options = parser.parse_args(words)

@@ -86,6 +86,7 @@ def page(result: dict[str, Any]) -> str:
     suites, found, run = result["suites"], rows(result), result["run"]
     alive = [r for r in found if not r.suites and not r.equivalent]
     sample = f", at most {run['sample']} a function, evenly spread over its source" if run["sample"] else ""
+    sample += f", as many as {run['minutes']:g} minutes allow" if run["minutes"] else ""
     machine = run["machine"]
     lines = [
         "# What the tests can tell apart",

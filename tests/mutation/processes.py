@@ -79,8 +79,13 @@ def in_processes(queue: list[tuple[Mutant, Callable[[], Outcome]]], jobs: int) -
     """Work through the queue, so many at a time, in the order in which they end."""
     children: list[Child] = []
     waiting = list(reversed(queue))
-    while waiting or children:
-        while waiting and len(children) < jobs:
-            children.append(start(*waiting.pop()))
-        for child, outcome in finished(children, LONGEST):
-            yield child.mutant, outcome
+    try:
+        while waiting or children:
+            while waiting and len(children) < jobs:
+                children.append(start(*waiting.pop()))
+            for child, outcome in finished(children, LONGEST):
+                yield child.mutant, outcome
+    finally:  # the caller may stop early
+        for child in children:
+            os.kill(child.pid, 9)
+            os.waitpid(child.pid, 0)
