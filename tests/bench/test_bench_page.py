@@ -9,6 +9,7 @@ import pytest
 from endotsr.bench import charts, page, peers, scaling, start, suite, trained
 from endotsr.bench.case import Case, measure
 from endotsr.bench.limits import limits
+from endotsr.bench.page_parts import MAIN
 from endotsr.bench.stages import grid, ns_per_pair
 from endotsr.cli import main
 from endotsr.commands.bench_options import StagesOptions
@@ -30,7 +31,9 @@ def results():
     measured = [measure(case) for case in small]
     for result in measured:
         result |= {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)}
-    axis = scaling.axes(1000)["gaussians"]
+    for result, precision in zip(measured, ("float32", "float64")):  # the two that the targets speak of
+        result["case"] = result["case"] | MAIN | {"precision": precision}
+    axis = scaling.axes(1000)["gaussians"]._replace(along=lambda result: float(result["view"]["visible"]))
     grown = {"gaussians": scaling.summary(axis, measured)}
     spread = {"median_ms": 2.0, "quartiles_ms": [1.0, 3.0]}
     compared = {
@@ -89,6 +92,13 @@ def test_page_names_what_is_missing(folder, capsys):
     (folder / suite.PEERS_FILE).unlink()
     assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 2
     assert "endotsr bench all" in capsys.readouterr().err
+
+
+def test_page_refuses_results_of_other_sizes(results):
+    found = {name: suite.dated(results[file]) for name, file in page.FILES.items()}
+    found["stages"] = found["stages"] | {"cases": found["stages"]["cases"][1:]}
+    with pytest.raises(InputError, match="no case with"):
+        page.fragments(found, {})
 
 
 def test_pictures_are_drawn(results, tmp_path):

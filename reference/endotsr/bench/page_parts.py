@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from endotsr.bench import peers as peer_results
 from endotsr.bench.clock import REST
 from endotsr.bench.stages import memory
+from endotsr.errors import InputError
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of
@@ -187,13 +188,14 @@ def peers(found: Result) -> str:
         blocks.append([*size, *(f"{error:.1e}" for error in case["errors"].values())])
     first = found["cases"][0]
     head = ["Gaussians", "precision", "endotsr, ms", "gsplat, ms", "its pair lists, ms", "ratio", "largest error"]
-    about = f"gsplat {first['versions']['gsplat']}, torch {first['versions']['torch']}, {first['threads']} threads."
+    versions = f"gsplat {first['versions']['gsplat']}, torch {first['versions']['torch']}"
+    about = f"Measured on {found['date'][:10]} with {versions}, {first['threads']} threads."
     names = [name.replace("_", " ") for name in first["errors"]]
     return f"{table(head, rows)}\n\n{about}\n\n{table(['Gaussians', 'precision', *names], blocks)}"
 
 
 def start(found: Result) -> str:
-    """Cold and warm start by moment."""
+    """Cold start, and the median of the warm ones, by moment."""
     rows = [[moment, f"{found['cold'][moment]:.1f}", f"{found['warm'][moment]:.1f}"] for moment in found["cold"]]
     return table(["seconds from the call to", "cold", "warm"], rows)
 
@@ -216,8 +218,11 @@ def main_case(found: Result) -> Result:
 
 
 def find(results: Sequence[Result], wanted: Mapping[str, Any]) -> Result:
-    """The result whose case has these values; the first result if there is none (a quick run of other sizes)."""
-    return next((r for r in results if all(r["case"][key] == value for key, value in wanted.items())), results[0])
+    """The result whose case has these values. Raises: InputError if there is none: a page of other sizes would lie."""
+    for result in results:
+        if all(result["case"][key] == value for key, value in wanted.items()):
+            return result
+    raise InputError(f"the stages hold no case with {dict(wanted)}; measure it with `endotsr bench all`")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
