@@ -11,6 +11,7 @@ import hashlib
 import importlib
 import importlib.util
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -108,6 +109,7 @@ def noticed(module: str, source: str) -> bool:
     load_package()
     child = os.fork()
     if child == 0:
+        signal.alarm(300)  # a loop that never ends is noticed too
         sys.stdout = sys.stderr = open(os.devnull, "w")
         try:
             load_changed(module, source)

@@ -62,7 +62,10 @@ def field_comments(dotted: str) -> list[str]:
     node = next((n for n in ast.parse(text).body if isinstance(n, ast.ClassDef) and n.name == name), None)
     body = node.body if node else []  # a name for a type is no class of its own
     fields = [n for n in body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
-    comments = [(ast.unparse(n.target), text.splitlines()[n.end_lineno - 1].partition("#")[2].strip()) for n in fields]
+    comments = [
+        (ast.unparse(n.target), text.splitlines()[(n.end_lineno or n.lineno) - 1].partition("#")[2].strip())
+        for n in fields
+    ]
     return [f"{field}  {comment}" for field, comment in comments if comment]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 pytest.importorskip("sphinx")
-from docstring_layout import INLINE, NOTE, blocks, grouped
+from docstring_layout import INLINE, NOTE, blocks, grouped  # pyright: ignore[reportMissingImports]
 
 from endotsr.equations.matern import matern_weights
 from endotsr.evaluation.metrics import psnr

@@ -3,8 +3,8 @@
 from importlib import import_module
 
 import pytest
-from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_derivation, names_of_tests
-from package_names import NOTEBOOKS, ROOT, definitions, equation_pages, linkable
+from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_derivation, names_of_tests  # pyright: ignore[reportMissingImports]
+from package_names import NOTEBOOKS, ROOT, definitions, equation_pages, linkable  # pyright: ignore[reportMissingImports]
 
 from endotsr.checking import all_pairs
 
