@@ -136,6 +136,16 @@ def test_peaks_are_positive_numbers():
     assert peaks.fma_peak("float32", repeats=1) > 0
 
 
+def test_higher_peaks_are_kept():
+    other = {"flop_per_second": {"float32": 2e11, "float64": 1e10}, "bytes_per_second": {"triad": 5e9, "update": 3e10}}
+    kept = peaks.higher(PEAKS | {"threads": 2}, other)
+    assert kept == {
+        "threads": 2,
+        "flop_per_second": {"float32": 2e11, "float64": 5e10},
+        "bytes_per_second": {"triad": 1e10, "update": 3e10},
+    }
+
+
 def test_memory_kernels_do_what_they_say():
     out, left, right = np.full(5, 2.0), np.arange(5.0), np.arange(5.0) + 1
     peaks._triad(0, 1, out, left, right, 0.5)

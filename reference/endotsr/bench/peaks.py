@@ -90,7 +90,13 @@ def bandwidths(repeats: int = 7, array_bytes: int = TRIAD_BYTES) -> dict[str, fl
 
 
 def measure_peaks(threads: int) -> dict[str, Any]:
-    """Peaks with `threads` threads: "fma_per_precision" in FLOP/s, "bandwidth" in bytes/s. The best of the repeats."""
-    numba.set_num_threads(threads)
+    """{"threads", "flop_per_second" {precision}, "bytes_per_second" {kernel}}: the best of the repeats."""
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     fma = {precision: fma_peak(precision) for precision in ("float32", "float64")}
     return {"threads": threads, "flop_per_second": fma, "bytes_per_second": bandwidths()}
+
+
+def higher(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """The higher of two measurements of each peak."""
+    rates = ("flop_per_second", "bytes_per_second")
+    return first | {kind: {name: max(v, second[kind][name]) for name, v in first[kind].items()} for kind in rates}
