@@ -17,15 +17,16 @@ def joined(one: Scene, two: Scene) -> Scene:
     return Scene(*(None if a is None else np.concatenate([a, b], axis=-1) for a, b in zip(one, two)))
 
 
-def single(z: float, dtype, logit: float = 1.0, log_scale: float = -1.0) -> Scene:
-    """One Gaussian on the axis of CAMERA."""
-    parts = ([[0.0], [0.0], [z]], [[1.0], [0.0], [0.0], [0.0]], [[log_scale]] * 3, [logit], [[[1.0]] * 3])
+def single(z: float, dtype, logit: float = 1.0, log_scale: float = -1.0, x: float = 0.0) -> Scene:
+    """One Gaussian, on the axis of CAMERA where x is 0."""
+    parts = ([[x], [0.0], [z]], [[1.0], [0.0], [0.0], [0.0]], [[log_scale]] * 3, [logit], [[[1.0]] * 3])
     return Scene(*(np.array(a, dtype) for a in parts))
 
 
 @given(scenes(), RASTER)
 @example(single(float(np.nextafter(0.2, 1)), np.float32, 800.0), ("rows", PAPER))
 @example(single(1.0, np.float32, log_scale=12.0), ("definition", LEGACY))  # det^2 of conic_epsilon was infinite
+@example(single(1.0, np.float32, x=1e15), ("rows", PAPER))  # a centre that no pixel index can hold
 def test_finite_scenes_give_finite_images_and_gradients(scene, how):
     path, settings = how
     assert_finite(*run(scene, CAMERA, settings, path, background=BACKGROUND))

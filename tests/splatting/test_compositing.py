@@ -193,6 +193,18 @@ def test_hard_A2_the_error_shrinks_with_the_stop_and_is_bounded_by_it():
         assert errors[-1] <= 1e-7 and errors[0] >= errors[2]
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_hard_A2_a_tile_in_which_every_pixel_has_stopped_is_left(dtype):
+    """80 opaque splats over the whole image: two are blended, the others have gradient 0 and change nothing."""
+    camera = plain_camera(9, 5, 10.0)
+    scene = as_dtype(screen_scene(camera, 4.5, 2.5, 2.0 + np.arange(80), 1e4, 0.98, ONE_COLOUR), dtype)
+    for path in ("definition", "rows"):
+        images, gradients = run(scene, camera, PAPER, path, background=BACKGROUND)
+        wanted = (1 - 0.02**2) * ONE_COLOUR + 0.02**2 * BACKGROUND
+        np.testing.assert_allclose(images["colour"], np.broadcast_to(wanted[:, None, None], (3, 5, 9)), rtol=1e-5)
+        assert gradients["harmonics"][..., :2].all() and not gradients["harmonics"][..., 2:].any()
+
+
 @pytest.mark.parametrize("path", ["definition", "rows"])
 def test_hard_A3_the_jump_at_the_cutoff_is_alpha_times_the_difference(path):
     settings = PAPER
