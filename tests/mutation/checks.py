@@ -54,7 +54,7 @@ def limited(seconds: float) -> Iterator[None]:
         raise OutOfTime
 
     before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 0.5)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 5.0)  # again, should the first be swallowed
     try:
         yield
     finally:

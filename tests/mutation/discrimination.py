@@ -35,7 +35,7 @@ from mutation.registry import DEFECT, defect_mutants  # noqa: E402
 from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "hard", "properties", "checking/test_ranges.py")
-FIRST = 2.0  # s of checks of one suite
+FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
 LATER = 30.0  # s of further checks for a mutant that no suite has noticed by then
 
 
@@ -48,7 +48,7 @@ def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
         for suite in SUITES:
             spent = 0.0
             for check in checks.of(mutant.kernel, suite):
-                if spent > FIRST:
+                if spent > FIRST.get(suite, 1.0):
                     later.append((suite, check))
                     continue
                 spent += check.seconds
