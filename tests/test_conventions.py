@@ -15,7 +15,9 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
-PEERS = [PACKAGE / "bench" / "peer_gsplat.py"]  # runs another program beside ours, and is never needed
+PEERS = [
+    PACKAGE / "bench" / name for name in ("peer_gsplat.py", "peers.py")
+]  # another program beside ours, never needed
 
 # Forward functions whose check runs under the name of another pair, and why.
 ALIASES: dict[str, str] = {}
