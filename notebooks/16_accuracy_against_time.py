@@ -110,7 +110,8 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 # ## How large the error can be, and how the work grows
 #
 # At a pixel, what is skipped are many Gaussians, each with $\alpha<\alpha_{\mathrm{cut}}$. In front of an opaque scene only a few of them
-# lie on the rim of their ellipse at one pixel, so the sum stays within a few times $\alpha_{\mathrm{cut}}$: five, in every scene we measured.
+# lie on the rim of their ellipse at one pixel, so the sum stays within a few times $\alpha_{\mathrm{cut}}$: five, on a surface. Where hundreds
+# of faint Gaussians overlap it is more.
 #
 # $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels: the visits
 # grow with the **logarithm** of the accuracy. A thousand times the accuracy costs the same number of visits again and again.

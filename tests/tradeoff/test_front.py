@@ -59,7 +59,7 @@ def test_a_worse_preset_is_found(result):
 
 @pytest.mark.parametrize("file", sorted(RESULTS.glob("tradeoff*.json")), ids=lambda file: file.stem)
 def test_committed_measurements(file):
-    """Certified, no preset dominated without a reason, and the law of the cutoff."""
+    """Certified, no preset dominated without a reason, and on the simulated scene the law of the cutoff."""
     result = json.loads(file.read_text(encoding="utf-8"))
     if "points" not in result:
         pytest.skip("a study of training")
@@ -69,7 +69,7 @@ def test_committed_measurements(file):
     by_name = {p["name"]: p for p in result["points"]}
     for dial in result["dials"]:
         for point in (by_name[name] for name in dial["points"].values()):
-            if dial["name"] == "cutoff":
+            if dial["name"] == "cutoff" and result["scene"]["name"] == "simulated":
                 assert point["error"]["max"] <= 5 * point["setting"]["raster"]["alpha_cutoff"]
     page = (RESULTS.parent / "accuracy_against_time.md").read_text(encoding="utf-8")
     assert all(reason in page for reason in KEPT.values())

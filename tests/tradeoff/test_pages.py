@@ -10,7 +10,8 @@ from made_up import moving_scene
 from endotsr.bench.page import replaced
 from endotsr.tradeoff.document import fragments
 from endotsr.tradeoff.figures import dials_figure, draw, main_figure
-from endotsr.tradeoff.page import PICTURES, advice, plain, write_page
+from endotsr.tradeoff.page import PICTURES, advice, error_over_cutoff, plain, write_page
+from endotsr.tradeoff.settings import CUTOFFS
 from endotsr.tradeoff.study import described, run_study
 
 ROOT = Path(__file__).parents[2]
@@ -103,3 +104,10 @@ def test_a_scene_on_which_the_advice_fails_is_named(result):
     made = fragments(result, {"other": other}, {})["scenes"]
     rows = [line for line in made.splitlines() if line.startswith("| made up")]
     assert rows[0].endswith("holds |") and "does not hold" in rows[1]
+
+
+def test_the_factor_of_the_cutoff_is_the_largest_of_the_sweep(result):
+    """And not that of a point where the stop decides."""
+    by_name = {p["name"]: p for p in result["points"]}
+    ratios = [by_name[f"float64, cutoff {name}, stop 1e-6"]["error"]["max"] / value for name, value in CUTOFFS.items()]
+    assert error_over_cutoff(result) == pytest.approx(max(ratios)) and max(ratios) <= 5

@@ -10,6 +10,8 @@ from endotsr.tradeoff.page import (
     advice,
     certificate_line,
     eight_bit_setting,
+    error_over_cutoff,
+    float32_floor,
     front_rows,
     levels,
     made,
@@ -37,7 +39,7 @@ def fragments(
         "certificate": certificate_line(result),
         "omitted": _bullets([f"{what}: {why}." for what, why in result["omitted"].items()]),
         "scenes": scenes(result, others),
-        "training": "\n\n".join(training(t) for t in trainings.values()) or "Not measured yet.",
+        "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
     }
     return parts
 
@@ -64,7 +66,7 @@ def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
     advised = eight_bit_setting(simulated)
     here = by_name.get(advised["name"]) if advised else None
     row = [scene["scene"]["name"], str(scene["scene"]["gaussians"]), levels(paper["error"]["rms"])]
-    row.append(levels(paper["error"]["max"]))
+    row += [levels(paper["error"]["max"]), f"{error_over_cutoff(scene):.1f}", levels(float32_floor(scene))]
     if here is None:
         return [*row, "-", "-", "no such setting"]
     ratio = f"{here['visits'] / paper['visits']:.1f}x"
@@ -83,8 +85,8 @@ def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any])
     return "holds" if not wrong else "does not hold: " + "; ".join(wrong)
 
 
-def training(result: dict[str, Any]) -> str:
-    """One study of training: what was run, the table, and what each stretch of time bought."""
+def training(name: str, result: dict[str, Any]) -> str:
+    """One study of training: what was run, its pictures, the table, and what each stretch of time bought."""
     m = result["machine"]
     head = (
         f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
@@ -92,10 +94,23 @@ def training(result: dict[str, Any]) -> str:
         f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
     )
     left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
+    stem = f"results/tradeoff_training_{name}"
+    pictures = [
+        f"![Held-out PSNR against minutes of training]({stem}.svg)",
+        f"![All metrics against minutes of training]({stem}_seconds.svg)",
+        f"![All metrics against iterations]({stem}_iterations.svg)",
+    ]
     bought = gain_by_minute(best_by_time(result))
     return "\n\n".join(
         part
-        for part in (head, table(TRAINING_COLUMNS, training_rows(result)), _bullets(bought), _bullets(left))
+        for part in (
+            head,
+            pictures[0],
+            table(TRAINING_COLUMNS, training_rows(result)),
+            _bullets(bought),
+            _bullets(left),
+            *pictures[1:],
+        )
         if part
     )
 

@@ -43,11 +43,11 @@ def advice(result: dict[str, Any]) -> list[str]:
             f"and the stop to {raster['transmittance_stop']:.2g}, in float32: {chosen['visits'] / paper['visits']:.1f} "
             f"times the visits of `paper`, and a largest error of {levels(chosen['error']['max'])}."
         )
-    finest = min(_joint(result, "float32"), key=lambda p: p["error"]["max"], default=None)
-    if finest is not None:
+    if result["joint"]:
         sentences.append(
-            f"Below a largest error of {levels(finest['error']['max'])} float32 ends and float64 begins, whose error "
-            "falls with the cutoff, at most five times it; `exact` is for certifying, never for work."
+            f"Below a largest error of {levels(float32_floor(result))} float32 ends and float64 begins, whose error "
+            f"falls with the cutoff, here at most {error_over_cutoff(result):.1f} times it; `exact` is for certifying, "
+            "never for work."
         )
     return sentences
 
@@ -56,6 +56,17 @@ def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
     """The cheapest float32 setting of the sweep whose largest error is below half a step of 8 bit."""
     kept = [p for p in _joint(result, "float32") if p["error"]["max"] <= result["lines"]["eight_bit"]]
     return min(kept, key=lambda p: (p["visits"], p["error"]["max"]), default=None)
+
+
+def error_over_cutoff(result: dict[str, Any]) -> float:
+    """Largest error over the cutoff, in float64, where the cutoff alone decides (the tightest stop of the sweep)."""
+    points = [p for p in _joint(result, "float64") if p["setting"]["raster"]["transmittance_stop"] <= 1e-6]
+    return max((p["error"]["max"] / p["setting"]["raster"]["alpha_cutoff"] for p in points), default=float("nan"))
+
+
+def float32_floor(result: dict[str, Any]) -> float:
+    """The smallest largest error of the sweep in float32."""
+    return min((p["error"]["max"] for p in _joint(result, "float32")), default=float("nan"))
 
 
 def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:
