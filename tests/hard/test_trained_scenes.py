@@ -56,7 +56,7 @@ def gradients_of_the_losses(images, dtype):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("preset", list(PRESETS))
 def test_trained_scene_is_finite_from_losses_to_parameters(preset, dtype, name):
-    scene, camera = trained_scene(name, 200 if preset == "exact" else 16, dtype)
+    scene, camera = trained_scene(name, 64 if preset == "exact" else 16, dtype)
     assert np.exp(np.ptp(scene.log_scale.astype(np.float64), axis=0)).max() > 1000
     for path in ("definition", "rows") if preset == "paper" else ("definition",):
         images, _ = run(scene, camera, PRESETS[preset], path)
