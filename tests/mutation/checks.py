@@ -28,7 +28,7 @@ from endotsr.conformance.store import Golden
 from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")
-SLOW = 0.5  # s of processor time; a check that takes longer without the compiler is left out
+SLOW = 1.0  # s of processor time; a check that takes longer without the compiler is left out
 BLOCKS = 0.03  # s; a forward pass as quick as this is also differentiated block by block
 
 

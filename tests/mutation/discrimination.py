@@ -28,6 +28,7 @@ import pytest  # noqa: E402
 
 from endotsr.runs import machine, now, versions  # noqa: E402
 from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
+from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
@@ -36,7 +37,7 @@ from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "hard", "properties", "checking/test_ranges.py")
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
-LATER = 30.0  # s of further checks for a mutant that no suite has noticed by then
+LATER = 30.0  # s of further checks for a mutant that no suite has noticed and that is not listed as equivalent
 
 
 def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
@@ -55,7 +56,7 @@ def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
                 if run(check, 2 + 10 * check.seconds, facts):
                     killed[suite] = check.name
                     break
-        if not any(killed.values()):
+        if not any(killed.values()) and mutant.name not in reasons():
             spent = 0.0
             for suite, check in later:
                 spent += check.seconds
