@@ -1,7 +1,7 @@
 """What this machine can do at most: fused multiply-adds per second, and bytes to and from memory per second.
 
-Measured, not looked up, because a virtual machine gets what its host leaves. A stage of the training is then compared
-with these peaks (see `endotsr.bench.limits`).
+Measured, not looked up, because a virtual machine gets what its host leaves; contracted like the fast path. A stage of
+the training is then compared with these peaks (see `endotsr.bench.limits`).
 """
 
 from typing import Any
