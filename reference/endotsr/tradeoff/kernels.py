@@ -1,7 +1,7 @@
 """Variants of the compositing kernels that exist for this study alone: other exponentials, other tiles.
 
 A variant is the body of the package's kernel, compiled anew with a few of its names bound to other things, so that
-nothing is written twice.
+nothing is written twice. Those of the fast path are compiled as the fast path is, with contraction.
 """
 
 import contextlib
