@@ -131,7 +131,7 @@ class Plugin:
                 by_kernel.setdefault(mutant.kernel, {})[mutant.name] = [mutant.kind, found, change]
         commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
         about = {
-            "commit": commit.stdout.strip(), "started": now(), "seconds": round(time.monotonic() - self.begin),
+            "commit": commit.stdout.strip(), "finished": now(), "seconds": round(time.monotonic() - self.begin),
             "jobs": self.options.jobs, "sample": self.options.sample, "minutes": self.options.minutes, "slow": SLOW,
             "machine": machine(), "versions": versions(),
         }  # fmt: skip

@@ -104,12 +104,14 @@ def page(result: dict[str, Any]) -> str:
         "- `hard`: the tests named after the catalogue of hard cases.",
         "- `properties`: all other tests of the numerical modules.",
         "",
-        f"{run['started'][:10]}, revision {run['commit']}; {len(found)} mutants of {len(result['kernels'])} functions"
+        f"{run['finished'][:10]}, revision {run['commit']}; {len(found)} mutants of {len(result['kernels'])} functions"
         f"{sample}; {run['seconds'] / 60:.0f} minutes with {run['jobs']} process(es) on {machine['processor']} "
         f"({machine['cores']} cores). Made by `python tests/mutation/discrimination.py"
-        f"{' --sample ' + str(run['sample']) if run['sample'] else ''}`. The kernels run as plain Python here; checks "
-        f"that take longer than {run['slow']:g} s that way are left out ({len(result['left_out'])} of "
-        f"{len(result['left_out']) + len(result['checks'])}), so a suite may notice more than is counted.",
+        f"{' --sample ' + str(run['sample']) if run['sample'] else ''}"
+        f"{' --minutes ' + format(run['minutes'], 'g') if run['minutes'] else ''}`. "
+        f"The kernels run as plain Python here; checks that take longer than {run['slow']:g} s that way are left out "
+        f"({len(result['left_out'])} of {len(result['left_out']) + len(result['checks'])}), so a suite may notice more "
+        f"than is counted.",
         "",
         "## Summary",
         "",

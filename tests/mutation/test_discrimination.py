@@ -1,0 +1,55 @@
+"""The report on mutants fits today's source, and what it says was noticed still is."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutation.equivalents import EQUIVALENT
+from mutation.kernels import kernels, planted
+from mutation.mutator import mutants
+from mutation.page import PAGE, RESULT, page, rows
+from mutation.registry import DEFECTS, defect_mutants
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def result():
+    return json.loads(RESULT.read_text(encoding="utf-8"))
+
+
+def test_every_equivalent_mutant_is_one_of_todays_source():
+    listed = [name for group in EQUIVALENT for name in group.names]
+    assert len(set(listed)) == len(listed)
+    functions = kernels()
+    named = {name.split(":", 1)[0] for name in listed}
+    assert named <= functions.keys()
+    today = {m.name for kernel in named for m in mutants(kernel, functions[kernel])}
+    assert not set(listed) - today
+    assert all(group.reason and group.names for group in EQUIVALENT)
+
+
+def test_no_mutant_that_is_called_equivalent_was_noticed(result):
+    assert not [r.name for r in rows(result) if r.equivalent and r.suites]
+
+
+def test_every_named_defect_can_be_planted_and_is_noticed(result):
+    assert len(defect_mutants(kernels() | planted())) == len(DEFECTS) >= 22
+    assert result["defects"].keys() == {d.name for d in DEFECTS}
+    for name, (_, found) in result["defects"].items():
+        assert max(found) >= 0, name
+
+
+def test_the_page_is_made_from_the_report(result):
+    assert PAGE.read_text(encoding="utf-8") == page(result)
+
+
+def test_defects_and_a_sample_of_mutants_are_still_noticed():
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, str(ROOT / "tests/mutation/again.py"), "40"]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
