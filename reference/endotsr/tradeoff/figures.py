@@ -12,6 +12,7 @@ from endotsr.evaluation.curves import UNSIGNED
 from endotsr.runs import replace_file
 from endotsr.tradeoff.labels import Label, place_labels
 from endotsr.tradeoff.measure import LEVELS
+from endotsr.tradeoff.page import small
 from endotsr.tradeoff.study import cost_of
 
 BLUE, ORANGE, GREEN, PINK, INK, GREY, PALE = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#24303a", "#6b7680", "#c9d1d8"
@@ -66,7 +67,7 @@ def _short(point: dict[str, Any], cost: str) -> str:
     raster, scale = point["setting"]["raster"], point["setting"]["scale"]
     cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
     words = [] if cost == "visits" else [point["setting"]["precision"]]
-    words.append(f"cutoff 1/{round(1 / cut)}" if cut > 5e-4 else f"cutoff {cut:.0e}".replace("e-0", "e-"))
+    words.append(f"cutoff {small(cut)}")
     words += [f"stop {stop:.0e}".replace("e-0", "e-")] if stop >= 1e-3 else []
     return ", ".join(words + (["half size"] if scale != 1 else []))
 

@@ -22,6 +22,11 @@ def levels(error: float) -> str:
     return f"{error * LEVELS:.2g}/255"
 
 
+def small(number: float) -> str:
+    """A cutoff or a stop: 1/255, 1/1024, 1e-4."""
+    return f"1/{round(1 / number)}" if number > 5e-4 else f"{number:.0e}".replace("e-0", "e-")
+
+
 def milliseconds(seconds: float) -> str:
     """A time for a person."""
     return f"{seconds * 1e3:.3g} ms"
@@ -39,9 +44,9 @@ def advice(result: dict[str, Any]) -> list[str]:
     if chosen is not None:
         raster = chosen["setting"]["raster"]
         sentences.append(
-            f"For an image that is right to the last of 8 bits, lower the cutoff to {raster['alpha_cutoff']:.2g} "
-            f"and the stop to {raster['transmittance_stop']:.2g}, in float32: {chosen['visits'] / paper['visits']:.1f} "
-            f"times the visits of `paper`, and a largest error of {levels(chosen['error']['max'])}."
+            f"For an image that is right to the last of 8 bits, lower the cutoff to {small(raster['alpha_cutoff'])} "
+            f"and the stop to {small(raster['transmittance_stop'])}, in float32: "
+            f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of {levels(chosen['error']['max'])}."
         )
     if result["joint"]:
         sentences.append(
