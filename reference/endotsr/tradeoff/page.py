@@ -46,7 +46,8 @@ def advice(result: dict[str, Any]) -> list[str]:
         sentences.append(
             f"For an image that is right to the last of 8 bits, lower the cutoff to {small(raster['alpha_cutoff'])} "
             f"and the stop to {small(raster['transmittance_stop'])}, in float32: "
-            f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of {levels(chosen['error']['max'])}."
+            f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of "
+            f"{levels(chosen['error']['max'])}."
         )
     if result["joint"]:
         sentences.append(
