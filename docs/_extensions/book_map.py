@@ -44,13 +44,11 @@ UNDIFFERENTIATED = {
         ("endotsr.scene.density_control.gather_statistics", "endotsr.scene.density_control.densify"),
         "choosing Gaussians is not differentiable",
         "tests/scene/test_density_control.py",
-        "training",
     ),
     "b12": Undifferentiated(
         ("endotsr.scene.initialisation.initialise",),
         "it comes before training",
         "tests/scene/test_initialisation.py",
-        "none: points are drawn at random, a port is given the Gaussians",
     ),
     "m1": Undifferentiated(
         ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),

@@ -1,5 +1,6 @@
 """The reference goes through the doors of a port: a folder of outputs, and a command called with requests."""
 
+import re
 import sys
 
 import numpy as np
@@ -9,6 +10,7 @@ from endotsr.commands.golden import run
 from endotsr.conformance.judge import judge
 from endotsr.conformance.npy import npy_bytes, read_plain
 from endotsr.conformance.port import answer_all
+from endotsr.conformance.report import as_table
 from endotsr.conformance.store import golden_folder, read_golden
 from endotsr.errors import InputError
 
@@ -106,6 +108,21 @@ def test_a_port_that_fails_gets_verdicts(tmp_path, capsys):
         run(["run", "--port", "true"])
     with pytest.raises(InputError, match="started"):
         run(["run", "--port", "no-such-program {requests} {outputs}"])
+
+
+def test_a_refusal_like_no_known_mistake_says_so_and_shows_the_difference(golden, tmp_path):
+    folder = tmp_path / "motion" / "generic"
+    folder.mkdir(parents=True)
+    off = golden.array(next(c for c in golden.cases if c.name == "motion/generic"), "expected/translation.npy").copy()
+    off[1, 2] += 1e-10
+    (folder / "translation.npy").write_bytes(npy_bytes(off))
+    lines = as_table(judge(golden, tmp_path, "float64", level=1)).splitlines()
+    assert next(s for s in lines if s.startswith("motion/generic")).endswith("looks like none of the known mistakes")
+    assert not [line for line in lines if line == "looks like:" or "made for" in line]
+    (line,) = [line for line in lines if "motion/generic/translation" in line]
+    ((got, right, difference),) = re.findall(r"at \[1, 2\] (\S+), expected (\S+): off by (\S+)", line)
+    assert got != right and float(difference) == pytest.approx(1e-10, rel=1e-3)
+    assert "times what is allowed" in line
 
 
 def test_difference_images_stand_in_the_page(golden, answered, tmp_path):

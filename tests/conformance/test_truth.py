@@ -35,7 +35,7 @@ def dictionary(i, s, right):
 
 def atoms(i, s, right):
     """The oracle normalises phi(t) for a time; two times give mean and gain of every atom."""
-    times = i["times"][i["train_index"]]
+    times = sorted(set(i["times"][i["train_index"]]))
     gains, means = [], []
     for k in range(i["phi"].size):
         (t0, t1) = (0.1, 0.23)
@@ -72,8 +72,9 @@ def laplacian(i, s, right):
     masks = laplacian_oracle.masks_by_impulse_response(i["mask"], rule, levels)
     found = {f"band_{k + 1}": band for k, band in enumerate(bands)}
     found |= {f"valid_{k + 1}": valid for k, valid in enumerate(masks)}
-    gradient = laplacian_oracle.loss_gradient(i["rendered"], i["observed"], masks, rule)
-    loss = laplacian_oracle.loss(i["rendered"], i["observed"], masks, rule)
+    images = [np.where(i["mask"], i[name], 0.0) for name in ("rendered", "observed")]  # excluded values are never read
+    gradient = laplacian_oracle.loss_gradient(*images, masks, rule)
+    loss = laplacian_oracle.loss(*images, masks, rule)
     return found | {"loss": loss, "d_rendered": float(i["d_loss"]) * gradient}
 
 
@@ -164,8 +165,10 @@ def composite(i, s, right):
 
 
 def render(i, s, right):
+    """In long doubles: the oracle forms Sigma and a c - b^2, where a needle loses digits."""
     pose = (i["rotation_matrix"], i["translation"])
-    images = splatting_oracle.render(i, pose, lens_of(s), s["raster"], i["background"], s["degree"])
+    wide = {name: array.astype(np.longdouble) for name, array in i.items()}
+    images = splatting_oracle.render(wide, pose, lens_of(s), s["raster"], i["background"], s["degree"])
     return dict(zip(("colour_image", "depth_image", "opacity_image"), images))
 
 

@@ -13,7 +13,7 @@ OPERATION_MODULES = (
     "operations_fitting",
     "operations_scene",
 )
-CASE_MODULES = ("cases_equations", "cases_losses", "cases_splatting", "cases_fitting", "cases_scene")
+CASE_MODULES = ("cases_equations", "cases_losses", "cases_splatting", "cases_fitting", "cases_scene", "cases_edges")
 
 
 class Spec(NamedTuple):

@@ -222,8 +222,8 @@ def _deformation() -> list[Spec]:
 def _adam() -> list[Spec]:
     seeds = Seeds("adam", "three_steps")
     gradients = seeds.uniform("gradients", -1.0, 1.0, 3, 4, 5)
-    gradients = changed(gradients, (slice(None), 0), gradients.array[:, 0] * 2.0**-24, "row 0 times 2^-24")
-    gradients = changed(gradients, (slice(None), 3, 4), 0.0, "entry [3, 4] is 0")
+    gradients = changed(gradients, (slice(None), 0), gradients.array[:, 0] * 2.0**-24, "[:, 0] times 2^-24")
+    gradients = changed(gradients, (slice(None), 3, 4), 0.0, "[:, 3, 4] is 0")
     inputs = {"parameter": seeds.uniform("parameter", -1.0, 1.0, 4, 5), "gradients": gradients}
     settings = {"rate": 0.005, "beta1": 0.9, "beta2": 0.999, "epsilon": 1e-15}
     flags = ("adam_without_bias_correction", "adam_epsilon_in_root", "adam_epsilon_1e-8", "adam_first_step_zero")

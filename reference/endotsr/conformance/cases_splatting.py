@@ -34,7 +34,7 @@ def pose(static: bool = False) -> dict[str, Made]:
 def seen_at(points: np.ndarray, cast: dict[str, Made]) -> Made:
     """World positions of points given in camera axes."""
     world = cast["rotation_matrix"].array.T @ (points - cast["translation"].array[:, None])
-    return given(world, "W^T (p - d) of points p in camera axes, see the text of the family", "scene unit")
+    return given(world, "W^T (p - d) of points p in camera axes, see *Recipes* in README.md", "scene unit")
 
 
 def spread_points(seeds: Seeds, count: int, reach: float = 0.3) -> np.ndarray:
@@ -78,12 +78,12 @@ def _projection() -> list[Spec]:
                  *(("jacobian_clamp_missing",) if name != "exact" else ("jacobian_clamped",)),
                  *(("clamp_term_twice",) if name == "paper" else ()))  # fmt: skip
         title = f"Preset {name}: centres off axis on all sides, behind the camera, just inside the near plane"
-        out.append(Spec("projection", name, "projection", title, flags, _lens(preset), inputs))
+        out.append(Spec("projection", name, "projection", title, flags, lens_settings(preset), inputs))
     seeds, cast = Seeds("projection", "needle"), pose()
     inputs = _shape_inputs(seeds, 4) | {"position": seen_at(spread_points(seeds, 4), cast)} | cast
     inputs["scale"] = given(np.array([[20.0] * 4, [1e-3] * 4, [2e-3] * 4]), "20, 1e-3, 2e-3", "scene unit")
     out.append(Spec("projection", "needle", "projection", "Needles: long axes of hundreds of pixels", 
-                    ("shape_rotation_ignored",), _lens(PAPER), inputs))  # fmt: skip
+                    ("shape_rotation_ignored",), lens_settings(PAPER), inputs))  # fmt: skip
     return out
 
 
@@ -101,7 +101,8 @@ def _shape_inputs(seeds: Seeds, count: int) -> dict[str, Made]:
     }
 
 
-def _lens(raster: RasterSettings, **more: Any) -> dict[str, Any]:
+def lens_settings(raster: RasterSettings, **more: Any) -> dict[str, Any]:
+    """Rasteriser and lens as settings."""
     return {"raster": raster_dict(raster), "camera": LENS} | more
 
 
@@ -130,19 +131,21 @@ def _harmonics() -> list[Spec]:
 WIDTH, HEIGHT = 18, 13
 
 
-def _screen(seeds: Seeds, count: int, low: float, high: float) -> dict[str, Made]:
+def screen_inputs(seeds: Seeds, count: int, low: float, high: float) -> dict[str, Made]:
     a, c = (seeds.uniform(name, low, high, count).array for name in ("a", "c"))
     skew = seeds.uniform("skew", -0.6, 0.6, count).array
     across = seeds.uniform("mean2d", 0.0, 1.0, 2, count)
     z = 3.0 + 0.35 * permutation(seeds.seed("order"), count)
     mean = given(across.array * np.array([[WIDTH], [HEIGHT]]), f"{across.recipe}, times image size", "px")
-    cover = given(np.stack([a, skew * np.sqrt(a * c), c]), f"a, s sqrt(a c), c from uniform({low}, {high})", "px^2")
+    recipe = (f"a, s sqrt(a c), c; a, c = uniform({low}, {high}) seeds {seeds.seed('a')}, {seeds.seed('c')}; "
+              f"s = uniform(-0.6, 0.6) seed {seeds.seed('skew')}")  # fmt: skip
+    cover = given(np.stack([a, skew * np.sqrt(a * c), c]), recipe, "px^2")
     return {
         "mean2d": mean,
         "covariance2d": cover,
         "opacity_logit": seeds.uniform("opacity_logit", -2.0, 2.0, count),
         "colour": seeds.uniform("colour", 0.1, 1.0, 3, count, unit="display"),
-        "depth": given(z, "3 + 0.35 k in the stable order of the seed's words", "scene unit"),
+        "depth": given(z, f"3 + 0.35 k, k = stable order of the words of {seeds.seed('order')}", "scene unit"),
         "background": seeds.uniform("background", 0.1, 0.9, 3, unit="display"),
         "d_colour_image": seeds.uniform("d_colour_image", -1.0, 1.0, 3, HEIGHT, WIDTH),
         "d_depth_image": seeds.uniform("d_depth_image", -1.0, 1.0, HEIGHT, WIDTH),
@@ -150,7 +153,8 @@ def _screen(seeds: Seeds, count: int, low: float, high: float) -> dict[str, Made
     }
 
 
-def _logit(opacity: list[float]) -> Made:
+def logit_of(opacity: list[float]) -> Made:
+    """Logits of opacities."""
     values = np.array(opacity)
     return given(np.log(values) - np.log1p(-values), "logit of " + ", ".join(f"{v:.6g}" for v in opacity))
 
@@ -164,7 +168,7 @@ def _composite() -> list[Spec]:
     common = ("order_by_index", "order_reversed", "depth_over_opacity", "background_missing", "pixel_corner_sample",
               "depth_gradient_dropped", "alpha_gradient_without_rest", "covariance_off_diagonal_half")  # fmt: skip
     for name, preset in PRESETS.items():
-        inputs = _screen(Seeds("composite", name), 8, 4.0, 90.0)
+        inputs = screen_inputs(Seeds("composite", name), 8, 4.0, 90.0)
         flags = common if name != "legacy" else tuple(f for f in common if f != "depth_gradient_dropped")
         title = f"Preset {name}: overlapping Gaussians, depth order unlike index order"
         out.append(
@@ -175,8 +179,8 @@ def _composite() -> list[Spec]:
 
     def flat(case: str, title: str, opacity: list[float], depth: list[float], flags: tuple[str, ...], still=(),
              without=()) -> Spec:  # fmt: skip
-        inputs = _screen(Seeds("composite", case), 5, 4.0, 90.0)
-        inputs |= {"covariance2d": wide, "opacity_logit": _logit(opacity)}
+        inputs = screen_inputs(Seeds("composite", case), 5, 4.0, 90.0)
+        inputs |= {"covariance2d": wide, "opacity_logit": logit_of(opacity)}
         inputs["depth"] = given(depth, ", ".join(map(str, depth)), "scene unit")
         return Spec("composite", case, "composite", title, flags, paper, inputs, still, without)
 
@@ -191,7 +195,7 @@ def _composite() -> list[Spec]:
                     ("d_mean2d", "d_covariance2d")))  # fmt: skip
     out.append(flat("equal_depths", "Equal depths keep the order of the index", [0.3, 0.4, 0.5, 0.6, 0.7],
                     [4.0, 4.0, 3.0, 4.0, 4.0], ("ties_reversed",), ("depth",)))  # fmt: skip
-    inputs = _screen(Seeds("composite", "opaque_exact"), 4, 1.0, 4.0)
+    inputs = screen_inputs(Seeds("composite", "opaque_exact"), 4, 1.0, 4.0)
     inputs["opacity_logit"] = given([40.0, -40.0, 2.0, 40.0], "40, -40, 2, 40")
     inputs["covariance2d"] = given(
         np.array([[1e12, 9.0, 9.0, 9.0], [0.0] * 4, [1e12, 9.0, 9.0, 9.0]]), "a = c = 1e12, 9, 9, 9; b = 0", "px^2"
@@ -200,9 +204,9 @@ def _composite() -> list[Spec]:
     out.append(Spec("composite", "opaque_exact", "composite", "Alpha of 1 in front: no division by 1 - alpha",
                     ("divide_by_one_minus_alpha",), {"raster": raster_dict(EXACT)} | _size(), inputs,
                     without=("d_background",)))  # fmt: skip
-    inputs = _screen(Seeds("composite", "on_the_cutoff"), 5, 4.0, 6.0)
+    inputs = screen_inputs(Seeds("composite", "on_the_cutoff"), 5, 4.0, 6.0)
     middles = [[2.5, 6.5, 9.5, 13.5, 16.5], [3.5, 9.5, 5.5, 10.5, 2.5]]
-    inputs |= {"mean2d": given(middles, "pixel centres", "px"), "opacity_logit": _logit([cut] * 5)}
+    inputs |= {"mean2d": given(middles, "pixel centres", "px"), "opacity_logit": logit_of([cut] * 5)}
     reverse = tuple(
         f"d_{name}" for name in ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "background")
     )
@@ -214,7 +218,7 @@ def _composite() -> list[Spec]:
 
 def _one_on_the_cutoff(settings: dict[str, Any]) -> Spec:
     """One decision that rounding may take either way, and with it the whole answer, gradients included."""
-    inputs = _screen(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0)
+    inputs = screen_inputs(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0)
     inputs["mean2d"] = changed(inputs["mean2d"], (slice(None), 1), [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")
     inputs["covariance2d"] = changed(
         inputs["covariance2d"], (slice(None), 1), [1.5, 0.25, 2.0], "[:, 1] is 1.5, 0.25, 2"
@@ -242,7 +246,8 @@ def scene_inputs(seeds: Seeds, count: int, degree: int, cast: dict[str, Made], s
     } | cast
 
 
-def _cotangents(seeds: Seeds) -> dict[str, Made]:
+def cotangents(seeds: Seeds) -> dict[str, Made]:
+    """Given derivatives by the images, and a background."""
     height, width = LENS["height"], LENS["width"]
     return {
         "background": seeds.uniform("background", 0.1, 0.9, 3, unit="display"),
@@ -270,13 +275,14 @@ def _render() -> list[Spec]:
     ]
     for case, preset, degree, static, title, flags in rows:
         seeds, cast = Seeds("render", case), pose(static)
-        inputs = scene_inputs(seeds, 12, degree, cast) | _cotangents(seeds)
+        inputs = scene_inputs(seeds, 12, degree, cast) | cotangents(seeds)
         inputs["residual"] = seeds.uniform("residual", -0.2, 0.2, 3, 12)
         if static:
             shared_here = tuple(f for f in shared if f != "pose_inverted")
         else:
             shared_here = shared
-        out.append(Spec("render", case, "render", title, shared_here + flags, _lens(preset, degree=degree), inputs))
+        settings = lens_settings(preset, degree=degree)
+        out.append(Spec("render", case, "render", title, shared_here + flags, settings, inputs, without=("visible",)))
     return out + _hard_renders()
 
 
@@ -285,11 +291,11 @@ def _hard_renders() -> list[Spec]:
 
     def add(case: str, title: str, flags: tuple[str, ...], change, still=(), own=()):
         seeds, cast, count = Seeds("render", case), pose(static=True), 8
-        inputs = scene_inputs(seeds, count, 1, cast) | _cotangents(seeds)
+        inputs = scene_inputs(seeds, count, 1, cast) | cotangents(seeds)
         inputs["residual"] = seeds.uniform("residual", -0.2, 0.2, 3, count)
         change(inputs, seeds)
-        settings = _lens(PAPER, degree=1)
-        out.append(Spec("render", case, "render", title, flags, settings, inputs, still, own=own))
+        settings = lens_settings(PAPER, degree=1)
+        out.append(Spec("render", case, "render", title, flags, settings, inputs, still, ("visible",), own=own))
 
     def near(inputs, seeds):
         z = [0.1984375, 0.2015625, -2.0, 0.0]

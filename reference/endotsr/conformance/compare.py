@@ -78,7 +78,8 @@ def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdi
             return Verdict(True, f"{beyond} of {rule.flips} flips", found)
         return _refusal(f"{beyond} entries beyond {tolerance:.0e}, {rule.flips} may flip by {rule.flip_size:.0e}",
                         got, expected, worst, found)  # fmt: skip
-    return _refusal(f"{found:.1e} > {tolerance:.0e} of scale, {beyond} entries", got, expected, worst, found)
+    times = f", {found / tolerance:.2g} times what is allowed" if tolerance > 0 else ""
+    return _refusal(f"{found:.1e} > {tolerance:.0e} of scale{times}, {beyond} entries", got, expected, worst, found)
 
 
 def misses(verdicts: Iterable[tuple[int, bool]]) -> tuple[int, ...]:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from endotsr.conformance.operation import Inputs, Outputs, Settings, tidy
 
-MODULES = ("negative_equations", "negative_losses", "negative_splatting", "negative_fitting", "negative_scene")
+MODULES = (
+    "negative_equations",
+    "negative_losses",
+    "negative_splatting",
+    "negative_fitting",
+    "negative_scene",
+    "negative_edges",
+)
 
 Run = Callable[[Inputs, Settings], Outputs]
 

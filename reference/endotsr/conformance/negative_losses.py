@@ -70,18 +70,20 @@ def _depth(request: Request, *, holes=False, constant=False, tissue_maximum=Fals
            few=False) -> dict[str, Any]:  # fmt: skip
     depth, prior, mask = (request.inputs[n].astype(float) for n in ("rendered_depth", "prior_depth", "mask"))
     mask = mask > 0
-    valid = mask if holes else mask & (prior > 0)
+    valid = mask if holes else mask & np.isfinite(prior) & (prior > 0)
     count = int(valid.sum())
     if count < 10 and not few:
         return {}
     inside = mask if tissue_maximum else np.ones(mask.shape, bool)
-    top, top_prior = (a[inside].max() if normalise else 1.0 for a in (depth, prior))
+    top, top_prior = (a[inside & np.isfinite(a)].max() if normalise else 1.0 for a in (depth, prior))
+    if top == 0:
+        return {}
     residual = np.where(valid, depth / top - prior / top_prior, 0.0)
     up = float(request.inputs["d_loss"])
     gradient = up * np.sign(residual) / (count * top)
     if normalise and not constant:
         holders = (depth == top) & inside
-        share = -up * (np.sign(residual) * depth).sum() / (count * top**2)
+        share = -up * (np.sign(residual) * np.where(valid, depth, 0.0)).sum() / (count * top**2)
         if first:
             gradient[tuple(np.argwhere(holders)[0])] += share
         else:

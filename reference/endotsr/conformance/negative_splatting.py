@@ -115,7 +115,7 @@ def _ties_reversed(request: Request) -> dict[str, NDArray] | None:
     inputs = dict(request.inputs) | {n: np.ascontiguousarray(request.inputs[n][..., ::-1]) for n in names}
     found = request.run(inputs, request.settings)
     whole = ("d_background", "d_rotation_matrix", "d_translation")
-    return {n: np.ascontiguousarray(a[..., ::-1]) if n.startswith("d_") and n not in whole else a
+    return {n: np.ascontiguousarray(a[..., ::-1]) if n.startswith(("d_", "visible")) and n not in whole else a
             for n, a in found.items()}  # fmt: skip
 
 
@@ -264,7 +264,8 @@ NEGATIVES = [
              {"projection": _switch("double_clamp_term"), "render": _switch("double_clamp_term")}),
     Negative("screen_gradient_in_ndc", "Screen gradient per NDC unit", "times half the image size; right: per px",
              {"render": lambda r: {"d_mean2d": r.right["d_mean2d"] * np.array(
-                 [[r.settings["camera"]["width"] / 2], [r.settings["camera"]["height"] / 2]])}}),
+                 [[r.settings["camera"]["width"] / 2], [r.settings["camera"]["height"] / 2]])}
+              if "d_mean2d" in r.right else None}),
     Negative("near_plane_zero", "Near plane at 0", "z > 0; right: z > near",
              _raster(("projection", "render"), near=1e-3)),
     Negative("pose_inverted", "Pose taken as camera to world", "W^T; right: world to camera",

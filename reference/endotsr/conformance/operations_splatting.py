@@ -158,6 +158,7 @@ def _render(inputs: Inputs, settings: Settings) -> Found:
     names = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual", "mean2d", "background")
     return {
         **found,
+        "visible": saved.visible,
         **{f"d_{name}": getattr(grads, name) for name in names},
         "d_rotation_matrix": grads.camera.rotation.astype(dtype),
         "d_translation": grads.camera.translation.astype(dtype),
@@ -212,6 +213,7 @@ OPERATIONS = [
     }, lambda s: _compositing_pairs("composite", s)),
     Operation("render", "B5", "one view of deformed Gaussians", _render, {
         **{name: Asked(3, unit, oracle=oracle) for name, (unit, oracle) in IMAGES.items()},
+        "visible": Asked(3, scale="exact"),
         "d_position": Asked(3, "loss per scene unit", "last"), "d_quaternion": Asked(3, "loss", "last"),
         "d_log_scale": Asked(3, "loss", "last"), "d_opacity_logit": Asked(3, "loss", "last"),
         "d_harmonics": Asked(3, "loss", "last"), "d_residual": Asked(3, "loss", "last"),

@@ -17,6 +17,7 @@ from endotsr.conformance.store import Golden
 
 MOST_LINES = 60  # refused outputs that the table prints
 MOST_PICTURES = 40
+UNKNOWN = "looks like none of the known mistakes"
 
 
 def as_json(report: Report) -> bytes:
@@ -40,6 +41,8 @@ def as_table(report: Report) -> str:
         for s in report.suspects[:5]:
             against = f", but {s.contradicted} passed cases speak against it" if s.contradicted else ""
             lines.append(f"  {s.flag}: {s.title} ({s.wrong}); in {s.matches} case{'s' * (s.matches > 1)}{against}")
+    elif bad:
+        lines += ["", UNKNOWN]
     lines += [""] + [
         f"level {k} ({LEVELS[k]}): {good} of {asked} outputs" for k, (good, asked) in report.levels.items()
     ]
@@ -49,16 +52,20 @@ def as_table(report: Report) -> str:
 def _summary(case: CaseReport) -> str:
     if case.status in ("passed", "not ported"):
         return case.status
-    found = f"looks like {', '.join(case.looks_like[:3])}" if case.looks_like else ""
-    made = f"made for {', '.join(case.made_for)}" if case.made_for else ""
-    return f"{case.status}: {found or made or case.title}"
+    if case.looks_like:
+        return f"{case.status}: looks like {', '.join(case.looks_like[:3])}"
+    return f"{case.status}: {UNKNOWN}" if any(o.expected is not None for o in case.outputs) else case.status
 
 
 def _line(output: OutputReport) -> str:
     if not output.index and output.got is None:
         return output.reason
-    got = "not finite" if output.got is None else f"{output.got:.9g}"
-    return f"{output.reason}; at {list(output.index)} {got}, expected {output.expected:.9g}"
+    if output.got is None or output.expected is None:
+        return f"{output.reason}; at {list(output.index)} not finite, expected {output.expected:.17g}"
+    off = output.got - output.expected
+    return (
+        f"{output.reason}; at {list(output.index)} {output.got:.17g}, expected {output.expected:.17g}: off by {off:.2e}"
+    )
 
 
 def as_html(report: Report, golden: Golden, outputs: Path) -> str:
