@@ -87,9 +87,9 @@ def test_pairs_are_those_of_the_rule():
     position = np.stack([rng.uniform(-0.012, 0.012, 40), rng.uniform(-0.009, 0.009, 40), rng.uniform(3, 5, 40)])
     quaternion = np.repeat([[1.0], [0], [0], [0]], 40, axis=1)
     scene = Scene(position, quaternion, np.full((3, 40), np.log(0.008)), rng.uniform(-1, 8, 40), np.zeros((16, 3, 40)))
-    found = pairs.count_pairs(scene, camera, PAPER_RULES, 0)
-    assert found["blended"] == pairs_by_loops(scene, camera)
-    assert found["visible"] == 40 and found["listed"] >= 40
+    _, saved = render.render_forward(scene, camera, PAPER_RULES, degree=0)
+    found = pairs.count_pairs(saved)
+    assert 0 < found.blended == pairs_by_loops(scene, camera) <= found.visited
 
 
 def test_exponent_is_that_of_the_upper_decade():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_up import moving_scene
 
+from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import scene_at
 from endotsr.splatting import compositing, compositing_rows
 from endotsr.splatting.projection import footprint
@@ -15,7 +16,6 @@ from endotsr.tradeoff.kernels import kernels_of
 from endotsr.tradeoff.measure import _upsampling, errors, forward, frame, prepare, reverse, terms
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, TILES
 from endotsr.tradeoff.study import cost_of, described, run_study
-from endotsr.tradeoff.visits import count_visits
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_visits_are_counted_right_on_both_paths(preset, path):
     view, _ = scene_at(scene.gaussians, scene.spectral, scene.model, scene.time)
     _, saved = render_forward(view, scene.camera, PRESETS[preset], path=path)
     by_hand = visits_by_hand(saved, PRESETS[preset], scene.camera.width, scene.camera.height)
-    assert count_visits(saved) == by_hand
+    assert count_pairs(saved).visited == by_hand
     unstopped = visits_by_hand(saved, PRESETS[preset]._replace(transmittance_stop=0.0), 20, 16)
     assert preset == "exact" or by_hand < unstopped
 

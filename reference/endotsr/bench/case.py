@@ -124,11 +124,14 @@ def _view(state: Any, shop: Any) -> dict[str, int]:
     """Gaussians on the screen, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.bench.pairs import count_pairs
     from endotsr.fitting.model import raster_settings, scene_at
+    from endotsr.splatting.render import render_forward
 
     model, index = shop.config.model, int(shop.sequence.train_index[0])
     scene, _ = scene_at(state.gaussians, shop.spectral, model, float(shop.sequence.times[index]))
-    camera = shop.sequence.cameras[index]
-    return count_pairs(scene, camera, raster_settings(shop.config), model.harmonics_degree)
+    settings = raster_settings(shop.config)
+    _, saved = render_forward(scene, shop.sequence.cameras[index], settings, degree=model.harmonics_degree)
+    listed = int(saved.composite.lists.ranks.size)
+    return {"visible": int(saved.order.size), "listed": listed, "blended": count_pairs(saved).blended}
 
 
 def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:

@@ -1,56 +1,68 @@
-"""How much blending a view asks for: the pixel-Gaussian pairs that change a pixel, by the definition of compositing.
+"""How many pixel-Gaussian pairs a frame visits and blends: costs that no machine, path, tile or thread changes.
 
-A pair is blended when alpha reaches the cutoff and the pixel is not finished. The number depends on the scene and the
-settings only, not on tiles or lanes, so times per pair compare across versions and renderers.
+A visit is a pair whose alpha has to be known: the pixel lies in the support of the Gaussian and is not yet finished
+by the Gaussians in front. The support is alpha >= cutoff (`ellipse`), the tiles of the 3-sigma square
+(`three_sigma_tiles`) or the whole picture (`everywhere`). A pair is blended when it also changes the pixel.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.jit import jit
 from endotsr.sharing import share
-from endotsr.splatting.camera import Camera
-from endotsr.splatting.compositing import TILE_HEIGHT, TILE_WIDTH, _alpha_kernel
-from endotsr.splatting.render import Scene, render_forward
-from endotsr.splatting.settings import RasterSettings
+from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting.compositing import _alpha_kernel
+from endotsr.splatting.render import RenderSaved
 
 
-def _count_blended(first, stop, records, starts, ranks, limits, width, height, counts):
-    """Pairs blended in each tile, pixel by pixel, in the order of `compositing`."""
+class PairCount(NamedTuple):
+    """Pixel-Gaussian pairs of one frame."""
+
+    visited: int
+    blended: int
+
+
+def _count(first_tile, last_tile, records, starts, ranks, limits, in_support_only, width, height, size, counts):
     real = records.dtype.type
     one, half = real(1), real(0.5)
-    cutoff, lowest, alpha_max = limits[0], limits[1], limits[2]
-    tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    for tile in range(first, stop):
-        top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
-        for row in range(top, min(height, top + TILE_HEIGHT)):
-            for column in range(left, min(width, left + TILE_WIDTH)):
+    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]
+    tile_width, tile_height = size
+    tiles_x = (width + tile_width - 1) // tile_width
+    for tile in range(first_tile, last_tile):
+        top, left = (tile // tiles_x) * tile_height, (tile % tiles_x) * tile_width
+        visited, blended = 0, 0
+        for row in range(top, min(height, top + tile_height)):
+            for column in range(left, min(width, left + tile_width)):
                 t = one
                 for p in range(starts[tile], starts[tile + 1]):
                     _, _, value = _alpha_kernel(records[ranks[p]], real(column) + half, real(row) + half)
                     alpha = min(value, alpha_max)
                     if alpha < cutoff:
+                        visited += 0 if in_support_only else 1
                         continue
-                    if t * (one - alpha) < lowest:
+                    visited += 1
+                    behind = t * (one - alpha)
+                    if behind < stop:
                         break
-                    t *= one - alpha
-                    counts[tile] += 1
+                    blended += 1
+                    t = behind
+        counts[tile, 0], counts[tile, 1] = visited, blended
 
 
-_count_blended_kernel = jit(_count_blended)
+_count_kernel = jit(_count)
 
 
-def count_pairs(scene: Scene, camera: Camera, settings: RasterSettings, degree: int) -> dict[str, int]:
-    """{"visible": Gaussians on the screen, "listed": (tile, Gaussian) pairs of the path in use, "blended": pairs}.
-
-    Slow: what belongs beside a time, not inside it.
-    """
-    _, used = render_forward(scene, camera, settings, degree=degree)
-    _, saved = render_forward(scene, camera, settings, degree=degree, path="definition")
-    composite = saved.composite
-    counts = np.zeros(composite.lists.starts.size - 1, np.int64)
+def count_pairs(saved: RenderSaved) -> PairCount:
+    """Pairs of the frame that `render_forward` has just rendered. Slow: it stands beside a time, not inside it."""
+    composite, camera = saved.composite, saved.camera
+    module = compositing_rows if isinstance(composite, compositing_rows.RowsSaved) else compositing
+    ellipse = saved.settings.support == "ellipse" and saved.settings.alpha_cutoff > 0
+    counts: NDArray[np.int64] = np.zeros((composite.lists.starts.size - 1, 2), np.int64)
     share(
-        _count_blended_kernel, counts.size, composite.records, composite.lists.starts, composite.lists.ranks,
-        composite.limits, camera.width, camera.height, counts,
+        _count_kernel, counts.shape[0],
+        composite.records, composite.lists.starts, composite.lists.ranks, composite.limits, ellipse,
+        camera.width, camera.height, (module.TILE_WIDTH, module.TILE_HEIGHT), counts,
     )  # fmt: skip
-    listed = int(used.composite.lists.ranks.size)
-    return {"visible": int(saved.order.size), "listed": listed, "blended": int(counts.sum())}
+    return PairCount(*(int(total) for total in counts.sum(axis=0)))

@@ -126,6 +126,4 @@ def appearance_reverse(
     Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
     """
     d_argument = np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)
-    return AppearanceGrads(
-        *spread(d_argument, saved.colour_coefficients, saved.phi_bar, atom_gradient=atom_gradient)
-    )
+    return AppearanceGrads(*spread(d_argument, saved.colour_coefficients, saved.phi_bar, atom_gradient=atom_gradient))

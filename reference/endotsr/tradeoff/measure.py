@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import SceneSaved, Spectral, scene_at, scene_reverse
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
@@ -18,7 +19,6 @@ from endotsr.splatting.render import RenderGrads, RenderOut, RenderSaved, render
 from endotsr.tradeoff.kernels import kernels_of
 from endotsr.tradeoff.scenes import StudyScene, in_precision, scaled
 from endotsr.tradeoff.settings import Setting
-from endotsr.tradeoff.visits import count_visits
 
 FloatArray = NDArray[np.floating]
 
@@ -131,7 +131,7 @@ def frame(prepared: Prepared) -> tuple[Frame, int]:
     """The frame in float64 at full resolution, and its visits."""
     with kernels_of(prepared.setting), threads(prepared.setting.threads):
         out, saved, scene_saved = forward(prepared)
-        visits = count_visits(saved)
+        visits = count_pairs(saved).visited
         grads = reverse(prepared, saved, scene_saved)
     colour = out.colour.astype(np.float64)
     full, small = prepared.scene.camera, prepared.camera
