@@ -143,24 +143,26 @@ def _opacity(logit: NDArray) -> NDArray:
 
 
 def _needle(textbook_determinant: bool) -> Wrong:
-    """Projects in float32 and loses digits there."""
+    """Composites in float32 and loses digits; its inputs are rounded, so that all machines lose the same."""
 
     def wrong(request: Request) -> dict[str, NDArray] | None:
-        raster = raster_of(request.settings)
-        if raster.support != "ellipse" or not request.inputs["position"].size:
+        raster, i = raster_of(request.settings), request.inputs
+        if raster.support != "ellipse" or not i["position"].size:
             return None
-        i = {name: a.astype(np.float32) for name, a in request.inputs.items()}
-        camera = camera_of(i, request.settings)
-        projected = projection_forward(i["position"], covariance_forward(i["quaternion"], i["log_scale"])[0], camera,
-                                       raster)[0]  # fmt: skip
+        camera, degree = camera_of(i, request.settings), request.settings["degree"]
+        shape = covariance_forward(i["quaternion"], i["log_scale"])[0]
+        projected = projection_forward(i["position"], shape, camera, raster)[0]
         centre = -(i["rotation_matrix"].T @ i["translation"])
-        colour = harmonics_forward(i["harmonics"], i["residual"], i["position"], centre, request.settings["degree"])[0]
-        seen = projected.visible
-        a, b, c = cover = projected.covariance2d[:, seen]
-        det = a * c - b * b if textbook_determinant else projected.determinant[seen]
-        screen = _Screen(projected.mean2d[:, seen], cover, det, projected.depth[seen],
-                         _opacity(i["opacity_logit"][seen]), colour[:, seen], i["background"], camera.width,
-                         camera.height)  # fmt: skip
+        colour = harmonics_forward(i["harmonics"], i["residual"], i["position"], centre, degree)[0]
+        rounded = (projected.mean2d, projected.covariance2d, projected.determinant, projected.depth,
+                   _opacity(i["opacity_logit"]), colour)  # fmt: skip
+        arrays = [array[..., projected.visible].astype(np.float32) for array in rounded]
+        if textbook_determinant:
+            a, b, c = arrays[1]
+            arrays[2] = a * c - b * b
+        mean, cover, det, depth, opacity, colour = arrays
+        background = i["background"].astype(np.float32)
+        screen = _Screen(mean, cover, det, depth, opacity, colour, background, camera.width, camera.height)
         return _images(screen, raster, _distance if textbook_determinant else _inverse_matrix)
 
     return wrong
