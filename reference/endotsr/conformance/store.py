@@ -55,7 +55,7 @@ def golden_folder(given: Path | None = None) -> Path:
     places = [given] if given else [Path(__file__).parents[3] / "golden", Path("golden")]
     for place in places:
         if (place / "VERSION").is_file():
-            return place
+            return place.resolve()  # a caller may change its working folder
     raise InputError(f"{places[-1]}: no golden folder (no file VERSION); name it with --golden")
 
 
