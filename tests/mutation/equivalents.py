@@ -23,7 +23,17 @@ EQUIVALENT: tuple[Group, ...] = (
     ),
     Group(
         "One more task, which finds nothing to do.",
-        ("equations.atom_sums._blocks: `n + BLOCK - 1` -> `n + BLOCK` in `return (n + BLOCK - 1) // BLOCK`",),
+        (
+            "equations.atom_sums._blocks: `n + BLOCK - 1` -> `n + BLOCK` in `return (n + BLOCK - 1) // BLOCK`",
+            "equations.atom_sums._blocks: `n + BLOCK - 1` -> `n + BLOCK + 1` in `return (n + BLOCK - 1) // BLOCK`",
+        ),
+    ),
+    Group(
+        "At equality both sides of the choice are the same number.",
+        (
+            "equations.appearance._exp_nonpositive: `z > real(SATURATED)` -> `z >= real(SATURATED)` in "
+            "`z = real(SATURATED) if z > real(SATURATED) else z`",
+        ),
     ),
 )
 
