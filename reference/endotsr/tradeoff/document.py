@@ -51,6 +51,8 @@ def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
         "Gaussians",
         "`paper`: RMS",
         "`paper`: largest",
+        "error over cutoff, at most",
+        "float32 ends at",
         "8-bit setting: largest",
         "its visits",
         "verdict",

@@ -65,9 +65,14 @@ def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def error_over_cutoff(result: dict[str, Any]) -> float:
-    """Largest error over the cutoff, in float64, where the cutoff alone decides (the tightest stop of the sweep)."""
-    points = [p for p in _joint(result, "float64") if p["setting"]["raster"]["transmittance_stop"] <= 1e-6]
-    return max((p["error"]["max"] / p["setting"]["raster"]["alpha_cutoff"] for p in points), default=float("nan"))
+    """Largest error over the cutoff, in float64, where the cutoff decides: at the tightest stop, below it."""
+    rasters = [(p["error"]["max"], p["setting"]["raster"]) for p in _joint(result, "float64")]
+    ratios = [
+        error / raster["alpha_cutoff"]
+        for error, raster in rasters
+        if raster["transmittance_stop"] <= 1e-6 and raster["alpha_cutoff"] > raster["transmittance_stop"]
+    ]
+    return max(ratios, default=float("nan"))
 
 
 def float32_floor(result: dict[str, Any]) -> float:
