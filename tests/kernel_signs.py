@@ -154,10 +154,7 @@ def main(names: list[str]) -> int:
             continue
         start, found = time.perf_counter(), list(flips(module))
         alive = [line for source, line in found if not noticed(module, source)]
-        bad += bool(alive)
-        print(f"{module}: {len(found)} signs, {len(alive)} unnoticed, {time.perf_counter() - start:.0f} s", flush=True)
-        for line in alive:
-            print(f"    {line}", flush=True)
+        bad += notebook_signs.report(module, len(found), alive, start)
     return bad
 
 

@@ -116,6 +116,14 @@ def survivors(file: Path) -> tuple[int, list[str]]:
     return count, alive
 
 
+def report(name: str, count: int, alive: list[str], start: float) -> bool:
+    """Print how many of `count` flips were noticed since `start`, and those that were not; whether there are such."""
+    print(f"{name}: {count} signs, {len(alive)} unnoticed, {time.perf_counter() - start:.0f} s", flush=True)
+    for line in alive:
+        print(f"    {line}", flush=True)
+    return bool(alive)
+
+
 def main(names: list[str]) -> int:
     """Print what survived; the exit status is the number of notebooks with survivors."""
     bad = 0
@@ -124,10 +132,7 @@ def main(names: list[str]) -> int:
             continue
         start = time.perf_counter()
         count, alive = survivors(file)
-        bad += bool(alive)
-        print(f"{file.stem}: {count} signs, {len(alive)} unnoticed, {time.perf_counter() - start:.0f} s", flush=True)
-        for line in alive:
-            print(f"    {line}", flush=True)
+        bad += report(file.stem, count, alive, start)
     return bad
 
 

@@ -192,14 +192,14 @@ _write_row_kernel = jit(_write_row, contract=True)
 
 def _write_tile(buffer, top, left, background, colour, depth, opacity, transmittance):
     """The finished tile to the images; row by row and plane by plane, which is vector code."""
-    one = buffer.dtype.type(1)
+    zero, one = buffer.dtype.type(0), buffer.dtype.type(1)
     right = min(left + TILE_WIDTH, depth.shape[1])
     for y in range(top, min(top + TILE_HEIGHT, depth.shape[0])):
         at = _U64((y - top) * PITCH)
         for channel in range(3):
             plane = at + _U64((channel + 1) * PLANE)
             _write_row_kernel(buffer, at, plane, background[channel], colour[channel, y, left:right])
-        _write_row_kernel(buffer, at, at + _U64(4 * PLANE), one - one, depth[y, left:right])
+        _write_row_kernel(buffer, at, at + _U64(4 * PLANE), zero, depth[y, left:right])
         t_row, opacity_row = transmittance[y, left:right], opacity[y, left:right]
         for x in range(t_row.size):
             t_row[x] = abs(buffer[at + _U64(x)])
