@@ -173,6 +173,8 @@ def main(words: list[str]) -> int:
     parser.add_argument("--tests", nargs="+", default=FOLDERS, help="folders and files of tests")
     parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
     options = parser.parse_args(words)
+    if options.keep:
+        options.keep.mkdir(parents=True, exist_ok=True)  # now, not after the first quarter of an hour
     plugin = Plugin(options)
     folders = [str(ROOT / "tests" / name) for name in options.tests if (ROOT / "tests" / name).exists()]
     quiet = ["-q", "-s", "-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings", "-p", "no:xdist"]

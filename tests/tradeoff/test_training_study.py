@@ -15,7 +15,7 @@ from endotsr.fitting.trainer import new_training, train
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.tradeoff import training
 from endotsr.tradeoff.training import changed, configurations, measured, run_training_study
-from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, training_lines, training_rows
+from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_lines, training_rows
 
 SMALL = SimulatorSettings(width=64, height=64, frames=9)
 BASE = msgspec.structs.replace(
@@ -132,9 +132,27 @@ def test_best_states_and_what_a_minute_gained():
     result = {"configurations": [entry("a", (60, 1, 20.0), (180, 2, 30.0)), entry("b", (30, 1, 19.0), (120, 2, 19.5))]}
     states = best_by_time(result)
     assert [(s["name"], s["seconds"]) for s in states] == [("b", 30), ("a", 60), ("a", 180)]
-    lines = gain_by_minute(states)
+    near = [{"name": "c", "seconds": 80, "iteration": 1, "psnr_full": 20.5}]  # better, but not half as late again
+    lines = gain_by_minute([*states[:2], *near, states[2]])
+    assert len(lines) == 3
     assert lines[1].endswith("20.00 dB (a, iteration 1), 2.00 dB a minute")
     assert lines[2].endswith("30.00 dB (a, iteration 2), 5.00 dB a minute")
+
+
+def test_a_training_is_beaten_only_beyond_chance():
+    ends = {"base": (60, 30.0), "float64": (90, 30.5), "slow": (70, 29.4), "near": (70, 29.6), "small": (20, 25.0)}
+    result = {
+        "configurations": [
+            {"name": name, "seconds": seconds, "milestones": [{"psnr_full": psnr}]}
+            for name, (seconds, psnr) in ends.items()
+        ]
+    }
+    chance, kept, beaten = summary(result)
+    assert "ends 0.50 dB from it" in chance
+    assert kept.endswith("than: small, base, near, float64")
+    assert beaten == "slow: beaten by base"
+    del result["configurations"][0]
+    assert summary(result) == []
 
 
 def test_the_table_stands_beside_the_base(whole):

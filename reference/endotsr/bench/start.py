@@ -49,6 +49,7 @@ def _first_iterations() -> None:
     """Say each moment as it is reached; the parent takes the time."""
     from endotsr.bench import workload
     from endotsr.bench.case import representative
+    from endotsr.compile_ahead import compile_ahead
     from endotsr.config import PAPER
     from endotsr.fitting.trainer import new_training, training_step, workshop
 
@@ -58,6 +59,7 @@ def _first_iterations() -> None:
     say(MOMENTS[1])
     state = new_training(shop.sequence, PAPER)
     say(MOMENTS[2])
+    compile_ahead(PAPER)
     training_step(state, shop)
     say(MOMENTS[3])
     for iteration in (PAPER.training.residual_activation, representative(PAPER)):

@@ -116,7 +116,7 @@ def train_new(
     _say_settings(config, schedule_note)
     _say_sequence(source, sequence)
     threads = use_threads(config.training.threads)
-    print("starting; the first run on a machine also compiles, which takes about a minute", flush=True)
+    print("starting", flush=True)
     state = new_training(sequence, config)
     record = {
         "status": "running",
@@ -185,6 +185,7 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
     """
     from endotsr.commands.progress import Progress
     from endotsr.commands.state import save_training
+    from endotsr.compile_ahead import compile_ahead
     from endotsr.fitting.trainer import train
 
     log = RunLog(folder.log, state.iteration)
@@ -207,6 +208,7 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         folder.update(iterations_done=saved, lambda_lap=reached.lambda_lap, **_costs(offset, began))
 
     try:
+        compile_ahead(config, progress.say)
         last = train(state, sequence, config, on_iteration, on_checkpoint, on_message=progress.say)
         if saved != last.iteration:
             on_checkpoint(last)

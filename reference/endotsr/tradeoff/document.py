@@ -17,7 +17,7 @@ from endotsr.tradeoff.page import (
     made,
     preset_lines,
 )
-from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, training_rows
+from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_rows
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 
@@ -109,6 +109,8 @@ def training(name: str, result: dict[str, Any]) -> str:
             head,
             pictures[0],
             table(TRAINING_COLUMNS, training_rows(result)),
+            _bullets(summary(result)),
+            "Which minute bought how many decibels, whatever the training:" if bought else "",
             _bullets(bought),
             _bullets(left),
             *pictures[1:],

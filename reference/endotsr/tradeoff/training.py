@@ -15,6 +15,7 @@ import msgspec
 import numba
 import numpy as np
 
+from endotsr.compile_ahead import rehearse
 from endotsr.config import Config, config_from_dict, config_to_toml, with_iterations
 from endotsr.errors import InputError
 from endotsr.evaluation.evaluate import evaluate_frames
@@ -135,8 +136,9 @@ def run_configuration(
 ) -> dict[str, Any]:
     """Train once; the entry of training.json.
 
-    Seconds count from the initialisation to the end of a milestone's iteration, evaluations left out.
+    Seconds count from the initialisation to the end of a milestone's iteration, compilation and evaluations left out.
     """
+    rehearse(config)
     total = config.training.iterations
     stops = {max(1, round(share * total)) for share in MILESTONES}
     rows: list[dict[str, Any]] = []
@@ -149,7 +151,7 @@ def run_configuration(
         if entry["iteration"] in stops:
             reached = time.monotonic()
             row = {"iteration": entry["iteration"], "seconds": reached - began - away, "gaussians": entry["gaussians"]}
-            used = weights if entry["iteration"] >= LPIPS_FROM * total else None
+            used = weights if entry["iteration"] >= round(LPIPS_FROM * total) else None
             rows.append(row | measured(state, config, sequence, full, used))
             away += time.monotonic() - reached
 

@@ -19,7 +19,29 @@ def training_lines(result: dict[str, Any]) -> list[str]:
     head = ("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
     lines.insert(0, "".join(f"{name:<16}" if i == 0 else f"{name:>11}" for i, name in enumerate(head)))
     lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
-    return lines + gain_by_minute(best_by_time(result))
+    return lines + summary(result) + gain_by_minute(best_by_time(result))
+
+
+def summary(result: dict[str, Any]) -> list[str]:
+    """How far chance goes, and which trainings were beaten by one that was both faster and better by more than that."""
+    ends = {c["name"]: (c["seconds"], c["milestones"][-1]["psnr_full"]) for c in result["configurations"]}
+    if "base" not in ends or None in [psnr for _, psnr in ends.values()]:
+        return []
+    chance, lines = 0.0, []
+    if "float64" in ends:
+        chance = abs(ends["float64"][1] - ends["base"][1])
+        lines.append(
+            f"one seed each: `float64` differs from `base` by rounding alone and ends {chance:.2f} dB from it, "
+            "so that is how far chance goes here"
+        )
+    beaten = {
+        name: [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
+        for name, (seconds, psnr) in ends.items()
+    }
+    kept = [name for name in sorted(ends, key=lambda n: ends[n]) if not beaten[name]]
+    lines.append(f"nothing was both faster and better by more than chance than: {', '.join(kept)}")
+    lines += [f"{name}: beaten by {', '.join(others)}" for name, others in beaten.items() if others]
+    return lines
 
 
 def training_rows(result: dict[str, Any]) -> list[list[str]]:
@@ -57,16 +79,17 @@ def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-def gain_by_minute(states: list[dict[str, Any]], least: float = 0.1) -> list[str]:
+def gain_by_minute(states: list[dict[str, Any]], least: float = 0.3, stretch: float = 1.5) -> list[str]:
     """Along the best states: when it was reached, by which training, and what each minute before it gained.
 
-    least   a state is told if it is so many dB better than the one told before
+    least, stretch   a state is told if it is so many dB better, and so many times later, than the one told before
     """
     lines: list[str] = []
     before: dict[str, Any] | None = None
     for row in states:
-        if before is not None and row["psnr_full"] < before["psnr_full"] + least and row is not states[-1]:
-            continue
+        if before is not None and row is not states[-1]:
+            if row["psnr_full"] < before["psnr_full"] + least or row["seconds"] < stretch * before["seconds"]:
+                continue
         line = (
             f"after {duration(row['seconds'])}: {row['psnr_full']:.2f} dB ({row['name']}, iteration {row['iteration']})"
         )

@@ -1,0 +1,68 @@
+"""A cold start: two processes compile all that a training calls, and nothing is compiled twice."""
+
+import json
+import os
+import subprocess
+import sys
+
+import msgspec
+import pytest
+
+from endotsr import compile_ahead
+from endotsr.commands.threads import len_cores
+from endotsr.config import DEMO, PAPER
+
+COMPILE = """
+from endotsr import compile_ahead
+from endotsr.config import PAPER
+assert compile_ahead.compile_ahead(PAPER) and compile_ahead._helpers[0].wait() == 0
+assert not compile_ahead.compile_ahead(PAPER), "a second time there is nothing to do"
+"""
+TRAIN = """
+import json, sys
+import msgspec
+from endotsr.bench import workload
+from endotsr.bench.case import representative
+from endotsr.config import PAPER
+from endotsr.fitting.trainer import new_training, training_step, workshop
+
+small = msgspec.structs.replace(PAPER.initialisation, first_frame_points=500, other_frame_points=50)
+config = msgspec.structs.replace(PAPER, initialisation=small)
+shop = workshop(workload.sequence(128, 96), config)
+state = new_training(shop.sequence, config)
+born = config.training.residual_activation
+for before in (0, born, representative(config), born + 2 * config.density.interval - 1):  # the last one densifies
+    state.iteration = before
+    training_step(state, shop)
+kernels = [(f"{n}.{k}", v) for n, m in list(sys.modules.items()) if n.startswith("endotsr") for k, v in vars(m).items()]
+stats = {name: kernel.stats for name, kernel in kernels if hasattr(kernel, "stats") and hasattr(kernel, "overloads")}
+missed = sorted(name for name, s in stats.items() if s.cache_misses)
+print(json.dumps([missed, sum(bool(s.cache_hits) for s in stats.values())]))
+"""
+
+
+@pytest.mark.skipif(len_cores() < 2, reason="one core: nothing is compiled ahead")
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="the compiler is off")
+def test_a_training_finds_every_kernel_compiled(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", COMPILE], env=environment, check=True)
+    done = subprocess.run([sys.executable, "-c", TRAIN], env=environment, check=True, capture_output=True, text=True)
+    compiled, loaded = json.loads(done.stdout)
+    assert compiled == []
+    assert loaded > 30
+
+
+@pytest.mark.parametrize("program", ["false", "/nowhere/python"])
+def test_without_the_second_process_all_goes_on(tmp_path, monkeypatch, program):
+    monkeypatch.setattr(compile_ahead, "done_before", lambda config: tmp_path / "marker")
+    monkeypatch.setattr(compile_ahead, "len_cores", lambda: 2)
+    monkeypatch.setattr(sys, "executable", program)
+    said = []
+    assert compile_ahead.compile_ahead(DEMO, said.append) == (os.environ.get("NUMBA_DISABLE_JIT") != "1")
+    assert not (tmp_path / "marker").exists()
+
+
+def test_settings_that_call_other_kernels_have_another_marker():
+    double = msgspec.structs.replace(PAPER, training=msgspec.structs.replace(PAPER.training, precision="float64"))
+    static = msgspec.structs.replace(PAPER, model=msgspec.structs.replace(PAPER.model, deformation=False))
+    assert len({compile_ahead.done_before(config) for config in (PAPER, double, static)}) == 3
