@@ -109,6 +109,18 @@ def test_hard_W1_a_dead_atom_adds_nothing_to_the_rank():
     assert (report.rank, report.condition) == (0, 0.0)
 
 
+def test_rank_and_condition_are_those_of_the_normalised_atoms():
+    """Stamps on an eighth of the clip: the atoms have unequal RMS, and only the normalised ones have this condition."""
+    omega, times = np.array([0.5, 1.0, 2.0]), np.linspace(0, 0.3, 11)
+    atoms = atoms_at(times, omega)
+    atoms = atoms - atoms.mean(axis=0)
+    rms = np.sqrt((atoms**2).mean(axis=0))
+    assert rms.max() > 5 * rms.min()
+    report = report_atoms(times, omega)
+    assert report.rank == 6
+    assert report.condition == pytest.approx(np.linalg.cond(atoms / rms), rel=1e-6)
+
+
 def test_hard_W2_one_stamp_makes_every_atom_dead():
     omega = frequencies(8, 1.0, 16.0)
     for times in ([0.3], [0.3, 0.3, 0.3]):

@@ -19,7 +19,7 @@ def test_exponential_decay_end_points_middle_and_clip():
     assert decay(9000, 6000, 1.0, 0.01) == pytest.approx(0.01, rel=1e-14)
     assert decay(-5, 6000, 1.0, 0.01) == 1.0
     assert decay(1, 0, 1.0, 0.01) == pytest.approx(0.01)
-    assert decay(1, 10, 0.0, 0.0) == 0.0
+    assert decay(1, 10, 0.0, 0.0) == decay(1, 10, 1.0, 0.0) == decay(0, 10, 0.0, 1.0) == 0.0
 
 
 def test_rates_of_the_paper_preset():
@@ -55,6 +55,13 @@ def test_a_model_without_residuals_never_activates_them():
     config = Config(model=ModelConfig(appearance=False, spectral_motion=False))
     assert not schedules.residuals_active(5000, config)
     assert not any(schedules.residuals_born(i, config) for i in (3000, 3001, 3002))
+
+
+@pytest.mark.parametrize("alone", ["appearance", "spectral_motion"])
+def test_one_residual_is_enough_to_activate(alone):
+    model = {"appearance": False, "spectral_motion": False} | {alone: True}
+    config = Config(model=ModelConfig(**model))
+    assert schedules.residuals_active(5000, config) and not schedules.residuals_active(3000, config)
 
 
 def test_residuals_from_the_first_iteration():

@@ -18,6 +18,11 @@ def loss_and_gradient(rendered, prior, mask, d_loss=1.0):
     return loss, normalised_depth_reverse(d_loss, saved)
 
 
+def test_a_soft_mask_is_refused():
+    with pytest.raises(ValueError, match="mask must be boolean"):
+        depth_target(depths()[1], tool_mask().astype(float))
+
+
 @pytest.mark.parametrize("under_mask", [False, True])
 def test_equals_the_oracle(under_mask):
     rendered, prior = depths()

@@ -5,7 +5,17 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from endotsr.losses.similarity import C1, C2, masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.similarity import (
+    C1,
+    C2,
+    TAPS,
+    _column_moments,
+    _row_moments,
+    masked_ssim_forward,
+    masked_ssim_reverse,
+    ssim_target,
+    window,
+)
 from losses.made_up_images import images, tool_mask
 from oracle import losses as oracle
 
@@ -162,3 +172,30 @@ def test_target_is_zero_under_the_mask():
     target = ssim_target(observed, tool_mask())
     assert not target.image[:, ~tool_mask()].any()
     assert target.count == 3 * tool_mask().sum()
+
+
+def test_variances_keep_their_digits_beside_far_away_values():
+    """Each window is centred on a value of its own: in float32 a centre 1000 away would leave no digit of 1e-4."""
+    rng = np.random.default_rng(3)
+    far = np.where(np.arange(8) % 2, 1000.0, 0.0)
+    rows = (far + rng.normal(0, 0.01, (TAPS, 8))).astype(np.float32)
+    weights, exact = window(np.dtype(np.float32)), rows.astype(np.float64)
+    mean, variance = np.empty(8, np.float32), np.empty(8, np.float32)
+    _column_moments(rows, weights, mean, variance)
+    share = weights.astype(np.float64)
+    wanted = share @ (exact - share @ exact / share.sum()) ** 2
+    np.testing.assert_allclose(variance, wanted, rtol=1e-2)
+    np.testing.assert_allclose(mean, share @ exact / share.sum(), rtol=1e-6, atol=1e-6)
+
+
+def test_a_row_of_windows_keeps_its_digits_far_from_its_start():
+    rng = np.random.default_rng(4)
+    columns = np.where(np.arange(40) < 12, 0.0, 1000.0) + rng.normal(0, 0.01, 40)
+    columns, spread = columns.astype(np.float32), np.full(40, 1e-4, np.float32)
+    weights = window(np.dtype(np.float32))
+    mean, variance = np.empty(30, np.float32), np.empty(30, np.float32)
+    _row_moments(columns, spread, weights, mean, variance)
+    share = weights.astype(np.float64) / weights.sum(dtype=np.float64)
+    for i in range(12, 30):
+        part = columns[i : i + TAPS].astype(np.float64)
+        assert variance[i] == pytest.approx(1e-4 + share @ (part - share @ part) ** 2, rel=1e-2)

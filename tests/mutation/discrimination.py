@@ -1,10 +1,11 @@
 """Put every mutant of every kernel to every suite and write docs/results/discrimination.json.
 
     python tests/mutation/discrimination.py [--jobs 2] [--only losses.similarity] [--sample 20] [--minutes 30]
-                                            [--keep FOLDER]
+                                            [--keep FOLDER] [--survivors]
 
 --only    kernels whose name starts so; may be given several times
 --sample  at most so many mutants of a kernel, evenly spread
+--survivors   only what survived the run in the JSON file and is not listed as equivalent; what is noticed is added
 The page docs/discrimination.md is made from the result by tests/mutation/page.py.
 """
 
@@ -30,12 +31,23 @@ from endotsr.runs import machine, now, versions  # noqa: E402
 from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
+from mutation.merge import added, survivors  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
 from mutation.survey import Checks  # noqa: E402
 
-FOLDERS = ("equations", "splatting", "losses", "scene", "fitting", "hard", "properties", "checking/test_ranges.py")
+FOLDERS = (
+    "equations",
+    "splatting",
+    "losses",
+    "scene",
+    "fitting",
+    "hard",
+    "properties",
+    "checking/test_ranges.py",
+    "checking/test_pieces.py",
+)
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
 LATER = 30.0  # s of further checks for a mutant that no suite has noticed and that is not listed as equivalent
 
@@ -92,6 +104,9 @@ class Plugin:
         chosen = [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]
         groups = [every(mutants(k, functions[k]), self.options.sample) for k in wanted]
         chosen += [m for row in zip_longest(*groups) for m in row if m is not None]  # so that a stop is fair to all
+        if self.options.survivors:
+            alive = survivors(json.loads(self.options.json.read_text(encoding="utf-8")))
+            chosen = [m for m in chosen if m.name in alive]
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
         checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
@@ -109,6 +124,8 @@ class Plugin:
         alarms = self.false_alarms(outcomes, checks)
         outcomes = {name: _without(outcome, alarms) for name, outcome in outcomes.items()}
         self.result = self.report(chosen, outcomes, checks) | {"false_alarms": sorted(alarms)}
+        if self.options.survivors:
+            self.result = added(json.loads(self.options.json.read_text(encoding="utf-8")), self.result)
         return True
 
     def false_alarms(self, outcomes: dict[str, Outcome], checks: Checks) -> set[str]:
@@ -170,6 +187,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder that keeps what was measured with the right kernels")
     parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long, 0 = never")
+    parser.add_argument("--survivors", action="store_true", help="only what survived the run in the JSON file")
     parser.add_argument("--tests", nargs="+", default=FOLDERS, help="folders and files of tests")
     parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
     options = parser.parse_args(words)

@@ -10,6 +10,7 @@ import pytest
 
 from mutation.equivalents import EQUIVALENT
 from mutation.kernels import kernels, planted
+from mutation.merge import added, survivors
 from mutation.mutator import mutants
 from mutation.page import PAGE, RESULT, page, rows
 from mutation.registry import DEFECTS, defect_mutants
@@ -53,3 +54,20 @@ def test_defects_and_a_sample_of_mutants_are_still_noticed():
     command = [sys.executable, str(ROOT / "tests/mutation/again.py"), "40"]
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+
+
+def test_a_later_run_of_survivors_is_added_by_name():
+    run = {"commit": "a", "finished": "1", "seconds": 1}
+    early = {
+        "run": run, "checks": ["x", "y"], "false_alarms": ["y"], "defects": {},
+        "kernels": {"k": {"k: seen": ["sign", [0, -1], None], "k: alive": ["sign", [-1, -1], None]}},
+    }  # fmt: skip
+    assert survivors(early) == {"k: alive"}
+    late = {
+        "run": run | {"commit": "b"}, "checks": ["new", "x"], "false_alarms": [], "defects": {},
+        "kernels": {"k": {"k: alive": ["sign", [-1, 0], 0.5]}},
+    }  # fmt: skip
+    both = added(early, late)
+    assert both["checks"] == ["x", "y", "new"] and both["run"]["again"][0]["commit"] == "b"
+    assert both["kernels"]["k"] == {"k: seen": ["sign", [0, -1], None], "k: alive": ["sign", [-1, 2], 0.5]}
+    assert survivors(both) == set() and survivors(early) == {"k: alive"}

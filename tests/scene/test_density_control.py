@@ -3,12 +3,14 @@
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState, adam_state, adam_update
 from endotsr.scene.density_control import (
     DensityStatistics,
+    _rotations,
     check_lengths,
     densify,
     empty_statistics,
@@ -221,6 +223,14 @@ def test_hard_G4_lengths_agree_after_many_rounds(rng, dtype):
         check_lengths(gaussians, adam)
         assert gaussians.position.dtype == dtype
     assert gaussians.count == 20
+
+
+def test_rotations_of_quaternions_with_zeros_and_of_any_length():
+    quaternion = np.array(
+        [[0, 1, 0, 0], [0, 0, 3, 0], [1, 0, 0, 1], [2, 0, -1, 0], [1e-200, 0, 1e-200, 0], [1, 2, 3, 4.0]]
+    )
+    wanted = Rotation.from_quat(np.roll(quaternion / np.abs(quaternion).max(axis=1, keepdims=True), -1, axis=1))
+    np.testing.assert_allclose(_rotations(quaternion.T), np.moveaxis(wanted.as_matrix(), 0, -1), atol=1e-15)
 
 
 def test_zero_quaternion_and_huge_scale_split_finitely(rng):

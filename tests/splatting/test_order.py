@@ -154,6 +154,7 @@ def test_tile_lists_hold_every_pair_once_in_depth_order():
         slots = lists.slots[lists.pair_starts[k] : lists.pair_starts[k + 1]]
         assert (lists.ranks[slots] == k).all() and (np.diff(slots) > 0).all()
     np.testing.assert_array_equal(np.sort(lists.slots), np.arange(lists.slots.size))
+    assert lists.starts[0] == lists.pair_starts[0] == 0 and lists.pair_starts[-1] == lists.slots.size
 
 
 def test_order_of_the_tiles_does_not_matter_for_gradients():

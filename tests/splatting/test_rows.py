@@ -261,3 +261,13 @@ def test_hard_C8_lossless_box_definition(name, dtype):
     free = run(scene, camera, PAPER._replace(support="everywhere"), "definition", background=BACKGROUND)
     for one, two in zip(boxed, free):
         assert_bitwise(one, two)
+
+
+@pytest.mark.parametrize("width, height", [(64, 32), (32, 16), (96, 16)])
+def test_a_picture_of_whole_tiles_has_no_tile_beside_it(width, height):
+    camera = plain_camera(width, height, 40.0)
+    u, v = np.linspace(3, width - 3, 5), np.linspace(2, height - 2, 5)
+    scene = screen_scene(camera, u, v, np.arange(2.0, 7.0), 2.5, 0.7, rgb_for(5, 5))
+    fast, slow = run(scene, camera, PAPER, "rows"), run(scene, camera, PAPER, "definition")
+    assert_close(fast[0], slow[0], 1e-12)
+    assert_close(fast[1], slow[1], 1e-12)

@@ -1,0 +1,103 @@
+"""A result must not depend on the length of the pieces that a kernel takes its arrays in.
+
+The lengths are compiled into the kernels, so this runs with the compiler off, in a process of its own; there they are
+set to a few numbers, and arrays of a dozen already have whole and broken pieces.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from endotsr.checking import all_pairs, one_thread, pair_stream
+from endotsr.equations.deformation import CHANNELS, deformation_forward, deformation_reverse
+from endotsr.fitting.adam import adam_state, adam_update
+from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
+
+PAIRS = all_pairs()
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+plain_python = pytest.mark.skipif(not PLAIN, reason="runs in a process without the compiler")
+NAMES_OF_LENGTHS = ("PIECE", "BLOCK", "ROWS")
+
+
+@pytest.mark.skipif(PLAIN, reason="this is that process")
+def test_the_rest_of_this_file_without_the_compiler():
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(Path(__file__))]
+    done = subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert " passed" in done.stdout
+
+
+def shorten(monkeypatch, length):
+    """Set the length of every piece."""
+    changed = 0
+    for module_name, module in list(sys.modules.items()):
+        if module_name.startswith(("endotsr.equations", "endotsr.splatting", "endotsr.losses", "endotsr.fitting")):
+            for name in NAMES_OF_LENGTHS:
+                if isinstance(getattr(module, name, None), int):
+                    monkeypatch.setattr(module, name, length)
+                    changed += 1
+    assert changed >= 6
+
+
+@plain_python
+@pytest.mark.parametrize("length", [1, 4])
+@pytest.mark.parametrize("name", list(PAIRS))
+def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
+    """To rounding: sums over pieces are added in another order."""
+    pair = PAIRS[name]
+    rng = pair_stream(name, 3)
+    inputs = pair.inputs(rng)
+    cotangents = {k: np.asarray(rng.standard_normal(np.shape(v))) for k, v in pair.forward(inputs).items()}
+
+    def both():
+        reverse = pair.reverse(inputs, cotangents)
+        return dict(pair.forward(inputs)) | {f"gradient of {k}": v for k, v in reverse.items()}
+
+    with one_thread():
+        whole = both()
+        shorten(monkeypatch, length)
+        cut = both()
+    for key, value in whole.items():
+        largest = np.abs(value).max(initial=0.0)
+        np.testing.assert_allclose(cut[key], value, rtol=1e-9, atol=1e-12 * largest, err_msg=key)
+
+
+@plain_python
+@pytest.mark.parametrize("length, count", [(4, 11), (4, 8), (5, 9), (1, 3)])
+@pytest.mark.parametrize("ranges", ["whole", "one by one"])
+def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
+    rng = np.random.default_rng(length)
+    shape = (CHANNELS, 2, count)
+    start = {name: rng.uniform(0.1, 0.9, shape) for name in NAMES}
+    d_offsets = rng.normal(size=(CHANNELS, count))
+    rates = dict.fromkeys(NAMES, 1e-2)
+
+    def stepped(fused):
+        parameters = {name: a.copy() for name, a in start.items()}
+        state = adam_state(parameters)
+        for t in (0.2, 0.6):
+            _, saved = deformation_forward(*parameters.values(), t=t)
+            if fused:
+                deformation_adam_step(d_offsets, saved, state, rates, 0.9, 0.999, 1e-15)
+            else:
+                grads = dict(zip(NAMES, deformation_reverse(d_offsets, saved)[:3], strict=True))
+                adam_update(state, parameters, grads, rates, 0.9, 0.999, 1e-15)
+        return [*parameters.values(), *state.first.values(), *state.second.values()]
+
+    def one_by_one(kernel, tasks, *arguments):
+        for task in range(tasks - 1, -1, -1):
+            kernel(task, task + 1, *arguments)
+
+    with one_thread():
+        whole = stepped(False)
+        shorten(monkeypatch, length)
+        if ranges == "one by one":
+            for module in ("equations.deformation", "fitting.adam", "fitting.deformation_step"):
+                monkeypatch.setattr(sys.modules[f"endotsr.{module}"], "share", one_by_one)
+        for fused in (False, True):
+            for one, two in zip(stepped(fused), whole, strict=True):
+                np.testing.assert_array_equal(one, two)
