@@ -157,6 +157,17 @@ def test_tile_lists_hold_every_pair_once_in_depth_order():
     assert lists.starts[0] == lists.pair_starts[0] == 0 and lists.pair_starts[-1] == lists.slots.size
 
 
+@pytest.mark.parametrize("support", ["everywhere", "ellipse"])
+def test_without_a_cutoff_every_box_is_the_picture(support):
+    """An ellipse has no end then."""
+    scene = screen_scene(CAMERA, [-500.0, 16.0], 14.5, 3.0, 0.1, [1e-6, 0.9], [1, 1, 1])
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, _ = projection_forward(scene.position, shape, CAMERA, EXACT)
+    settings = PAPER._replace(alpha_cutoff=0.0, support=support)
+    box, seen = screen_boxes(projected, log_opacity(scene.opacity_logit), settings, 33, 29)
+    assert seen.all() and (box == [0, 32, 0, 28]).all()
+
+
 def test_order_of_the_tiles_does_not_matter_for_gradients():
     """A splat over many tiles collects the same sum as in one image row at a time (to rounding)."""
     camera = plain_camera(129, 5, 25.0)

@@ -231,6 +231,22 @@ def test_hard_P2_the_clamp_acts_on_the_jacobian_and_not_on_the_centre():
     np.testing.assert_array_equal(same, [max(abs(x), abs(y)) < 1 for x, y in PLACES])
 
 
+@pytest.mark.parametrize("clamp", [0.0, 0.4, 1.3])
+def test_the_clamp_of_the_jacobian_is_a_share_of_the_half_picture(clamp):
+    """Beyond clamp x tan(fov / 2) the slope that enters the Jacobian is constant; 0 means no clamp."""
+    camera = plain_camera(64, 48, 40.0)
+    limits = [clamp * 64 / 80, clamp * 48 / 88] if clamp else [np.inf, np.inf]
+    settings = PAPER._replace(jacobian_clamp=clamp, low_pass=0.0)
+    for slope in (0.1, 0.5, 0.9):
+        position = np.array([[slope], [-slope], [1.0]])
+        shape, _ = covariance_forward(np.array([[1.0], [0], [0], [0]]), np.log(np.full((3, 1), 0.01)))
+        projected, _ = projection_forward(position, shape, camera, settings)
+        x, y = min(slope, limits[0]), -min(slope, limits[1])
+        jacobian = np.array([[40.0, 0, -40.0 * x], [0, 44.0, -44.0 * y]]) * 0.01
+        a, b, c = projected.covariance2d[:, 0]
+        np.testing.assert_allclose([[a, b], [b, c]], jacobian @ jacobian.T, rtol=1e-12)
+
+
 @pytest.mark.parametrize("width, height", [(64, 48), (65, 47), (1, 1), (640, 512)])
 def test_hard_P3_project_of_backproject_is_the_pixel_centre(width, height):
     camera = turned_camera(width, height, 40.0)

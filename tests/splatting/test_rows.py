@@ -25,9 +25,20 @@ from endotsr.splatting import compositing_rows
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.covariance import covariance_forward
+from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
-from endotsr.splatting.records import HALF_HEIGHT, log_opacity, pack_records
+from endotsr.splatting.records import (
+    HALF_HEIGHT,
+    INVERSE_C,
+    LOG2_OPACITY,
+    PRECISION,
+    SLOPE,
+    U,
+    V,
+    log_opacity,
+    pack_records,
+)
 from endotsr.splatting.render import Scene, choose_path
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
@@ -271,3 +282,37 @@ def test_a_picture_of_whole_tiles_has_no_tile_beside_it(width, height):
     fast, slow = run(scene, camera, PAPER, "rows"), run(scene, camera, PAPER, "definition")
     assert_close(fast[0], slow[0], 1e-12)
     assert_close(fast[1], slow[1], 1e-12)
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e2, 1e3, 1e4, 3e4, 1e5, 1e6])
+def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
+    """Where the centre is far off, rounding of the edge is many times a pixel's margin, unless that grows with it."""
+    rng, f32 = np.random.default_rng(int(distance)), np.float32
+    log2_cutoff, (left, top) = f32(np.log2(1 / 255)), (320, 160)
+    lines, passing = np.empty(5 * compositing_rows.TILE_HEIGHT, f32), 0
+    for _ in range(400):
+        angle = rng.choice([0, np.pi / 2, np.pi, -np.pi / 2]) + rng.normal(0, 1e-6)  # edges along rows and columns
+        aim = np.array([left + 16, top + 8]) + rng.uniform(-8, 8, 2)
+        centre = aim - distance * np.array([np.cos(angle), np.sin(angle)])
+        log2_opacity = f32(rng.uniform(-4, 0))
+        # a round footprint whose edge goes through `aim`, or one of about three pixels around it
+        sigma = max(distance, 3.0) / np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
+        record = np.zeros(12, f32)
+        record[SLOPE] = slope = rng.choice([0.0, 0.7, -5.0])  # sheared, the same edge still goes through `aim`
+        record[U], record[V] = centre[0] - slope * (aim[1] - centre[1]), centre[1]
+        record[PRECISION] = record[INVERSE_C] = sigma**-2
+        record[LOG2_OPACITY] = log2_opacity
+        record[HALF_HEIGHT] = sigma * np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
+        first, last = compositing_rows._rows_kernel(record, top)
+        compositing_rows._spans_kernel(record, top, left, log2_cutoff, lines)
+        a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
+        for y in range(compositing_rows.TILE_HEIGHT):
+            _, row2, shift, low, high = compositing_rows._line_kernel(lines, y)
+            x = np.arange(compositing_rows.TILE_WIDTH)
+            e = (f32(left) + x.astype(f32) + f32(0.5)) - record[U] - f32(shift)
+            reached = np.flatnonzero(f32(row2) - a2 * e * e >= log2_cutoff)
+            passing += reached.size
+            if reached.size:
+                assert first <= y <= last
+                assert low <= reached[0] and reached[-1] <= high
+    assert passing > 1000

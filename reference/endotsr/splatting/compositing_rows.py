@@ -95,13 +95,15 @@ def _spans(record, top, left, log2_cutoff, lines):
            (first > last where the row is not reached)
 
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
-    beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm.
+    beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm. Where a huge
+    footprint just reaches a row, the reach is a difference of nearly equal numbers: its roundings are pixels (`faintest`).
     """
     real = record.dtype.type
-    half, one, zero, relative = real(0.5), real(1), real(0), real(1e-5)
+    half, one, zero = real(0.5), real(1), real(0)
     u, v, slope, log2_opacity = record[U], record[V], record[SLOPE], record[LOG2_OPACITY]
     r2 = half * real(LOG2_E) * record[INVERSE_C]
-    spread, margin = one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * relative + real(1e-3)
+    spread, margin = one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-5) + real(1e-3)
+    faintest = log2_cutoff - (one - log2_cutoff) * real(1e-6)
     first_row, right = real(top) + half - v, real(TILE_WIDTH - 1)
     offset = u - half - real(left)
     for y in range(TILE_HEIGHT):
@@ -109,8 +111,7 @@ def _spans(record, top, left, log2_cutoff, lines):
         dy = first_row + real(y)
         exponent = log2_opacity - r2 * dy * dy
         shift = slope * dy
-        width = math.sqrt(max(spread * (exponent - log2_cutoff), zero))
-        width += (width + abs(shift)) * relative + margin
+        width = math.sqrt(max(spread * (exponent - faintest), zero)) + margin
         low, high = offset + shift - width, min(offset + shift + width, right)
         lines[k] = dy
         lines[k + _U64(TILE_HEIGHT)] = exponent
