@@ -68,6 +68,15 @@ def test_large_image_equals_skimage_inside():
     assert value == pytest.approx(full[inside].mean(), abs=1e-12)
 
 
+def test_a_mask_of_one_pixel_in_one_channel_has_a_gradient():
+    rendered, observed = images((1, 8, 9))
+    mask = np.zeros((8, 9), bool)
+    mask[3, 4] = True
+    expected = oracle.masked_ssim_gradient(rendered, observed, mask)
+    assert abs(expected[0, 3, 4]) > 1e-6
+    np.testing.assert_allclose(ssim(rendered, observed, mask)[1], expected, rtol=1e-9, atol=1e-15)
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_hard_X1_identical_images_are_one_without_gradient(dtype):
     image = images()[1].astype(dtype)

@@ -10,6 +10,7 @@ from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState, adam_state, adam_update
 from endotsr.scene.density_control import (
     DensityStatistics,
+    _fainter_than,
     _rotations,
     check_lengths,
     densify,
@@ -223,6 +224,16 @@ def test_hard_G4_lengths_agree_after_many_rounds(rng, dtype):
         check_lengths(gaussians, adam)
         assert gaussians.position.dtype == dtype
     assert gaussians.count == 20
+
+
+@pytest.mark.parametrize("opacity", [0.0, -1.0])
+def test_a_pruning_bound_of_zero_keeps_everything(rng, opacity):
+    gaussians, adam = make(rng, 5)
+    gaussians.opacity_logit[:] = [-1e4, -800, -1, 0, 800]
+    assert not _fainter_than(gaussians.opacity_logit, opacity).any()
+    if opacity == 0:
+        config = msgspec.structs.replace(CONFIG, prune_opacity=0.0)
+        assert run(gaussians, adam, empty_statistics(5), config).gaussians.count == 5
 
 
 def test_rotations_of_quaternions_with_zeros_and_of_any_length():

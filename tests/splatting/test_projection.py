@@ -30,7 +30,7 @@ from endotsr.splatting.covariance import (
     covariance_matrix,
     covariance_reverse,
 )
-from endotsr.splatting.projection import projection_forward, projection_reverse
+from endotsr.splatting.projection import footprint, projection_forward, projection_reverse
 from endotsr.splatting.records import INVERSE_C, PRECISION, SLOPE, log_opacity, pack_records
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import EXACT, PAPER
@@ -53,6 +53,17 @@ def test_rotation_and_covariance_equal_scipy_and_the_oracle():
     assert np.abs(shape.rotation - wanted).max() <= 16 * U64
     np.testing.assert_allclose(shape.scale, np.exp(s), rtol=4 * U64)
     assert_close({"sigma": covariance_matrix(shape)}, {"sigma": oracle.covariance(q, s)}, 1e-14)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("place", range(4))
+def test_quaternions_of_one_number_are_half_turns(place, sign):
+    q = np.zeros((4, 1))
+    q[place] = sign * 3.0
+    wanted = -np.eye(3) if place else np.eye(3)
+    if place:
+        wanted[place - 1, place - 1] = 1
+    np.testing.assert_array_equal(covariance_forward(q, np.zeros((3, 1)))[0].rotation[:, :, 0], wanted)
 
 
 @pytest.mark.parametrize("dtype, u, exponents", [(np.float64, U64, (-300, 300)), (np.float32, U32, (-37, 37))])
@@ -229,6 +240,14 @@ def test_hard_P2_the_clamp_acts_on_the_jacobian_and_not_on_the_centre():
     np.testing.assert_array_equal(clamped.mean2d, free.mean2d)
     same = (clamped.covariance2d == free.covariance2d).all(axis=0)
     np.testing.assert_array_equal(same, [max(abs(x), abs(y)) < 1 for x, y in PLACES])
+
+
+def test_the_footprint_of_what_is_not_visible_is_zero():
+    camera, one = plain_camera(), np.array([[1.0], [0], [0], [0]])
+    shape, _ = covariance_forward(np.repeat(one, 2, axis=1), np.zeros((3, 2)))
+    projected, _ = projection_forward(np.array([[0.0, 0], [0, 0], [3.0, -3.0]]), shape, camera, PAPER)
+    found = footprint(projected)
+    assert projected.visible.tolist() == [True, False] and (found[:, 1] == 0).all() and (found[[0, 2], 0] > 0).all()
 
 
 @pytest.mark.parametrize("clamp", [0.0, 0.4, 1.3])
