@@ -5,7 +5,8 @@
 
 --only    kernels whose name starts so; may be given several times
 --sample  at most so many mutants of a kernel, evenly spread
---survivors   only what survived the run in the JSON file and is not listed as equivalent; what is noticed is added
+--survivors   only what survived the run in the JSON file and is not listed as equivalent, and what the source has
+              got since; the file is brought up to date
 The page docs/discrimination.md is made from the result by tests/mutation/page.py.
 """
 
@@ -31,7 +32,7 @@ from endotsr.runs import machine, now, versions  # noqa: E402
 from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
-from mutation.merge import added, survivors  # noqa: E402
+from mutation.merge import added, names, of_today, survivors  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
@@ -93,6 +94,7 @@ class Plugin:
     def __init__(self, options: argparse.Namespace):
         self.options, self.begin = options, time.monotonic()
         self.result: dict[str, Any] = {}
+        self.before = json.loads(options.json.read_text(encoding="utf-8")) if options.survivors else {}
 
     def say(self, text: str) -> None:
         print(f"{time.monotonic() - self.begin:7.0f} s  {text}", flush=True)
@@ -105,8 +107,8 @@ class Plugin:
         groups = [every(mutants(k, functions[k]), self.options.sample) for k in wanted]
         chosen += [m for row in zip_longest(*groups) for m in row if m is not None]  # so that a stop is fair to all
         if self.options.survivors:
-            alive = survivors(json.loads(self.options.json.read_text(encoding="utf-8")))
-            chosen = [m for m in chosen if m.name in alive]
+            self.before = of_today(self.before, functions)
+            chosen = [m for m in chosen if m.name in survivors(self.before) or m.name not in names(self.before)]
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
         checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
@@ -125,7 +127,7 @@ class Plugin:
         outcomes = {name: _without(outcome, alarms) for name, outcome in outcomes.items()}
         self.result = self.report(chosen, outcomes, checks) | {"false_alarms": sorted(alarms)}
         if self.options.survivors:
-            self.result = added(json.loads(self.options.json.read_text(encoding="utf-8")), self.result)
+            self.result = added(self.before, self.result)
         return True
 
     def false_alarms(self, outcomes: dict[str, Outcome], checks: Checks) -> set[str]:
@@ -187,7 +189,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="folder that keeps what was measured with the right kernels")
     parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long, 0 = never")
-    parser.add_argument("--survivors", action="store_true", help="only what survived the run in the JSON file")
+    parser.add_argument("--survivors", action="store_true", help="bring the JSON file up to date")
     parser.add_argument("--tests", nargs="+", default=FOLDERS, help="folders and files of tests")
     parser.add_argument("--json", type=Path, default=ROOT / "docs/results/discrimination.json")
     options = parser.parse_args(words)

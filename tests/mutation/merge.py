@@ -4,6 +4,13 @@ import json
 from typing import Any
 
 from mutation.equivalents import reasons
+from mutation.mutator import mutants
+from mutation.registry import defect_mutants
+
+
+def names(result: dict[str, Any]) -> set[str]:
+    """Every mutant and defect of a report."""
+    return {name for found in result["kernels"].values() for name in found} | result["defects"].keys()
 
 
 def survivors(result: dict[str, Any]) -> set[str]:
@@ -12,14 +19,28 @@ def survivors(result: dict[str, Any]) -> set[str]:
     return {name for name, (_, killed, _) in found.items() if max(killed) < 0} - reasons().keys()
 
 
+def of_today(result: dict[str, Any], functions: dict[str, Any]) -> dict[str, Any]:
+    """The report without the mutants and defects that today's source no longer has."""
+    kernels = {}
+    for kernel in result["kernels"].keys() & functions.keys():
+        today = {m.name for m in mutants(kernel, functions[kernel])}
+        kernels[kernel] = {name: row for name, row in result["kernels"][kernel].items() if name in today}
+    ordered = {kernel: kernels[kernel] for kernel in result["kernels"] if kernel in kernels}
+    planted = {d.name for d in defect_mutants(functions)}
+    return result | {"kernels": ordered, "defects": {n: r for n, r in result["defects"].items() if n in planted}}
+
+
 def added(before: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:
     """The first run with what a later one, of the same kernels and newer tests, noticed; checks keep their numbers."""
-    names = [*before["checks"], *(n for n in later["checks"] if n not in before["checks"])]
-    place = {k: names.index(name) for k, name in enumerate(later["checks"])}
-    merged = json.loads(json.dumps(before)) | {"checks": names}
-    for kernel, mutants in later["kernels"].items():
-        for name, (kind, killed, change) in mutants.items():
-            merged["kernels"][kernel][name] = [kind, [place.get(k, k) for k in killed], change]
+    checks = [*before["checks"], *(n for n in later["checks"] if n not in before["checks"])]
+    place = {k: checks.index(name) for k, name in enumerate(later["checks"])}
+    numbers = lambda killed: [place.get(k, k) for k in killed]
+    merged = json.loads(json.dumps(before)) | {"checks": checks}
+    for kernel, found in later["kernels"].items():
+        for name, (kind, killed, change) in found.items():
+            merged["kernels"].setdefault(kernel, {})[name] = [kind, numbers(killed), change]
+    for name, (kernel, killed) in later["defects"].items():
+        merged["defects"][name] = [kernel, numbers(killed)]
     again = {key: later["run"][key] for key in ("commit", "finished", "seconds")}
     merged["run"]["again"] = [*before["run"].get("again", []), again]
     return merged | {"false_alarms": sorted({*before["false_alarms"], *later["false_alarms"]})}

@@ -10,7 +10,7 @@ import pytest
 
 from mutation.equivalents import EQUIVALENT
 from mutation.kernels import kernels, planted
-from mutation.merge import added, survivors
+from mutation.merge import added, names, of_today, survivors
 from mutation.mutator import mutants
 from mutation.page import PAGE, RESULT, page, rows
 from mutation.registry import DEFECTS, defect_mutants
@@ -64,10 +64,20 @@ def test_a_later_run_of_survivors_is_added_by_name():
     }  # fmt: skip
     assert survivors(early) == {"k: alive"}
     late = {
-        "run": run | {"commit": "b"}, "checks": ["new", "x"], "false_alarms": [], "defects": {},
+        "run": run | {"commit": "b"}, "checks": ["new", "x"], "false_alarms": [], "defects": {"d": ["k", [-1, 1]]},
         "kernels": {"k": {"k: alive": ["sign", [-1, 0], 0.5]}},
     }  # fmt: skip
     both = added(early, late)
     assert both["checks"] == ["x", "y", "new"] and both["run"]["again"][0]["commit"] == "b"
     assert both["kernels"]["k"] == {"k: seen": ["sign", [0, -1], None], "k: alive": ["sign", [-1, 2], 0.5]}
+    assert both["defects"] == {"d": ["k", [-1, 0]]}
     assert survivors(both) == set() and survivors(early) == {"k: alive"}
+
+
+def test_what_the_source_no_longer_has_leaves_the_report(result):
+    functions = kernels() | planted()
+    kernel = "equations.matern.matern_weights"
+    old = {"kernels": {"gone.away": {}, kernel: {f"{kernel}: gone": ["sign", [0], None]}}, "defects": {"gone": []}}
+    assert of_today(old, functions) == {"kernels": {kernel: {}}, "defects": {}}
+    today = of_today(result, functions)
+    assert today["defects"] == result["defects"] and names(today) <= names(result)

@@ -157,6 +157,24 @@ def test_tile_lists_hold_every_pair_once_in_depth_order():
     assert lists.starts[0] == lists.pair_starts[0] == 0 and lists.pair_starts[-1] == lists.slots.size
 
 
+def test_boxes_are_no_wider_than_the_ellipse_and_a_rounding():
+    """A box that is too wide changes no picture; it only takes time."""
+    camera = plain_camera(200, 150, 80.0)
+    scene = random_scene(9, 400, camera)
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, _ = projection_forward(scene.position, shape, camera, PAPER)
+    opacity = log_opacity(scene.opacity_logit)
+    box, seen = screen_boxes(projected, opacity, PAPER, 200, 150)
+    reach = np.sqrt(np.maximum(2 * (opacity - np.log(PAPER.alpha_cutoff)), 0) * projected.covariance2d[[0, 2]])
+    for axis, pixels in enumerate((200, 150)):
+        middle = projected.mean2d[axis, seen] - 0.5
+        first = np.clip(np.ceil(middle - reach[axis, seen]), 0, None)
+        last = np.clip(np.floor(middle + reach[axis, seen]), None, pixels - 1)
+        wide, narrow = first - box[seen, 2 * axis], box[seen, 2 * axis + 1] - last
+        assert ((wide == 0) | (wide == 1)).all() and ((narrow == 0) | (narrow == 1)).all()
+        assert (wide == 0).mean() > 0.95 and (narrow == 0).mean() > 0.95
+
+
 @pytest.mark.parametrize("support", ["everywhere", "ellipse"])
 def test_without_a_cutoff_every_box_is_the_picture(support):
     """An ellipse has no end then."""

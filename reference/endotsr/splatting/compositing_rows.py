@@ -96,7 +96,7 @@ def _spans(record, top, left, log2_cutoff, lines):
 
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
     beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm. Where a huge
-    footprint just reaches a row, the reach is a difference of nearly equal numbers: its roundings are pixels (`faintest`).
+    footprint just reaches a row, the reach is a difference of nearly equal numbers: `faintest` allows for its rounding.
     """
     real = record.dtype.type
     half, one, zero = real(0.5), real(1), real(0)
