@@ -109,7 +109,7 @@ def noticed(module: str, source: str) -> bool:
     load_package()
     child = os.fork()
     if child == 0:
-        signal.alarm(300)  # a loop that never ends is noticed too
+        signal.setitimer(signal.ITIMER_PROF, 300)  # s of processor time: a loop that never ends is noticed too
         sys.stdout = sys.stderr = open(os.devnull, "w")
         try:
             load_changed(module, source)
