@@ -305,6 +305,10 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
         record[HALF_HEIGHT] = sigma * np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
         first, last = compositing_rows._rows_kernel(record, top)
         compositing_rows._spans_kernel(record, top, left, log2_cutoff, lines)
+        if distance <= 100:  # and no wider than the ellipse and a rounding: more rows would only take time
+            low, high = record[V] - 0.5 - top + np.array([-1, 1]) * record[HALF_HEIGHT]
+            assert np.ceil(max(low, 0)) - first in (0, 1) or low > 15
+            assert last - np.floor(min(high, 15)) in (0, 1) or high < 0
         a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
         for y in range(compositing_rows.TILE_HEIGHT):
             _, row2, shift, low, high = compositing_rows._line_kernel(lines, y)
