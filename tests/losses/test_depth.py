@@ -18,6 +18,14 @@ def loss_and_gradient(rendered, prior, mask, d_loss=1.0):
     return loss, normalised_depth_reverse(d_loss, saved)
 
 
+def test_the_target_is_zero_where_there_is_no_prior():
+    prior = depths()[1]
+    prior[0, :4] = 0.0, -3.0, np.nan, np.inf
+    target = depth_target(prior, tool_mask())
+    assert (target.normalised[0, :4] == 0).all() and not target.valid[0, :4].any()
+    assert target.normalised[1:].min() > 0 and target.normalised.max() == 1
+
+
 def test_a_soft_mask_is_refused():
     with pytest.raises(ValueError, match="mask must be boolean"):
         depth_target(depths()[1], tool_mask().astype(float))

@@ -226,6 +226,13 @@ def test_hard_G4_lengths_agree_after_many_rounds(rng, dtype):
     assert gaussians.count == 20
 
 
+@pytest.mark.parametrize("opacity", [1e-8, 0.005, 0.3, 0.9])
+def test_fainter_is_told_on_the_logit(opacity):
+    logit = np.log(opacity / (1 - opacity)) + np.array([-1e-6, 1e-6])
+    assert _fainter_than(logit, opacity).tolist() == [True, False]
+    assert _fainter_than(np.array([-800.0, 800.0]), 1.0).all()
+
+
 @pytest.mark.parametrize("opacity", [0.0, -1.0])
 def test_a_pruning_bound_of_zero_keeps_everything(rng, opacity):
     gaussians, adam = make(rng, 5)
