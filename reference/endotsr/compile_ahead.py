@@ -65,13 +65,15 @@ def _second(config: Config) -> subprocess.Popen | None:
 
 
 def done_before(config: Config) -> Path:
-    """The file whose presence says that everything was compiled once, with these components, for this processor."""
-    import llvmlite.binding
+    """The file whose presence says that all kernels of this source and these components exist for this processor."""
     import numba
+    from llvmlite.binding import get_host_cpu_name
+
+    from endotsr.jit import kernel_source_hash
 
     model = config.model
     parts = [name for name in ("deformation", "appearance", "spectral_motion", "laplacian") if getattr(model, name)]
-    words = (config.training.precision, *parts, config.raster.preset, llvmlite.binding.get_host_cpu_name())
+    words = (kernel_source_hash(), config.training.precision, *parts, config.raster.preset, get_host_cpu_name())
     return Path(numba.config.CACHE_DIR) / f"compiled-{'-'.join(words)}"  # type: ignore[attr-defined]
 
 

@@ -31,8 +31,177 @@ EQUIVALENT: tuple[Group, ...] = (
     Group(
         "At equality both sides of the choice are the same number.",
         (
-            "equations.appearance._exp_nonpositive: `z > real(SATURATED)` -> `z >= real(SATURATED)` in "
-            "`z = real(SATURATED) if z > real(SATURATED) else z`",
+            "equations.appearance._exp_nonpositive: `z > real(SATURATED)` -> `z >= real(SATURATED)` in `z = "
+            "real(SATURATED) if z > real(SATURATED) else z`",
+            "fitting.schedules.detail_share: `iteration >= config.loss.detail_full` -> `iteration > "
+            "config.loss.detail_full` in `if iteration >= config.loss.detail_full`",
+            "equations.matern.matern_weights: `scaled >= math.sqrt(5.0)` -> `scaled > math.sqrt(5.0)` in `if "
+            "scaled >= math.sqrt(5.0)`",
+            "scene.density_control._choose: `candidates.size > room` -> `candidates.size >= room` in `if "
+            "candidates.size > room`",
+            "scene.density_control._fainter_than: `opacity < 1.0` -> `opacity <= 1.0` in `bound = np.log(opacity) "
+            "- np.log1p(-opacity) if opacity < 1.0 else np.inf`",
+            "equations.calibration.calibration_views: `count <= 0` -> `count < 0` in `if n_train <= 0 or count <= 0`",
+            "equations.fourier.frequencies: `count > 1` -> `count >= 1` in `omega[-1] = high if count > 1 else low`",
+        ),
+    ),
+    Group(
+        "One task or block more, which finds nothing to do.",
+        (
+            "fitting.adam.adam_step: `(p.size + PIECE - 1) // PIECE` -> `(p.size + PIECE - 1) * PIECE` in `tasks "
+            "= (p.size + PIECE - 1) // PIECE`",
+            "fitting.adam.adam_step: `p.size + PIECE - 1` -> `p.size + PIECE + 1` in `tasks = (p.size + PIECE - "
+            "1) // PIECE`",
+            "fitting.adam.adam_step: `p.size + PIECE - 1` -> `p.size + PIECE` in `tasks = (p.size + PIECE - 1) // "
+            "PIECE`",
+            "splatting.projection.projection_reverse_footprint: `(n + BLOCK - 1) // BLOCK` -> `(n + BLOCK - 1) * "
+            "BLOCK` in `d_poses = np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)`",
+            "splatting.projection.projection_reverse_footprint: `n + BLOCK - 1` -> `n + BLOCK` in `d_poses = "
+            "np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)`",
+            "splatting.harmonics.harmonics_reverse: `n + BLOCK - 1` -> `n + BLOCK + 1` in `d_centres = "
+            "np.empty(((n + BLOCK - 1) // BLOCK, 3), dtype)`",
+            "splatting.harmonics.harmonics_reverse: `n + BLOCK - 1` -> `n + BLOCK` in `d_centres = np.empty(((n + "
+            "BLOCK - 1) // BLOCK, 3), dtype)`",
+            "splatting.harmonics.harmonics_forward: `position.shape[1] + BLOCK - 1` -> `position.shape[1] + BLOCK "
+            "+ 1` in `blocks = (position.shape[1] + BLOCK - 1) // BLOCK`",
+            "splatting.harmonics.harmonics_forward: `position.shape[1] + BLOCK - 1` -> `position.shape[1] + "
+            "BLOCK` in `blocks = (position.shape[1] + BLOCK - 1) // BLOCK`",
+            "splatting.compositing.composite_forward: `lists.starts.size - 1` -> `lists.starts.size + 1` in "
+            "`share(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, "
+            "background, *out)`",
+            "splatting.compositing.composite_forward: `lists.starts.size - 1` -> `lists.starts.size` in "
+            "`share(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, "
+            "background, *out)`",
+        ),
+    ),
+    Group(
+        "Scratch memory, or an array without a column, larger than what is read of it.",
+        (
+            "losses.smoothness._variation: `3` -> `4` in `scratch = np.empty((3, width), image.dtype)`",
+            "splatting.harmonics._colour_block: `e - a` -> `e` in `basis = np.empty((15, e - a), position.dtype)`",
+            "splatting.harmonics._colour_reverse_block: `e - a` -> `e + a` in `weight = np.zeros((15, e - a), "
+            "position.dtype)`",
+            "fitting.deformation_step.deformation_adam_step: `3` -> `4` in `root = np.empty(3)`",
+            "equations.pyramid._reduce: `2` -> `3` in `pairs = np.empty((m + 2, 2), fine.dtype)`",
+            "equations.pyramid._expand: `2` -> `3` in `blend = np.empty(m + 2, coarse.dtype)`",
+            "splatting.render.render_forward: `3` -> `4` in `back = np.zeros(3, dtype) if background is None else "
+            "np.ascontiguousarray(background, dtype)`",
+            "splatting.harmonics.harmonics_forward: `3` -> `4` in `extra = np.empty((3, 0), dtype) if residual is "
+            "None else residual`",
+            "splatting.compositing_rows.composite_rows_reverse: `0` -> `1` in `extra = np.empty((0, 0), dtype) if "
+            "d_opacity is None else d_opacity` (2)",
+            "equations.pyramid._table: `1` -> `2` in `starts = np.searchsorted(owners, np.arange(targets + 1))`",
+            "splatting.binning._radix_order: `1` -> `2` in `histogram = np.empty(1 << _RADIX_BITS, np.int64)`",
+            "losses.similarity.masked_ssim_forward: `3` -> `4` in `slopes = np.empty((3, *padded), rendered.dtype)`",
+            "splatting.binning.tile_lists: `1` -> `2` in `counts, pair_starts = (np.zeros((CHUNKS, tiles_x * "
+            "tiles_y), np.int64), np.zeros(n + 1, np.int64))`",
+        ),
+    ),
+    Group(
+        "Every cell is written again before it is read, or all cells are cleared in another order.",
+        (
+            "losses.similarity._clear_border: `-RADIUS` -> `RADIUS` in `for border in (slice(None, RADIUS), "
+            "slice(-RADIUS, None))`",
+            "equations.pyramid._gather_rows: `x` -> `x - 1` in `target[x] = real(0.0)`",
+            "equations.matern._row_square_sums: `k` -> `k - 1` in `lanes[k] = 0.0`",
+            "equations.atom_sums.spread: `np.zeros((tasks, coefficients.shape[1]))` -> `np.ones((tasks, "
+            "coefficients.shape[1]))` in `partial = np.zeros((tasks, coefficients.shape[1]))`",
+            "equations.atom_sums._spread: `min(n, start + BLOCK)` -> `max(n, start + BLOCK)` in `stop = min(n, "
+            "start + BLOCK)`",
+            "splatting.projection.projection_reverse: `np.zeros_like(d_covariance2d)` -> "
+            "`np.ones_like(d_covariance2d)` in `d_footprint = np.zeros_like(d_covariance2d)`",
+            "splatting.binning.screen_boxes: `np.zeros((projected.depth.size, 4), np.int32)` -> "
+            "`np.ones((projected.depth.size, 4), np.int32)` in `box = np.zeros((projected.depth.size, 4), "
+            "np.int32)`",
+        ),
+    ),
+    Group(
+        "What stands in for a number that is not used: a dead atom has gain 0, a zero quaternion is replaced.",
+        (
+            "equations.fourier.report_atoms: `1.0` -> `0.5` in `gain = np.where(statistics.dead, 0.0, 1.0 / "
+            "np.where(statistics.dead, 1.0, statistics.rms))` (2)",
+            "equations.fourier.normalise_forward: `1.0` -> `0.5` in `gain = np.where(statistics.dead, 0.0, 1.0 / "
+            "np.where(statistics.dead, 1.0, statistics.rms))` (2)",
+            "scene.density_control._rotations: `largest > 0.0` -> `largest >= 0.0` in `q = np.where(largest > "
+            "0.0, quaternion / np.where(largest > 0.0, largest, 1.0), [[1.0], [0.0], [0.0], [0.0]])` (2)",
+        ),
+    ),
+    Group(
+        "The logarithm of 0 or less is minus infinity or not a number, and nothing is below it; the statement "
+        "saves the warning.",
+        (
+            "scene.density_control._fainter_than: `if opacity <= 0.0` dropped",
+            "scene.density_control._fainter_than: `opacity <= 0.0` -> `opacity < 0.0` in `if opacity <= 0.0`",
+        ),
+    ),
+    Group(
+        "The end of a tile in which every pixel is finished is missed: more work, the same picture.",
+        (
+            "splatting.compositing_rows._finished: `0` -> `1` in `alive = np.int32(0)`",
+            "splatting.compositing_rows._finished: `alive += np.int32(buffer[_U64(j)] > zero)` -> `alive -= "
+            "np.int32(buffer[_U64(j)] > zero)` in `alive += np.int32(buffer[_U64(j)] > zero)`",
+            "splatting.compositing_rows._finished: `buffer[_U64(j)] > zero` -> `buffer[_U64(j)] >= zero` in "
+            "`alive += np.int32(buffer[_U64(j)] > zero)`",
+            "splatting.compositing_rows._blend_reverse: `if done` dropped",
+            "splatting.compositing_rows._blend: `break` dropped",
+        ),
+    ),
+    Group(
+        "A box, row or span is wider than it has to be, or a margin that is many times the rounding is halved.",
+        (
+            "splatting.binning._boxes: `ex + abs(x)` -> `abs(x)` in `ex += (ex + abs(x)) * real(1e-05) + margin`",
+            "splatting.binning._boxes: `0` -> `1` in `box[i, 0], box[i, 1], box[i, 2], box[i, 3] = (0, width - 1, "
+            "0, height - 1)` (2)",
+            "splatting.compositing_rows._spans: `u - half` -> `u` in `offset = u - half - real(left)`",
+        ),
+    ),
+    Group(
+        "The taps of the filter are the same from either side, and `zip` ends with the shorter sequence.",
+        (
+            "equations.pyramid.reduce_adjoint_table: `1` -> `2` in `for offset, tap in zip(range(-MARGIN, MARGIN "
+            "+ 1), BINOMIAL)`",
+            "equations.pyramid.reduce_adjoint_table: `2 * k + offset` -> `2 * k - offset` in `key = (_reflect(2 * "
+            "k + offset, n), k)`",
+            "equations.pyramid.reflect_indices: `2 * k + o` -> `2 * k - o` in `return [np.array([_reflect(2 * k + "
+            "o, n) for k in range(coarse_length(n))], np.int64) for o in taps]`",
+        ),
+    ),
+    Group(
+        "Whole turns are taken off once more with the quarter turns; taking them off before keeps the integer small.",
+        ("equations.fourier._sine_cosine: `phase - np.rint(phase)` -> `phase` in `turn = phase - np.rint(phase)`",),
+    ),
+    Group(
+        "A factor common to all frequencies cancels in the normalisation to mean 1.",
+        (
+            "equations.matern.matern_weights: `1.0 + small` -> `1.0` in `density = ((small + ratio ** 2) / (1.0 + "
+            "small)) ** 3`",
+        ),
+    ),
+    Group(
+        "The four partial sums of a fold are added in another order.",
+        (
+            "splatting.compositing_rows._fold_lanes: `base + _U64(lane)` -> `base` in `sums[base + _U64(lane)] += "
+            "sums[base + _U64(lane + LANES // 4)]`",
+        ),
+    ),
+    Group(
+        "A gradient that nobody asks for is formed as well.",
+        (
+            "fitting.model.scene_reverse: `False` -> `True` in `appearance = appearance_reverse(grads.residual, "
+            "saved.appearance, atom_gradient=False)`",
+            "fitting.model.scene_reverse: `False` -> `True` in `motion = motion_reverse(grads.position, "
+            "saved.motion, atom_gradient=False)`",
+        ),
+    ),
+    Group(
+        "The index -1 is the last cell as well.",
+        ("splatting.binning._tile_starts: `starts.size - 1` -> `-1` in `starts[starts.size - 1] = total`",),
+    ),
+    Group(
+        "No number is in an empty array.",
+        (
+            "equations.calibration.calibration_views: `np.zeros(0, np.int64)` -> `np.ones(0, np.int64)` in "
+            "`return np.zeros(0, np.int64)`",
         ),
     ),
 )
