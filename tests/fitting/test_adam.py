@@ -188,6 +188,26 @@ def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dty
         np.testing.assert_array_equal(states[0].second[name], states[1].second[name])
 
 
+def test_fused_step_with_rates_and_counters_of_their_own(rng):
+    """Every array, and every part of its channels, may have its own rate and its own number of steps."""
+    separate = _deformation(rng, np.float64, 2, 6)
+    fused = {name: a.copy() for name, a in separate.items()}
+    states = [adam_state(separate), adam_state(fused)]
+    parts = (slice(0, 3), slice(3, 7), slice(7, 10))
+    rates = {n: tuple((p, 1e-3 * (1 + 3 * i + j)) for j, p in enumerate(parts)) for i, n in enumerate(NAMES)}
+    for state in states:
+        state.step.update(zip(NAMES, (0, 4, 11), strict=True))
+    d_offsets = rng.normal(size=(10, 6))
+    _, saved = deformation_forward(*separate.values(), t=0.4)
+    grads = deformation_reverse(d_offsets, saved)
+    adam_update(states[0], separate, dict(zip(NAMES, grads[:3], strict=True)), rates, *BETAS)
+    _, saved = deformation_forward(*fused.values(), t=0.4)
+    deformation_adam_step(d_offsets, saved, states[1], rates, *BETAS)
+    assert states[0].step == states[1].step == dict(zip(NAMES, (1, 5, 12), strict=True))
+    for name in NAMES:
+        np.testing.assert_array_equal(separate[name], fused[name])
+
+
 def test_fused_step_refuses_arrays_that_disagree(rng):
     parameters = _deformation(rng, np.float64, 3, 4)
     out, saved = deformation_forward(*parameters.values(), t=0.5)

@@ -26,28 +26,6 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "equations.atom_sums._blocks: `n + BLOCK - 1` -> `n + BLOCK` in `return (n + BLOCK - 1) // BLOCK`",
             "equations.atom_sums._blocks: `n + BLOCK - 1` -> `n + BLOCK + 1` in `return (n + BLOCK - 1) // BLOCK`",
-        ),
-    ),
-    Group(
-        "At equality both sides of the choice are the same number.",
-        (
-            "equations.appearance._exp_nonpositive: `z > real(SATURATED)` -> `z >= real(SATURATED)` in `z = "
-            "real(SATURATED) if z > real(SATURATED) else z`",
-            "fitting.schedules.detail_share: `iteration >= config.loss.detail_full` -> `iteration > "
-            "config.loss.detail_full` in `if iteration >= config.loss.detail_full`",
-            "equations.matern.matern_weights: `scaled >= math.sqrt(5.0)` -> `scaled > math.sqrt(5.0)` in `if "
-            "scaled >= math.sqrt(5.0)`",
-            "scene.density_control._choose: `candidates.size > room` -> `candidates.size >= room` in `if "
-            "candidates.size > room`",
-            "scene.density_control._fainter_than: `opacity < 1.0` -> `opacity <= 1.0` in `bound = np.log(opacity) "
-            "- np.log1p(-opacity) if opacity < 1.0 else np.inf`",
-            "equations.calibration.calibration_views: `count <= 0` -> `count < 0` in `if n_train <= 0 or count <= 0`",
-            "equations.fourier.frequencies: `count > 1` -> `count >= 1` in `omega[-1] = high if count > 1 else low`",
-        ),
-    ),
-    Group(
-        "One task or block more, which finds nothing to do.",
-        (
             "fitting.adam.adam_step: `(p.size + PIECE - 1) // PIECE` -> `(p.size + PIECE - 1) * PIECE` in `tasks "
             "= (p.size + PIECE - 1) // PIECE`",
             "fitting.adam.adam_step: `p.size + PIECE - 1` -> `p.size + PIECE + 1` in `tasks = (p.size + PIECE - "
@@ -75,6 +53,23 @@ EQUIVALENT: tuple[Group, ...] = (
         ),
     ),
     Group(
+        "At equality both sides of the choice are the same number.",
+        (
+            "equations.appearance._exp_nonpositive: `z > real(SATURATED)` -> `z >= real(SATURATED)` in `z = "
+            "real(SATURATED) if z > real(SATURATED) else z`",
+            "fitting.schedules.detail_share: `iteration >= config.loss.detail_full` -> `iteration > "
+            "config.loss.detail_full` in `if iteration >= config.loss.detail_full`",
+            "equations.matern.matern_weights: `scaled >= math.sqrt(5.0)` -> `scaled > math.sqrt(5.0)` in `if "
+            "scaled >= math.sqrt(5.0)`",
+            "scene.density_control._choose: `candidates.size > room` -> `candidates.size >= room` in `if "
+            "candidates.size > room`",
+            "scene.density_control._fainter_than: `opacity < 1.0` -> `opacity <= 1.0` in `bound = np.log(opacity) "
+            "- np.log1p(-opacity) if opacity < 1.0 else np.inf`",
+            "equations.calibration.calibration_views: `count <= 0` -> `count < 0` in `if n_train <= 0 or count <= 0`",
+            "equations.fourier.frequencies: `count > 1` -> `count >= 1` in `omega[-1] = high if count > 1 else low`",
+        ),
+    ),
+    Group(
         "Scratch memory, or an array without a column, larger than what is read of it.",
         (
             "losses.smoothness._variation: `3` -> `4` in `scratch = np.empty((3, width), image.dtype)`",
@@ -95,6 +90,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "losses.similarity.masked_ssim_forward: `3` -> `4` in `slopes = np.empty((3, *padded), rendered.dtype)`",
             "splatting.binning.tile_lists: `1` -> `2` in `counts, pair_starts = (np.zeros((CHUNKS, tiles_x * "
             "tiles_y), np.int64), np.zeros(n + 1, np.int64))`",
+            "equations.matern.matern_penalty_reverse: `2` -> `3` in `factors = np.tile(factor, 2 * "
+            "axes).astype(coefficients.dtype)`",
         ),
     ),
     Group(
@@ -103,7 +100,9 @@ EQUIVALENT: tuple[Group, ...] = (
             "losses.similarity._clear_border: `-RADIUS` -> `RADIUS` in `for border in (slice(None, RADIUS), "
             "slice(-RADIUS, None))`",
             "equations.pyramid._gather_rows: `x` -> `x - 1` in `target[x] = real(0.0)`",
+            "equations.deformation._forward: `i` -> `i - 1` in `out[i] = weight.dtype.type(0)`",
             "equations.matern._row_square_sums: `k` -> `k - 1` in `lanes[k] = 0.0`",
+            "equations.matern._row_square_sums: `k` -> `k - 1` in `total += lanes[k]`",
             "equations.atom_sums.spread: `np.zeros((tasks, coefficients.shape[1]))` -> `np.ones((tasks, "
             "coefficients.shape[1]))` in `partial = np.zeros((tasks, coefficients.shape[1]))`",
             "equations.atom_sums._spread: `min(n, start + BLOCK)` -> `max(n, start + BLOCK)` in `stop = min(n, "
@@ -175,6 +174,10 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "equations.matern.matern_weights: `1.0 + small` -> `1.0` in `density = ((small + ratio ** 2) / (1.0 + "
             "small)) ** 3`",
+            "equations.matern.matern_weights: `5.0 + scaled ** 2` -> `5.0` in `density = ((5.0 + (scaled * ratio) "
+            "** 2) / (5.0 + scaled ** 2)) ** 3`",
+            "equations.matern.matern_weights: `2` -> `3` in `density = ((5.0 + (scaled * ratio) ** 2) / (5.0 + "
+            "scaled ** 2)) ** 3` (2)",
         ),
     ),
     Group(
@@ -198,10 +201,62 @@ EQUIVALENT: tuple[Group, ...] = (
         ("splatting.binning._tile_starts: `starts.size - 1` -> `-1` in `starts[starts.size - 1] = total`",),
     ),
     Group(
+        "A weight of 0 stands before it.",
+        ("equations.deformation._reverse_row: `0` -> `1` in `ratio = real(0) if exponent < cut else ratio`",),
+    ),
+    Group(
+        "Without a cutoff its logarithm is not used.",
+        (
+            "splatting.render.render_forward: `0.0` -> `1.0` in `log_cutoff = math.log(settings.alpha_cutoff) if "
+            "settings.alpha_cutoff > 0 else 0.0`",
+            "splatting.binning.screen_boxes: `0.0` -> `1.0` in `log_cutoff = "
+            "projected.depth.dtype.type(math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0)`",
+        ),
+    ),
+    Group(
+        "All cells of a sum are shifted in a circle: the same sum in another order.",
+        (
+            "splatting.harmonics._colour_reverse_blocks: `block` -> `block - 1` in "
+            "`_colour_reverse_kernel(harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, "
+            "d_position, d_centres[block], a, e)`",
+            "losses.depth._residual: `i` -> `i - 1` in `signed[i] = with_sign if use[i] else zero`",
+            "equations.atom_sums._atom_totals: `k` -> `k - 1` in `rest += lanes[k]`",
+        ),
+    ),
+    Group(
+        "Both forms are accurate to rounding on either side of the switch.",
+        ("equations.appearance._tanh_and_slope: `0.5` -> `0.25` in `value = small if size < real(0.5) else large`",),
+    ),
+    Group(
+        "So far out the basis value is below 2^-60, and 0 in its place changes nothing.",
+        (
+            "equations.deformation._add_row: `exponent < cut` -> `exponent <= cut` in `out[i] += weight[i] * "
+            "(real(0) if exponent < cut else value)`",
+            "equations.deformation._basis_constants: `2` -> `3` in `return (real(-0.5 * LOG2_E), real(0), "
+            "real(1), real(2 * LARGEST_U), real(1))`",
+        ),
+    ),
+    Group(
+        "No rounding of a root mean square falls on the bound exactly.",
+        (
+            "equations.fourier.atom_statistics: `rms < DEAD_RMS` -> `rms <= DEAD_RMS` in `return "
+            "AtomStatistics(mean, rms, rms < DEAD_RMS)`",
+        ),
+    ),
+    Group(
+        "The loss is off, and its reverse pass reads nothing else.",
+        (
+            "losses.depth.normalised_depth_forward: `0.0` -> `1.0` in `return (0.0, DepthSaved(rendered_depth, "
+            "target, 0.0, 0.0))` (3)",
+        ),
+    ),
+    Group(
         "No number is in an empty array.",
         (
             "equations.calibration.calibration_views: `np.zeros(0, np.int64)` -> `np.ones(0, np.int64)` in "
             "`return np.zeros(0, np.int64)`",
+            "fitting.objective.photometric_loss: `np.zeros((0, 0), colour.dtype)` -> `np.ones((0, 0), "
+            "colour.dtype)` in `return ImageLoss(loss, terms, d_colour, np.zeros((0, 0), colour.dtype))`",
         ),
     ),
 )

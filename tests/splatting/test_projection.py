@@ -242,6 +242,24 @@ def test_hard_P2_the_clamp_acts_on_the_jacobian_and_not_on_the_centre():
     np.testing.assert_array_equal(same, [max(abs(x), abs(y)) < 1 for x, y in PLACES])
 
 
+@pytest.mark.parametrize("dtype, far", [(np.float64, 1e70), (np.float32, 1e20)])
+@pytest.mark.parametrize("place", ["x", "y", "quaternion", "log_scale"])
+def test_out_of_range_or_not_a_number_is_not_visible_and_all_zero(place, dtype, far):
+    position, q, s = (
+        np.array([[0.1], [0.2], [3.0]], dtype),
+        np.array([[1.0], [0], [0], [0]], dtype),
+        np.zeros((3, 1), dtype),
+    )
+    if place in "xy":
+        position["xy".index(place)] = far
+    (q if place == "quaternion" else s)[0] = np.nan if len(place) > 1 else 0.5
+    shape, _ = covariance_forward(q, s)
+    projected, _ = projection_forward(position, shape, plain_camera(), PAPER)
+    assert not projected.visible[0]
+    for name in ("mean2d", "covariance2d", "determinant", "depth"):
+        assert not getattr(projected, name).any(), name
+
+
 def test_the_footprint_of_what_is_not_visible_is_zero():
     camera, one = plain_camera(), np.array([[1.0], [0], [0], [0]])
     shape, _ = covariance_forward(np.repeat(one, 2, axis=1), np.zeros((3, 2)))

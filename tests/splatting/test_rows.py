@@ -320,3 +320,16 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
                 assert first <= y <= last
                 assert low <= reached[0] and reached[-1] <= high
     assert passing > 1000
+
+
+def test_the_half_height_is_that_of_the_ellipse():
+    scene, camera = random_65x47()
+    scene.opacity_logit[:20] = -7.0  # fainter than the cutoff: no height
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    projected, _ = projection_forward(scene.position, shape, camera, PAPER)
+    log_alpha, order = log_opacity(scene.opacity_logit), np.flatnonzero(projected.visible).astype(np.int32)
+    records = pack_records(order, projected, log_alpha, np.zeros((3, 200)), np.log(PAPER.alpha_cutoff))
+    reach = np.maximum(log_alpha[order] - np.log(PAPER.alpha_cutoff), 0)
+    assert 0 < (reach == 0).sum() < order.size
+    wanted = np.sqrt(2 * reach * projected.covariance2d[2, order])
+    np.testing.assert_allclose(records[:, HALF_HEIGHT], wanted, rtol=1e-12)
