@@ -100,6 +100,7 @@ EQUIVALENT: tuple[Group, ...] = (
             "losses.similarity._clear_border: `-RADIUS` -> `RADIUS` in `for border in (slice(None, RADIUS), "
             "slice(-RADIUS, None))`",
             "equations.pyramid._gather_rows: `x` -> `x - 1` in `target[x] = real(0.0)`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `d_position[k, i] = zero`",
             "equations.deformation._forward: `i` -> `i - 1` in `out[i] = weight.dtype.type(0)`",
             "equations.matern._row_square_sums: `k` -> `k - 1` in `lanes[k] = 0.0`",
             "equations.matern._row_square_sums: `k` -> `k - 1` in `total += lanes[k]`",
@@ -146,12 +147,15 @@ EQUIVALENT: tuple[Group, ...] = (
         ),
     ),
     Group(
-        "A box, row or span is wider than it has to be, or a margin that is many times the rounding is halved.",
+        "A box, row or span is wider than it has to be, or a margin is still wider than the roundings of any "
+        "input we tried.",
         (
             "splatting.binning._boxes: `ex + abs(x)` -> `abs(x)` in `ex += (ex + abs(x)) * real(1e-05) + margin`",
             "splatting.binning._boxes: `0` -> `1` in `box[i, 0], box[i, 1], box[i, 2], box[i, 3] = (0, width - 1, "
             "0, height - 1)` (2)",
             "splatting.compositing_rows._spans: `u - half` -> `u` in `offset = u - half - real(left)`",
+            "splatting.compositing_rows._spans: `one - log2_cutoff` -> `one` in `faintest = log2_cutoff - (one - "
+            "log2_cutoff) * real(1e-06)`",
         ),
     ),
     Group(

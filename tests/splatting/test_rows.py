@@ -316,6 +316,10 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
             e = (f32(left) + x.astype(f32) + f32(0.5)) - record[U] - f32(shift)
             reached = np.flatnonzero(f32(row2) - a2 * e * e >= log2_cutoff)
             passing += reached.size
+            if distance <= 100 and first <= y <= last and row2 > log2_cutoff:
+                middle, half = record[U] + shift - 0.5 - left, np.sqrt((row2 - log2_cutoff) / a2)
+                assert low >= min(max(np.floor(middle - half) - 1, 0), 32)
+                assert high <= max(min(np.floor(middle + half) + 1, 31), -1)
             if reached.size:
                 assert first <= y <= last
                 assert low <= reached[0] and reached[-1] <= high
