@@ -13,7 +13,7 @@ import pytest
 
 from endotsr import sharing
 from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.sharing import share, together
 
 
 def _count(first, stop, out):
@@ -93,6 +93,39 @@ def test_calls_from_several_threads(threads):
     for caller in callers:
         caller.join()
     assert all((out == 50).all() for out in outs)
+
+
+def test_results_of_calls_made_together_keep_their_order(threads):
+    def call(k):
+        out = np.zeros(500, np.int64)
+        for _ in range(5):
+            share(count, 500, out)
+        time.sleep(0.001 * (3 - k % 3))
+        return k, numba.get_num_threads(), (out == 5).all()
+
+    for _ in range(5):
+        assert together(*(lambda k=k: call(k) for k in range(7))) == [(k, threads, True) for k in range(7)]
+    assert together() == []
+
+
+def test_calls_made_together_run_at_the_same_time(threads):
+    """Two calls that wait for each other end only if they run in two threads."""
+    if threads == 1 or numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        pytest.skip("one after the other")
+    meeting = threading.Barrier(2, timeout=20)
+    assert sorted(together(meeting.wait, meeting.wait)) == [0, 1]
+
+
+def test_the_error_of_a_call_is_raised_after_all_have_ended(threads):
+    ended = []
+
+    def fail():
+        raise ValueError("second")
+
+    with pytest.raises(ValueError, match="second"):
+        together(lambda: ended.append(1), fail, lambda: (time.sleep(0.02), ended.append(3)))
+    assert sorted(ended) == [1, 3]
+    assert together(lambda: 1, lambda: 2) == [1, 2]
 
 
 def test_arrays_are_let_go(threads):

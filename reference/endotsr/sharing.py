@@ -47,8 +47,34 @@ def share(kernel: Callable[..., Any], tasks: int, *arguments: Any) -> None:
         if tasks > 0:
             kernel(0, tasks, *arguments)
         return
+    _distribute(kernel, arguments, ranges(tasks, threads), threads)
+
+
+def together(*calls: Callable[[], Any]) -> list[Any]:
+    """The results of calls that do not depend on one another, in their order, made at the same time.
+
+    For work between kernels: a thread that has nothing else to do takes the next call, or helps in the `share` of one.
+    With one thread, or without compiled code, which would hold the interpreter lock: one after the other.
+    Raises:  what a call raises, after all have ended.
+    """
+    alone = numba.config.DISABLE_JIT  # type: ignore[attr-defined]
+    threads, results = 1 if alone else numba.get_num_threads(), [None] * len(calls)
+
+    def make(first: int, stop: int) -> None:
+        if not alone:
+            numba.set_num_threads(threads)  # the setting belongs to a thread
+        for k in range(first, stop):
+            results[k] = calls[k]()
+
+    _distribute(make, (), [(k, k + 1) for k in range(len(calls))], threads)
+    return results
+
+
+def _distribute(
+    kernel: Callable[..., Any], arguments: tuple[Any, ...], pieces: list[tuple[int, int]], threads: int
+) -> None:
+    """Every piece in one of the threads, this one included; waits for all of them."""
     _hire(threads - 1)
-    pieces = ranges(tasks, threads)
     job = _Job(kernel, arguments, iter(pieces), SimpleQueue())
     for _ in range(threads - 1):
         _jobs.put(job)

@@ -5,7 +5,8 @@ L = (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_msp L_msp + lambda_l
 The spectral penalty acts on coefficients, not on images, and is added by the trainer.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from endotsr.equations.laplacian import (
     laplacian_loss_reverse,
     support_masks,
 )
+from endotsr.equations.pyramid import Upsampling
 from endotsr.fitting.model import Spectral, render_at
 from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
 from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
@@ -27,6 +29,7 @@ from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
 from endotsr.sequences.sequence import Frame, Sequence
+from endotsr.sharing import together
 from endotsr.splatting.render import RenderOut
 
 FloatArray = NDArray[np.floating]
@@ -86,32 +89,59 @@ def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -
     return ImageLoss(loss, terms, d_colour, np.zeros((0, 0), colour.dtype))
 
 
+class Term(NamedTuple):
+    """One weighted term; a gradient that it has not is None."""
+
+    value: float  # unweighted
+    d_colour: FloatArray | None
+    d_depth: FloatArray | None
+
+
+def depth_term(rendered: RenderOut, target: DepthTarget, weight: float) -> Term:
+    """Normalised depth."""
+    value, saved = normalised_depth_forward(rendered.depth, target)
+    return Term(value, None, normalised_depth_reverse(weight, saved))
+
+
+def smoothness_term(rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float) -> Term:
+    """Smooth depth away from its edges, and total variation."""
+    edges = canny_edges(rendered.depth)
+    value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
+    smooth = smoothness_reverse(weight, saved)
+    return Term(value, smooth.rendered, smooth.rendered_depth)
+
+
+def laplacian_term(
+    colour: FloatArray, image: FloatArray, supports: SupportMasks, weight: float, rule: Upsampling
+) -> Term:
+    """Detail between the bands of two pyramids."""
+    value, saved = laplacian_loss_forward(colour, image, supports, rule)
+    return Term(value, laplacian_loss_reverse(weight, saved), None)
+
+
 def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig) -> ImageLoss:
-    """All image terms of equation (6) for one view.
+    """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
     """
-    loss, terms, d_colour, _ = photometric_loss(rendered.colour, targets, weights.ssim)
-    d_depth = np.zeros_like(rendered.depth)
-    if weights.depth > 0 and targets.depth is not None:
-        value, saved = normalised_depth_forward(rendered.depth, targets.depth)
-        loss += weights.depth * value
-        terms["depth"] = value
-        d_depth = normalised_depth_reverse(weights.depth, saved)
+    colour, (image, mask, _, depth, supports) = rendered.colour, targets
+    calls: dict[str, Callable[[], Any]] = {"": lambda: photometric_loss(colour, targets, weights.ssim)}
+    if weights.depth > 0 and depth is not None:
+        calls["depth"] = lambda: depth_term(rendered, depth, weights.depth)
     if weights.smoothness > 0:
-        edges = canny_edges(rendered.depth)
         factor = config.total_variation_factor
-        value, saved = smoothness_forward(rendered.depth, rendered.colour, targets.mask, edges, factor)
-        loss += weights.smoothness * value
-        terms["smoothness"] = value
-        smooth = smoothness_reverse(weights.smoothness, saved)
-        d_colour += smooth.rendered
-        d_depth += smooth.rendered_depth
-    if weights.laplacian > 0 and targets.supports is not None:
-        value, saved = laplacian_loss_forward(rendered.colour, targets.image, targets.supports, config.upsampling)
-        loss += weights.laplacian * value
-        terms["laplacian"] = value
-        d_colour += laplacian_loss_reverse(weights.laplacian, saved)
+        calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
+    if weights.laplacian > 0 and supports is not None:
+        calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
+    (loss, terms, d_colour, _), *others = together(*calls.values())
+    d_depth = np.zeros_like(rendered.depth)
+    for name, term in zip(list(calls)[1:], others, strict=True):
+        loss += getattr(weights, name) * term.value
+        terms[name] = term.value
+        if term.d_colour is not None:
+            d_colour += term.d_colour
+        if term.d_depth is not None:
+            d_depth += term.d_depth
     return ImageLoss(loss, terms, d_colour, d_depth)
 
 
