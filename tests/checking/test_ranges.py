@@ -1,6 +1,9 @@
 """A result must not depend on how `share` cuts the tasks of a kernel: every task writes cells of its own."""
 
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,3 +38,10 @@ def test_tasks_in_any_ranges_and_order_give_the_same_bits(name, monkeypatch):
     assert whole.keys() == cut.keys()
     for key, value in whole.items():
         assert np.array_equal(value, cut[key]), key
+
+
+def test_pieces_of_any_length_without_the_compiler():
+    file = Path(__file__).with_name("pieces_without_compiler.py")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)]
+    done = subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True)
+    assert done.returncode == 0 and " passed" in done.stdout, done.stdout[-3000:]

@@ -47,7 +47,7 @@ FOLDERS = (
     "hard",
     "properties",
     "checking/test_ranges.py",
-    "checking/test_pieces.py",
+    "checking/pieces_without_compiler.py",
 )
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
 LATER = 30.0  # s of further checks for a mutant that no suite has noticed and that is not listed as equivalent

@@ -1,13 +1,10 @@
 """A result must not depend on the length of the pieces that a kernel takes its arrays in.
 
-The lengths are compiled into the kernels, so this runs with the compiler off, in a process of its own; there they are
-set to a few numbers, and arrays of a dozen already have whole and broken pieces.
+The lengths are compiled into the kernels, so `test_ranges.py` runs this file in a process without the compiler; there
+they are set to a few numbers, and arrays of a dozen already have whole and broken pieces.
 """
 
-import os
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,17 +15,7 @@ from endotsr.fitting.adam import adam_state, adam_update
 from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
 
 PAIRS = all_pairs()
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
-plain_python = pytest.mark.skipif(not PLAIN, reason="runs in a process without the compiler")
 NAMES_OF_LENGTHS = ("PIECE", "BLOCK", "ROWS")
-
-
-@pytest.mark.skipif(PLAIN, reason="this is that process")
-def test_the_rest_of_this_file_without_the_compiler():
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(Path(__file__))]
-    done = subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout[-3000:]
-    assert " passed" in done.stdout
 
 
 def shorten(monkeypatch, length):
@@ -43,7 +30,6 @@ def shorten(monkeypatch, length):
     assert changed >= 6
 
 
-@plain_python
 @pytest.mark.parametrize("length", [1, 4])
 @pytest.mark.parametrize("name", list(PAIRS))
 def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
@@ -66,7 +52,6 @@ def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
         np.testing.assert_allclose(cut[key], value, rtol=1e-9, atol=1e-12 * largest, err_msg=key)
 
 
-@plain_python
 @pytest.mark.parametrize("length, count", [(4, 11), (4, 8), (5, 9), (1, 3)])
 @pytest.mark.parametrize("ranges", ["whole", "one by one"])
 def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
