@@ -255,6 +255,13 @@ EQUIVALENT: tuple[Group, ...] = (
         ),
     ),
     Group(
+        "Both sequences have one entry a call; `strict` is a guard.",
+        (
+            "fitting.objective.image_loss: `True` -> `False` in `for name, term in zip(list(calls)[1:], others, "
+            "strict=True)`",
+        ),
+    ),
+    Group(
         "No number is in an empty array.",
         (
             "equations.calibration.calibration_views: `np.zeros(0, np.int64)` -> `np.ones(0, np.int64)` in "
