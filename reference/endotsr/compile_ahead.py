@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 
 from endotsr.commands.threads import len_cores
-from endotsr.config import Config, SequenceConfig
+from endotsr.config import Config
 
 READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # referred to until this process ends: nobody waits for their last kernels
@@ -36,7 +36,7 @@ def compile_ahead(config: Config, say: Callable[[str], None] = lambda line: None
         return False
     say("compiling for this machine, once; this takes about half a minute")
     helper = _second(config)
-    rehearse_picture(config)
+    rehearse_picture(*_small(config))
     if helper is not None and helper.stdout is not None:
         helper.stdout.readline()  # READY, or the end of a process that failed
     return True
@@ -79,11 +79,12 @@ def done_before(config: Config) -> Path:
 
 def rehearse(config: Config) -> None:
     """Compile, or load, everything that a training with these settings calls, in this process: for fair timing."""
-    rehearse_picture(config)
-    rehearse_losses(config, everything=True)
-    rehearse_optimiser(config)
-    rehearse_residuals(config)
-    rehearse_densification(config)
+    shop, state = _small(config)
+    rehearse_picture(shop, state)
+    rehearse_losses(shop, everything=True)
+    rehearse_optimiser(shop, state)
+    rehearse_residuals(shop, state)
+    rehearse_densification(shop, state)
 
 
 def _small(config: Config) -> tuple[Any, Any]:
@@ -91,19 +92,17 @@ def _small(config: Config) -> tuple[Any, Any]:
     from endotsr.bench import workload
     from endotsr.fitting.trainer import bench_state, workshop
 
-    config = msgspec.structs.replace(config, sequence=SequenceConfig())
     shop = workshop(workload.sequence(64, 48, frames=3), config)
     return shop, bench_state(workload.gaussians(64, config), config, 0)
 
 
-def rehearse_picture(config: Config) -> None:
+def rehearse_picture(shop: Any, state: Any) -> None:
     """Deformation, splatting and its reverse pass, density statistics."""
     from endotsr.fitting.model import raster_settings, scene_at, scene_reverse, without
     from endotsr.scene.density_control import gather_statistics
     from endotsr.splatting.render import render_forward, render_reverse
 
-    shop, state = _small(config)
-    camera = shop.sequence.cameras[0]
+    config, camera = shop.config, shop.sequence.cameras[0]
     base = without(state.gaussians, appearance=False, spectral_motion=False)
     scene, saved = scene_at(base, shop.spectral, config.model, 0.5)
     out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
@@ -112,20 +111,20 @@ def rehearse_picture(config: Config) -> None:
     scene_reverse(grads, saved)
 
 
-def rehearse_losses(config: Config, everything: bool) -> None:
+def rehearse_losses(shop: Any, everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule switches on later."""
     from endotsr.fitting.objective import LossWeights, frame_targets, image_loss
     from endotsr.splatting.render import RenderOut
 
-    shop, _ = _small(config)
-    frame, loss = shop.sequence.frame(0, config.training.precision), config.loss
+    config, loss = shop.config, shop.config.loss
+    frame = shop.sequence.frame(0, config.training.precision)
     later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
     seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no term is at its end: all kernels run
     image_loss(seen, frame_targets(frame, config), weights, config.loss)
 
 
-def rehearse_optimiser(config: Config) -> None:
+def rehearse_optimiser(shop: Any, state: Any) -> None:
     """Adam, fused with the reverse pass of the deformation."""
     import numpy as np
 
@@ -135,8 +134,7 @@ def rehearse_optimiser(config: Config) -> None:
     from endotsr.fitting.schedules import learning_rates
     from endotsr.scene.gaussians import arrays
 
-    _, state = _small(config)
-    rates, o = learning_rates(1, config), config.optimiser
+    config, rates, o = shop.config, learning_rates(1, shop.config), shop.config.optimiser
     given = {name: array for name, array in arrays(state.gaussians).items() if name in rates and name not in NAMES}
     adam_update(state.adam, given, given, rates, o.beta1, o.beta2, o.epsilon)
     weight, centre, width = (getattr(state.gaussians, name) for name in NAMES)
@@ -147,7 +145,7 @@ def rehearse_optimiser(config: Config) -> None:
         deformation_adam_step(d_offsets, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
 
 
-def rehearse_residuals(config: Config) -> None:
+def rehearse_residuals(shop: Any, state: Any) -> None:
     """Both Fourier residuals, their reverse passes and the penalty."""
     import numpy as np
 
@@ -155,10 +153,9 @@ def rehearse_residuals(config: Config) -> None:
     from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
     from endotsr.equations.motion import motion_forward, motion_reverse
 
-    shop, state = _small(config)
     colour, motion = state.gaussians.colour_coefficients, state.gaussians.motion_coefficients
     if colour is not None:
-        residual, saved = appearance_forward(colour, np.zeros(colour.shape[1], colour.dtype), config.model.beta)
+        residual, saved = appearance_forward(colour, np.zeros(colour.shape[1], colour.dtype), shop.config.model.beta)
         appearance_reverse(residual, saved, atom_gradient=False)
     if motion is not None:
         translation, motion_saved = motion_forward(motion, np.zeros(motion.shape[1], motion.dtype))
@@ -167,14 +164,13 @@ def rehearse_residuals(config: Config) -> None:
         matern_penalty_reverse(1.0, penalty_saved)
 
 
-def rehearse_densification(config: Config) -> None:
+def rehearse_densification(shop: Any, state: Any) -> None:
     """The gather of every array."""
     from endotsr.scene.density_control import densify
 
-    shop, state = _small(config)
     state.statistics.gradient_sum[:] = 1.0
     state.statistics.visits[:] = 1
-    densify(state.gaussians, state.adam, state.statistics, config.density, state.rng, shop.extent)
+    densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
 
 
 def _second_process() -> None:
@@ -183,12 +179,13 @@ def _second_process() -> None:
 
     config = msgspec.json.decode(sys.stdin.buffer.read(), type=Config)
     use_threads(1)
-    rehearse_losses(config, everything=False)
-    rehearse_optimiser(config)
+    shop, state = _small(config)
+    rehearse_losses(shop, everything=False)
+    rehearse_optimiser(shop, state)
     print(READY, flush=True)
-    rehearse_residuals(config)
-    rehearse_losses(config, everything=True)
-    rehearse_densification(config)
+    rehearse_residuals(shop, state)
+    rehearse_losses(shop, everything=True)
+    rehearse_densification(shop, state)
     done_before(config).touch()
 
 

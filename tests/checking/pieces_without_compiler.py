@@ -8,13 +8,13 @@ import sys
 
 import numpy as np
 import pytest
+from test_ranges import PAIRS, both_passes, one_by_one_backwards
 
-from endotsr.checking import all_pairs, one_thread, pair_stream
+from endotsr.checking import one_thread, pair_stream
 from endotsr.equations.deformation import CHANNELS, deformation_forward, deformation_reverse
 from endotsr.fitting.adam import adam_state, adam_update
 from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
 
-PAIRS = all_pairs()
 NAMES_OF_LENGTHS = ("PIECE", "BLOCK", "ROWS")
 
 
@@ -38,15 +38,10 @@ def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
     rng = pair_stream(name, 3)
     inputs = pair.inputs(rng)
     cotangents = {k: np.asarray(rng.standard_normal(np.shape(v))) for k, v in pair.forward(inputs).items()}
-
-    def both():
-        reverse = pair.reverse(inputs, cotangents)
-        return dict(pair.forward(inputs)) | {f"gradient of {k}": v for k, v in reverse.items()}
-
     with one_thread():
-        whole = both()
+        whole = both_passes(pair, inputs, cotangents)
         shorten(monkeypatch, length)
-        cut = both()
+        cut = both_passes(pair, inputs, cotangents)
     for key, value in whole.items():
         largest = np.abs(value).max(initial=0.0)
         np.testing.assert_allclose(cut[key], value, rtol=1e-9, atol=1e-12 * largest, err_msg=key)
@@ -73,16 +68,12 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
                 adam_update(state, parameters, grads, rates, 0.9, 0.999, 1e-15)
         return [*parameters.values(), *state.first.values(), *state.second.values()]
 
-    def one_by_one(kernel, tasks, *arguments):
-        for task in range(tasks - 1, -1, -1):
-            kernel(task, task + 1, *arguments)
-
     with one_thread():
         whole = stepped(False)
         shorten(monkeypatch, length)
         if ranges == "one by one":
             for module in ("equations.deformation", "fitting.adam", "fitting.deformation_step"):
-                monkeypatch.setattr(sys.modules[f"endotsr.{module}"], "share", one_by_one)
+                monkeypatch.setattr(sys.modules[f"endotsr.{module}"], "share", one_by_one_backwards)
         for fused in (False, True):
             for one, two in zip(stepped(fused), whole, strict=True):
                 np.testing.assert_array_equal(one, two)

@@ -22,12 +22,12 @@ def survivors(result: dict[str, Any]) -> set[str]:
 def of_today(result: dict[str, Any], functions: dict[str, Any]) -> dict[str, Any]:
     """The report without the mutants and defects that today's source no longer has."""
     kernels = {}
-    for kernel in result["kernels"].keys() & functions.keys():
-        today = {m.name for m in mutants(kernel, functions[kernel])}
-        kernels[kernel] = {name: row for name, row in result["kernels"][kernel].items() if name in today}
-    ordered = {kernel: kernels[kernel] for kernel in result["kernels"] if kernel in kernels}
+    for kernel, found in result["kernels"].items():
+        if kernel in functions:
+            today = {m.name for m in mutants(kernel, functions[kernel])}
+            kernels[kernel] = {name: row for name, row in found.items() if name in today}
     planted = {d.name for d in defect_mutants(functions)}
-    return result | {"kernels": ordered, "defects": {n: r for n, r in result["defects"].items() if n in planted}}
+    return result | {"kernels": kernels, "defects": {n: r for n, r in result["defects"].items() if n in planted}}
 
 
 def added(before: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:

@@ -88,7 +88,8 @@ def page(result: dict[str, Any]) -> str:
     sample = f", at most {run['sample']} a function, evenly spread over its source" if run["sample"] else ""
     sample += f", as many as {run['minutes']:g} minutes allow" if run["minutes"] else ""
     machine = run["machine"]
-    again = [f" What survived was put to the tests of revision {a['commit']} again." for a in run.get("again", [])]
+    later = run.get("again", [])
+    again = f" What survived was put to the tests of revision {later[-1]['commit']} again." if later else ""
     lines = [
         "# What the tests can tell apart",
         "",
@@ -112,7 +113,7 @@ def page(result: dict[str, Any]) -> str:
         f"{' --minutes ' + format(run['minutes'], 'g') if run['minutes'] else ''}`. "
         f"The kernels run as plain Python here; checks that take longer than {run['slow']:g} s that way are left out "
         f"({len(result['left_out'])} of {len(result['left_out']) + len(result['checks'])}), so a suite may notice more "
-        f"than is counted.{again[-1] if again else ''}",
+        f"than is counted.{again}",
         "",
         "## Summary",
         "",
