@@ -5,8 +5,8 @@
 
 --only    kernels whose name starts so; may be given several times
 --sample  at most so many mutants of a kernel, evenly spread
---survivors   only what survived the run in the JSON file and is not listed as equivalent, and what the source has
-              got since; the file is brought up to date
+--survivors   only what survived the run in the JSON file and is not listed as equivalent, and what is not in the file;
+              the file is brought up to date (a run that is cut short by --minutes is continued so)
 The page docs/discrimination.md is made from the result by tests/mutation/page.py.
 """
 
@@ -32,7 +32,7 @@ from endotsr.runs import machine, now, versions  # noqa: E402
 from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
-from mutation.merge import added, names, of_today, survivors  # noqa: E402
+from mutation.merge import added, names, of_today, survivors, whole  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
 from mutation.registry import DEFECT, defect_mutants  # noqa: E402
@@ -128,6 +128,8 @@ class Plugin:
         self.result = self.report(chosen, outcomes, checks) | {"false_alarms": sorted(alarms)}
         if self.options.survivors:
             self.result = added(self.before, self.result)
+            if whole(self.result, kernels()):
+                self.result["run"] |= {"sample": 0, "minutes": 0.0}
         return True
 
     def false_alarms(self, outcomes: dict[str, Outcome], checks: Checks) -> set[str]:

@@ -256,10 +256,7 @@ EQUIVALENT: tuple[Group, ...] = (
     ),
     Group(
         "Both sequences have one entry a call; `strict` is a guard.",
-        (
-            "fitting.objective.image_loss: `True` -> `False` in `for name, term in zip(list(calls)[1:], others, "
-            "strict=True)`",
-        ),
+        ("fitting.objective.image_loss: `True` -> `False` in `for name, term in zip(calls, others, strict=True)`",),
     ),
     Group(
         "No number is in an empty array.",

@@ -30,6 +30,11 @@ def of_today(result: dict[str, Any], functions: dict[str, Any]) -> dict[str, Any
     return result | {"kernels": kernels, "defects": {n: r for n, r in result["defects"].items() if n in planted}}
 
 
+def whole(result: dict[str, Any], functions: dict[str, Any]) -> bool:
+    """True when no mutant of today's source is missing from the report."""
+    return names(result) >= {m.name for kernel, function in functions.items() for m in mutants(kernel, function)}
+
+
 def added(before: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:
     """The first run with what a later one, of the same kernels and newer tests, noticed; checks keep their numbers."""
     checks = [*before["checks"], *(n for n in later["checks"] if n not in before["checks"])]

@@ -89,7 +89,10 @@ def page(result: dict[str, Any]) -> str:
     sample += f", as many as {run['minutes']:g} minutes allow" if run["minutes"] else ""
     machine = run["machine"]
     later = run.get("again", [])
-    again = f" What survived was put to the tests of revision {later[-1]['commit']} again." if later else ""
+    again = ""
+    if later:
+        again = f" What survived, and what was not yet among them, was put to the tests of {later[-1]['commit']}"
+        again += f" ({sum(r['seconds'] for r in later) / 60:.0f} minutes more)."
     lines = [
         "# What the tests can tell apart",
         "",

@@ -10,7 +10,7 @@ import pytest
 
 from mutation.equivalents import EQUIVALENT
 from mutation.kernels import kernels, planted
-from mutation.merge import added, names, of_today, survivors
+from mutation.merge import added, names, of_today, survivors, whole
 from mutation.mutator import mutants
 from mutation.page import PAGE, RESULT, page, rows
 from mutation.registry import DEFECTS, defect_mutants
@@ -81,3 +81,12 @@ def test_what_the_source_no_longer_has_leaves_the_report(result):
     assert of_today(old, functions) == {"kernels": {kernel: {}}, "defects": {}}
     today = of_today(result, functions)
     assert today["defects"] == result["defects"] and names(today) <= names(result)
+
+
+def test_a_report_is_whole_when_no_mutant_is_missing():
+    kernel = "equations.matern.matern_weights"
+    functions = {kernel: kernels()[kernel]}
+    rows_of_all = {m.name: ["sign", [0], None] for m in mutants(kernel, functions[kernel])}
+    assert whole({"kernels": {kernel: rows_of_all}, "defects": {}}, functions)
+    rows_of_all.popitem()
+    assert not whole({"kernels": {kernel: rows_of_all}, "defects": {}}, functions)

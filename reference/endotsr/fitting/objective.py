@@ -6,7 +6,7 @@ The spectral penalty acts on coefficients, not on images, and is added by the tr
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
     """
     colour, (image, mask, _, depth, supports) = rendered.colour, targets
-    calls: dict[str, Callable[[], Any]] = {"": lambda: photometric_loss(colour, targets, weights.ssim)}
+    calls: dict[str, Callable[[], Term]] = {}
     if weights.depth > 0 and depth is not None:
         calls["depth"] = lambda: depth_term(rendered, depth, weights.depth)
     if weights.smoothness > 0:
@@ -133,9 +133,10 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
         calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
     if weights.laplacian > 0 and supports is not None:
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
-    (loss, terms, d_colour, _), *others = together(*calls.values())
+    photometric, *others = together(lambda: photometric_loss(colour, targets, weights.ssim), *calls.values())
+    loss, terms, d_colour, _ = photometric
     d_depth = np.zeros_like(rendered.depth)
-    for name, term in zip(list(calls)[1:], others, strict=True):
+    for name, term in zip(calls, others, strict=True):
         loss += getattr(weights, name) * term.value
         terms[name] = term.value
         if term.d_colour is not None:
