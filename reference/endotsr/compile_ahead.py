@@ -108,7 +108,7 @@ def rehearse_picture(shop: Any, state: Any) -> None:
     out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
     grads = render_reverse(out.colour, out.depth, None, render_saved)
     gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
-    scene_reverse(grads, saved)
+    scene_reverse(grads, saved, coefficients=False)
 
 
 def rehearse_losses(shop: Any, everything: bool) -> None:
@@ -146,22 +146,30 @@ def rehearse_optimiser(shop: Any, state: Any) -> None:
 
 
 def rehearse_residuals(shop: Any, state: Any) -> None:
-    """Both Fourier residuals, their reverse passes and the penalty."""
+    """Both Fourier residuals, the penalty, and their reverse passes fused with Adam."""
     import numpy as np
 
-    from endotsr.equations.appearance import appearance_forward, appearance_reverse
-    from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
-    from endotsr.equations.motion import motion_forward, motion_reverse
+    from endotsr.equations.appearance import appearance_forward
+    from endotsr.equations.matern import matern_penalty_forward, penalty_factors
+    from endotsr.equations.motion import motion_forward
+    from endotsr.fitting.coefficients_step import coefficients_adam_step
+    from endotsr.fitting.schedules import learning_rates
 
+    born = shop.config.training.residual_activation + 1
+    rates, o, rho = learning_rates(born, shop.config), shop.config.optimiser, shop.spectral.rho
     colour, motion = state.gaussians.colour_coefficients, state.gaussians.motion_coefficients
-    if colour is not None:
-        residual, saved = appearance_forward(colour, np.zeros(colour.shape[1], colour.dtype), shop.config.model.beta)
-        appearance_reverse(residual, saved, atom_gradient=False)
-    if motion is not None:
-        translation, motion_saved = motion_forward(motion, np.zeros(motion.shape[1], motion.dtype))
-        motion_reverse(translation, motion_saved, atom_gradient=False)
-        _, penalty_saved = matern_penalty_forward(motion, shop.spectral.rho)
-        matern_penalty_reverse(1.0, penalty_saved)
+    for name, coefficients in (("colour_coefficients", colour), ("motion_coefficients", motion)):
+        if coefficients is None:
+            continue
+        atoms, shrink = np.zeros(coefficients.shape[1], coefficients.dtype), None
+        if coefficients is colour:
+            sums, _ = appearance_forward(coefficients, atoms, shop.config.model.beta)
+        else:
+            sums, _ = motion_forward(coefficients, atoms)
+            matern_penalty_forward(coefficients, rho)
+            shrink = penalty_factors(1.0, rho, state.gaussians.count, coefficients.dtype)
+        settings = (o.beta1, o.beta2, o.epsilon)
+        coefficients_adam_step(sums, atoms, shrink, coefficients, state.adam, name, rates, *settings)
 
 
 def rehearse_densification(shop: Any, state: Any) -> None:

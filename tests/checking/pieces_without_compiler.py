@@ -13,6 +13,7 @@ from test_ranges import PAIRS, both_passes, one_by_one_backwards
 from endotsr.checking import one_thread, pair_stream
 from endotsr.equations.deformation import CHANNELS, deformation_forward, deformation_reverse
 from endotsr.fitting.adam import adam_state, adam_update
+from endotsr.fitting.coefficients_step import coefficients_adam_step
 from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
 
 NAMES_OF_LENGTHS = ("PIECE", "BLOCK", "ROWS")
@@ -77,3 +78,26 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
         for fused in (False, True):
             for one, two in zip(stepped(fused), whole, strict=True):
                 np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("length, count", [(4, 11), (4, 8), (1, 3)])
+@pytest.mark.parametrize("ranges", ["whole", "one by one"])
+def test_the_fused_step_of_coefficients_in_pieces(length, count, ranges, monkeypatch):
+    rng = np.random.default_rng(length)
+    start, d_sums = rng.normal(size=(3, 4, count)), rng.normal(size=(3, count))
+    atoms, factors = rng.normal(size=4), rng.uniform(0.5, 1.5, 4)
+
+    def stepped():
+        parameter = start.copy()
+        state = adam_state({"c": parameter})
+        for _ in range(2):
+            coefficients_adam_step(d_sums, atoms, factors, parameter, state, "c", {"c": 0.1}, 0.9, 0.999, 1e-15)
+        return [parameter, state.first["c"], state.second["c"]]
+
+    with one_thread():
+        whole = stepped()
+        shorten(monkeypatch, length)
+        if ranges == "one by one":
+            monkeypatch.setattr(sys.modules["endotsr.fitting.coefficients_step"], "share", one_by_one_backwards)
+        for one, two in zip(stepped(), whole, strict=True):
+            np.testing.assert_array_equal(one, two)

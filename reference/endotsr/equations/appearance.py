@@ -125,5 +125,10 @@ def appearance_reverse(
     returns     derivative by A (3, 2F, N) and by phi_bar (2F,): added in float64, None unless `atom_gradient`
     Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
     """
-    d_argument = np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)
+    d_argument = argument_gradient(d_residual, saved)
     return AppearanceGrads(*spread(d_argument, saved.colour_coefficients, saved.phi_bar, atom_gradient=atom_gradient))
+
+
+def argument_gradient(d_residual: FloatArray, saved: AppearanceSaved) -> FloatArray:
+    """The first half of the reverse pass: derivative (3, N) by A phi_bar, what tanh is taken of."""
+    return np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)

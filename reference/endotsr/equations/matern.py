@@ -114,6 +114,12 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
     return math.fsum(rho.astype(np.float64) * energy) / (6.0 * n * count), saved
 
 
+def penalty_factors(d_penalty: float, rho: FloatArray, count: int, dtype: np.dtype) -> FloatArray:
+    """rho_f d_penalty / (3 N F) of every atom (2F,): the gradient of the penalty is this times C. N = count, 0 as 1."""
+    factor = rho.astype(np.float64) * (float(d_penalty) / (3.0 * max(count, 1) * rho.size))
+    return np.tile(factor, 2).astype(dtype)
+
+
 def matern_penalty_reverse(d_penalty: float, saved: MaternSaved) -> FloatArray:
     """Reverse of equation (4): rho_f C / (3 N F) times d_penalty. Shape (3, 2F, N), dtype of C."""
     coefficients, rho = saved
@@ -121,8 +127,7 @@ def matern_penalty_reverse(d_penalty: float, saved: MaternSaved) -> FloatArray:
     out = np.empty(coefficients.shape, coefficients.dtype)
     if n == 0:
         return out
-    factor = rho.astype(np.float64) * (float(d_penalty) / (3.0 * n * rho.size))
-    factors = np.tile(factor, 2 * axes).astype(coefficients.dtype)
+    factors = np.tile(penalty_factors(d_penalty, rho, n, coefficients.dtype), axes)
     rows = np.ascontiguousarray(coefficients).reshape(axes * atoms, n)
     share(_scale_rows_kernel, axes * atoms, rows, factors, out.reshape(axes * atoms, n))
     return out

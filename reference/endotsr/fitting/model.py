@@ -95,15 +95,18 @@ def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: fl
     return scene, SceneSaved(deformation, appearance, motion)
 
 
-def scene_reverse(grads: RenderGrads, saved: SceneSaved) -> SceneGrads:
-    """From gradients by the deformed scene to gradients by the raw parameters (all additions are pre-activation)."""
+def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool = True) -> SceneGrads:
+    """From gradients by the deformed scene to gradients by the raw parameters (all additions are pre-activation).
+
+    coefficients   False leaves those of the Fourier residuals to `coefficients_adam_step`
+    """
     by_field = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
     by_field["harmonics"] = grads.harmonics
-    if saved.appearance is not None:
+    if saved.appearance is not None and coefficients:
         assert grads.residual is not None
         appearance = appearance_reverse(grads.residual, saved.appearance, atom_gradient=False)
         by_field["colour_coefficients"] = appearance.colour_coefficients
-    if saved.motion is not None:
+    if saved.motion is not None and coefficients:
         motion = motion_reverse(grads.position, saved.motion, atom_gradient=False)
         by_field["motion_coefficients"] = motion.motion_coefficients
     offsets = None

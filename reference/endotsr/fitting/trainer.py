@@ -16,21 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config
-from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
-from endotsr.fitting.adam import AdamState, Rate, adam_state, adam_update, add_array
+from endotsr.equations.matern import matern_penalty_forward
+from endotsr.fitting.adam import AdamState, adam_state, add_array
 from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
-from endotsr.fitting.deformation_step import NAMES as FDM_FIELDS
-from endotsr.fitting.deformation_step import deformation_adam_step
-from endotsr.fitting.model import (
-    SceneGrads,
-    SceneSaved,
-    Spectral,
-    raster_settings,
-    scene_at,
-    scene_reverse,
-    spectral_from,
-)
+from endotsr.fitting.model import Spectral, raster_settings, scene_at, scene_reverse, spectral_from
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
+from endotsr.fitting.optimise import optimise
 from endotsr.fitting.schedules import (
     active_degree,
     densify_now,
@@ -213,13 +204,14 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     timer.mark("render reverse")
     if statistics_active(iteration, config):
         gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
-    back = scene_reverse(grads, scene_saved)
-    penalty = _add_spectral_penalty(state.gaussians, shop, back)
+    back = scene_reverse(grads, scene_saved, coefficients=False)
+    penalty = _spectral_penalty(state.gaussians, shop)
     timer.mark("scene reverse")
     entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
     dense = densify_now(iteration, config)
     if not (dense and config.optimiser.legacy_skip):
-        _optimise(state, scene_saved, back, learning_rates(iteration, config), config)
+        rates = learning_rates(iteration, config)
+        optimise(state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates)
     timer.mark("optimiser")
     if dense:
         _control_density(state, shop)
@@ -270,28 +262,10 @@ def _give_birth(state: TrainingState, config: Config) -> None:
             add_array(state.adam, name, array)
 
 
-def _add_spectral_penalty(gaussians: Gaussians, shop: Workshop, back: SceneGrads) -> float | None:
-    """Add the gradient of lambda_msp L_msp to that of C; the penalty itself, None without component S."""
+def _spectral_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
+    """L_msp; None without component S."""
     coefficients = gaussians.motion_coefficients
-    if coefficients is None:
-        return None
-    weight = shop.config.loss.lambda_msp
-    penalty, saved = matern_penalty_forward(coefficients, shop.spectral.rho)
-    if weight > 0:
-        back.by_field["motion_coefficients"] += matern_penalty_reverse(weight, saved)
-    return penalty
-
-
-def _optimise(
-    state: TrainingState, saved: SceneSaved, back: SceneGrads, rates: dict[str, Rate], config: Config
-) -> None:
-    """Adam on every array; the FDM's reverse pass is fused with its step."""
-    o = config.optimiser
-    adam_update(state.adam, arrays(state.gaussians), back.by_field, rates, o.beta1, o.beta2, o.epsilon)
-    if saved.deformation is not None:
-        assert back.offsets is not None
-        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-        deformation_adam_step(back.offsets, saved.deformation, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
+    return None if coefficients is None else matern_penalty_forward(coefficients, shop.spectral.rho)[0]
 
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:

@@ -1,0 +1,53 @@
+"""One Adam step of everything that is trained, from the gradients by the deformed scene.
+
+Where the gradient of an array is much larger than what it is made of (time bases, Fourier coefficients), the reverse
+pass and the step are one sweep, and the gradient is never stored.
+"""
+
+from endotsr.config import Config
+from endotsr.equations.appearance import argument_gradient
+from endotsr.equations.matern import penalty_factors
+from endotsr.fitting.adam import AdamState, Rate, adam_update
+from endotsr.fitting.coefficients_step import coefficients_adam_step
+from endotsr.fitting.deformation_step import NAMES as FDM_FIELDS
+from endotsr.fitting.deformation_step import deformation_adam_step
+from endotsr.fitting.model import SceneGrads, SceneSaved, Spectral
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.splatting.render import RenderGrads
+
+
+def optimise(
+    gaussians: Gaussians,
+    adam: AdamState,
+    spectral: Spectral,
+    config: Config,
+    saved: SceneSaved,
+    grads: RenderGrads,
+    back: SceneGrads,
+    rates: dict[str, Rate],
+) -> None:
+    """Change the Gaussians and their moments in place.
+
+    saved   of `scene_at`, for these very Gaussians
+    grads   gradients by the deformed scene
+    back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
+    rates   learning rate of every array
+    """
+    o, rho = config.optimiser, spectral.rho
+    settings = (o.beta1, o.beta2, o.epsilon)
+    adam_update(adam, arrays(gaussians), back.by_field, rates, *settings)
+    if saved.appearance is not None:
+        assert grads.residual is not None
+        coefficients, atoms, _ = saved.appearance
+        d_argument = argument_gradient(grads.residual, saved.appearance)
+        coefficients_adam_step(d_argument, atoms, None, coefficients, adam, "colour_coefficients", rates, *settings)
+    if saved.motion is not None:
+        coefficients, atoms = saved.motion
+        weight = config.loss.lambda_msp
+        shrink = penalty_factors(weight, rho, gaussians.count, coefficients.dtype) if weight > 0 else None
+        d_sums = grads.position
+        coefficients_adam_step(d_sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
+    if saved.deformation is not None:
+        assert back.offsets is not None
+        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
+        deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings)
