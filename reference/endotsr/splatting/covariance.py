@@ -27,10 +27,11 @@ class Shape(NamedTuple):
 
 
 class CovarianceSaved(NamedTuple):
-    """What the reverse pass needs: the inputs."""
+    """What the reverse pass needs: the inputs, and the semi-axes, so that no exponential is taken twice."""
 
     quaternion: FloatArray
     log_scale: FloatArray
+    scale: FloatArray
 
 
 class CovarianceGrads(NamedTuple):
@@ -79,7 +80,7 @@ def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
             scale[k, i] = math.exp(min(max(log_scale[k, i], -limit), limit))
 
 
-def _covariance_reverse(first, stop, quaternion, log_scale, d_rotation, d_scale, d_quaternion, d_log_scale):
+def _covariance_reverse(first, stop, quaternion, log_scale, scale, d_rotation, d_scale, d_quaternion, d_log_scale):
     real = quaternion.dtype.type
     two, limit = real(2), real(LOG_SCALE_LIMIT)
     for i in range(np.uintp(first), np.uintp(stop)):
@@ -100,9 +101,8 @@ def _covariance_reverse(first, stop, quaternion, log_scale, d_rotation, d_scale,
         d_quaternion[2, i] = (gy - along * y) * inverse_norm
         d_quaternion[3, i] = (gz - along * z) * inverse_norm
         for k in range(3):
-            s = log_scale[k, i]
-            inside = abs(s) <= limit
-            d_log_scale[k, i] = d_scale[k, i] * math.exp(s) if inside else real(0)
+            inside = abs(log_scale[k, i]) <= limit
+            d_log_scale[k, i] = d_scale[k, i] * scale[k, i] if inside else real(0)
 
 
 _forward_kernel = jit(_covariance_forward)
@@ -125,7 +125,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
     rotation = np.empty((3, 3, n), quaternion.dtype)
     scale = np.empty((3, n), quaternion.dtype)
     share(_forward_kernel, n, quaternion, log_scale, rotation, scale)
-    return Shape(rotation, scale), CovarianceSaved(quaternion, log_scale)
+    return Shape(rotation, scale), CovarianceSaved(quaternion, log_scale, scale)
 
 
 def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrads:

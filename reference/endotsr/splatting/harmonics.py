@@ -15,7 +15,7 @@ from endotsr.sharing import share
 
 FloatArray = NDArray[np.floating]
 
-BLOCK = 256
+BLOCK = 512
 
 Y00 = 0.28209479177387814  # 1 / sqrt(4 pi), the degree-0 harmonic
 C1 = 0.4886025119029199
@@ -44,67 +44,98 @@ class HarmonicsGrads(NamedTuple):
     centre: FloatArray  # (3,) camera centre
 
 
-def _directions(position, centre, x, y, z, inverse_distance):
+# What a block works on stands in one flat array, plane k at k * BLOCK, and is indexed with unsigned integers: no alias
+# or wrap-around checks, so the loops become vector code. Planes: direction, 1 / distance, Y_1 ... Y_15, their weights.
+_INVERSE, _BASIS, _WEIGHT, _PLANES = 3, 3, 18, 34  # Y_k at _BASIS + k, its weight at _WEIGHT + k, k = 1 ... 15
+_U64 = np.uint64
+
+
+def _directions(position, centre, planes):
     """Unit directions; a Gaussian at the camera centre gets direction and inverse distance zero (band 0 only)."""
-    real = position.dtype.type
-    for i in range(x.size):
-        dx, dy, dz = position[0, i] - centre[0], position[1, i] - centre[1], position[2, i] - centre[2]
+    real = planes.dtype.type
+    one, zero = real(1), real(0)
+    x, y, z = centre[0], centre[1], centre[2]
+    px, py, pz = position[0], position[1], position[2]
+    for k in range(px.size):
+        i = _U64(k)
+        dx, dy, dz = px[i] - x, py[i] - y, pz[i] - z
         r = math.sqrt(dx * dx + dy * dy + dz * dz)
-        inverse = real(1) / r if r > real(0) else real(0)
-        x[i], y[i], z[i], inverse_distance[i] = dx * inverse, dy * inverse, dz * inverse, inverse
+        inverse = one / r if r > zero else zero
+        planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)] = dx * inverse, dy * inverse, dz * inverse
+        planes[i + _U64(_INVERSE * BLOCK)] = inverse
 
 
-def _basis(degree, x, y, z, basis):
-    """Y_k for k >= 1 up to the active degree, (15, n); formulas in the specification."""
-    real = x.dtype.type
+def _basis(degree, planes, count):
+    """Y_k for k >= 1 up to the active degree; formulas in the specification."""
+    real = planes.dtype.type
     c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
     c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)
     two, three, four = real(2), real(3), real(4)
-    for i in range(x.size):
-        a, b, c = x[i], y[i], z[i]
-        basis[0, i], basis[1, i], basis[2, i] = -c1 * b, c1 * c, -c1 * a
-        if degree < 2:
-            continue
+    for k in range(count):
+        i = _U64(k)
+        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        planes[i + _U64((_BASIS + 1) * BLOCK)] = -c1 * b
+        planes[i + _U64((_BASIS + 2) * BLOCK)] = c1 * c
+        planes[i + _U64((_BASIS + 3) * BLOCK)] = -c1 * a
+    for k in range(count if degree > 1 else 0):
+        i = _U64(k)
+        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
         aa, bb, cc = a * a, b * b, c * c
-        basis[3, i], basis[4, i] = c2a * a * b, -c2a * b * c
-        basis[5, i] = c2b * (two * cc - aa - bb)
-        basis[6, i], basis[7, i] = -c2a * a * c, c2c * (aa - bb)
-        if degree < 3:
-            continue
-        basis[8, i] = -c3a * b * (three * aa - bb)
-        basis[9, i] = c3b * a * b * c
-        basis[10, i] = -c3c * b * (four * cc - aa - bb)
-        basis[11, i] = c3d * c * (two * cc - three * aa - three * bb)
-        basis[12, i] = -c3c * a * (four * cc - aa - bb)
-        basis[13, i] = c3e * c * (aa - bb)
-        basis[14, i] = -c3a * a * (aa - three * bb)
+        planes[i + _U64((_BASIS + 4) * BLOCK)] = c2a * a * b
+        planes[i + _U64((_BASIS + 5) * BLOCK)] = -c2a * b * c
+        planes[i + _U64((_BASIS + 6) * BLOCK)] = c2b * (two * cc - aa - bb)
+        planes[i + _U64((_BASIS + 7) * BLOCK)] = -c2a * a * c
+        planes[i + _U64((_BASIS + 8) * BLOCK)] = c2c * (aa - bb)
+    for k in range(count if degree > 2 else 0):
+        i = _U64(k)
+        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        aa, bb, cc = a * a, b * b, c * c
+        planes[i + _U64((_BASIS + 9) * BLOCK)] = -c3a * b * (three * aa - bb)
+        planes[i + _U64((_BASIS + 10) * BLOCK)] = c3b * a * b * c
+        planes[i + _U64((_BASIS + 11) * BLOCK)] = -c3c * b * (four * cc - aa - bb)
+        planes[i + _U64((_BASIS + 12) * BLOCK)] = c3d * c * (two * cc - three * aa - three * bb)
+        planes[i + _U64((_BASIS + 13) * BLOCK)] = -c3c * a * (four * cc - aa - bb)
+        planes[i + _U64((_BASIS + 14) * BLOCK)] = c3e * c * (aa - bb)
+        planes[i + _U64((_BASIS + 15) * BLOCK)] = -c3a * a * (aa - three * bb)
 
 
-def _basis_gradient(degree, x, y, z, weight, gx, gy, gz):
-    """g += sum_k weight_k dY_k/d(x, y, z), the three taken as independent."""
-    real = x.dtype.type
+def _basis_gradient(degree, planes, gx, gy, gz):
+    """g = sum_k weight_k dY_k/d(x, y, z), the three taken as independent; degree >= 1."""
+    real = planes.dtype.type
     c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
     c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)
     two, three, four, six, eight = real(2), real(3), real(4), real(6), real(8)
-    for i in range(x.size):
-        a, b, c = x[i], y[i], z[i]
-        u, v, w = -c1 * weight[2, i], -c1 * weight[0, i], c1 * weight[1, i]
-        if degree > 1:
-            w4, w5, w6, w7, w8 = weight[3, i], weight[4, i], weight[5, i], weight[6, i], weight[7, i]
-            u += c2a * (b * w4 - c * w7) - two * c2b * a * w6 + two * c2c * a * w8
-            v += c2a * (a * w4 - c * w5) - two * c2b * b * w6 - two * c2c * b * w8
-            w += -c2a * (b * w5 + a * w7) + four * c2b * c * w6
-        if degree > 2:
-            aa, bb, cc = a * a, b * b, c * c
-            w9, w10, w11, w12 = weight[8, i], weight[9, i], weight[10, i], weight[11, i]
-            w13, w14, w15 = weight[12, i], weight[13, i], weight[14, i]
-            u += -c3a * six * a * b * w9 + c3b * b * c * w10 + c3c * two * a * b * w11 - c3d * six * a * c * w12
-            u += -c3c * (four * cc - three * aa - bb) * w13 + c3e * two * a * c * w14 - c3a * three * (aa - bb) * w15
-            v += -c3a * three * (aa - bb) * w9 + c3b * a * c * w10 - c3c * (four * cc - aa - three * bb) * w11
-            v += -c3d * six * b * c * w12 + c3c * two * a * b * w13 - c3e * two * b * c * w14 + c3a * six * a * b * w15
-            w += c3b * a * b * w10 - c3c * eight * b * c * w11 + c3d * (six * cc - three * aa - three * bb) * w12
-            w += -c3c * eight * a * c * w13 + c3e * (aa - bb) * w14
-        gx[i], gy[i], gz[i] = u, v, w
+    for k in range(gx.size):
+        i = _U64(k)
+        w1, w2 = planes[i + _U64((_WEIGHT + 1) * BLOCK)], planes[i + _U64((_WEIGHT + 2) * BLOCK)]
+        w3 = planes[i + _U64((_WEIGHT + 3) * BLOCK)]
+        gx[i], gy[i], gz[i] = -c1 * w3, -c1 * w1, c1 * w2
+    for k in range(gx.size if degree > 1 else 0):
+        i = _U64(k)
+        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        w4, w5 = planes[i + _U64((_WEIGHT + 4) * BLOCK)], planes[i + _U64((_WEIGHT + 5) * BLOCK)]
+        w6, w7 = planes[i + _U64((_WEIGHT + 6) * BLOCK)], planes[i + _U64((_WEIGHT + 7) * BLOCK)]
+        w8 = planes[i + _U64((_WEIGHT + 8) * BLOCK)]
+        gx[i] += c2a * (b * w4 - c * w7) - two * c2b * a * w6 + two * c2c * a * w8
+        gy[i] += c2a * (a * w4 - c * w5) - two * c2b * b * w6 - two * c2c * b * w8
+        gz[i] += -c2a * (b * w5 + a * w7) + four * c2b * c * w6
+    for k in range(gx.size if degree > 2 else 0):
+        i = _U64(k)
+        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        aa, bb, cc = a * a, b * b, c * c
+        w9, w10 = planes[i + _U64((_WEIGHT + 9) * BLOCK)], planes[i + _U64((_WEIGHT + 10) * BLOCK)]
+        w11, w12 = planes[i + _U64((_WEIGHT + 11) * BLOCK)], planes[i + _U64((_WEIGHT + 12) * BLOCK)]
+        w13, w14 = planes[i + _U64((_WEIGHT + 13) * BLOCK)], planes[i + _U64((_WEIGHT + 14) * BLOCK)]
+        w15 = planes[i + _U64((_WEIGHT + 15) * BLOCK)]
+        u = -c3a * six * a * b * w9 + c3b * b * c * w10 + c3c * two * a * b * w11 - c3d * six * a * c * w12
+        u += -c3c * (four * cc - three * aa - bb) * w13 + c3e * two * a * c * w14 - c3a * three * (aa - bb) * w15
+        v = -c3a * three * (aa - bb) * w9 + c3b * a * c * w10 - c3c * (four * cc - aa - three * bb) * w11
+        v += -c3d * six * b * c * w12 + c3c * two * a * b * w13 - c3e * two * b * c * w14 + c3a * six * a * b * w15
+        w = c3b * a * b * w10 - c3c * eight * b * c * w11 + c3d * (six * cc - three * aa - three * bb) * w12
+        w += -c3c * eight * a * c * w13 + c3e * (aa - bb) * w14
+        gx[i] += u
+        gy[i] += v
+        gz[i] += w
 
 
 _directions_kernel = jit(_directions)
@@ -112,29 +143,30 @@ _basis_kernel = jit(_basis)
 _basis_gradient_kernel = jit(_basis_gradient)
 
 
-def _direction_to_position_block(degree, d, weight, d_position, d_centre):
+def _direction_to_position_block(degree, planes, d_position, d_centre):
     """From direction to position: drop the radial part, divide by the distance; the centre gets minus the sum."""
-    real = d.dtype.type
-    zero = real(0)
+    zero = planes.dtype.type(0)
+    gx, gy, gz = d_position[0], d_position[1], d_position[2]
     d_centre[0] = d_centre[1] = d_centre[2] = zero
     if degree == 0:
-        for k in range(3):
-            for i in range(d_position.shape[1]):
-                d_position[k, i] = zero
+        for i in range(gx.size):
+            gx[i] = gy[i] = gz[i] = zero
         return
-    gx, gy, gz = d_position[0], d_position[1], d_position[2]
-    _basis_gradient_kernel(degree, d[0], d[1], d[2], weight, gx, gy, gz)
-    for i in range(gx.size):
-        x, y, z, inverse = d[0, i], d[1, i], d[2, i], d[3, i]
+    _basis_gradient_kernel(degree, planes, gx, gy, gz)
+    for k in range(gx.size):
+        i = _U64(k)
+        x, y, z = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        inverse = planes[i + _U64(_INVERSE * BLOCK)]
         along = gx[i] * x + gy[i] * y + gz[i] * z
-        gx[i], gy[i], gz[i] = (
-            (gx[i] - along * x) * inverse,
-            (gy[i] - along * y) * inverse,
-            (gz[i] - along * z) * inverse,
-        )
-        d_centre[0] -= gx[i]
-        d_centre[1] -= gy[i]
-        d_centre[2] -= gz[i]
+        gx[i] = (gx[i] - along * x) * inverse
+        gy[i] = (gy[i] - along * y) * inverse
+        gz[i] = (gz[i] - along * z) * inverse
+    sum_x, sum_y, sum_z = zero, zero, zero
+    for i in range(gx.size):
+        sum_x += gx[i]
+        sum_y += gy[i]
+        sum_z += gz[i]
+    d_centre[0], d_centre[1], d_centre[2] = -sum_x, -sum_y, -sum_z
 
 
 _direction_to_position = jit(_direction_to_position_block)
@@ -145,11 +177,10 @@ def _colour_block(harmonics, residual, position, centre, degree, colour, clamped
     real = position.dtype.type
     y00, half, zero = real(Y00), real(0.5), real(0)
     bands = (degree + 1) * (degree + 1)
-    basis = np.empty((15, e - a), position.dtype)
+    planes = np.empty(_PLANES * BLOCK, position.dtype)
     if degree > 0:
-        d = np.empty((4, e - a), position.dtype)
-        _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
-        _basis_kernel(degree, d[0], d[1], d[2], basis)
+        _directions_kernel(position[:, a:e], centre, planes)
+        _basis_kernel(degree, planes, e - a)
     for channel in range(3):
         out, flag, base = colour[channel, a:e], clamped[channel, a:e], harmonics[0, channel, a:e]
         if residual.shape[1] > 0:
@@ -160,7 +191,7 @@ def _colour_block(harmonics, residual, position, centre, degree, colour, clamped
             for i in range(out.size):
                 out[i] = half + y00 * base[i]
         for k in range(1, bands):
-            y, h = basis[k - 1], harmonics[k, channel, a:e]
+            y, h = planes[(_BASIS + k) * BLOCK :], harmonics[k, channel, a:e]
             for i in range(out.size):
                 out[i] += y[i] * h[i]
         for i in range(out.size):
@@ -176,12 +207,10 @@ def _colour_reverse_block(
     y00, zero = real(Y00), real(0)
     bands = (degree + 1) * (degree + 1)
     gc = np.empty(e - a, position.dtype)
-    d = np.empty((4, e - a), position.dtype)
-    basis = np.empty((15, e - a), position.dtype)
-    weight = np.zeros((15, e - a), position.dtype)  # sum over channels of g h_k
+    planes = np.zeros(_PLANES * BLOCK, position.dtype)  # weight of Y_k: sum over channels of g h_k
     if degree > 0:
-        _directions_kernel(position[:, a:e], centre, d[0], d[1], d[2], d[3])
-        _basis_kernel(degree, d[0], d[1], d[2], basis)
+        _directions_kernel(position[:, a:e], centre, planes)
+        _basis_kernel(degree, planes, e - a)
     for channel in range(3):
         up, flag, out = d_colour[channel, a:e], clamped[channel, a:e], d_harmonics[0, channel, a:e]
         for i in range(gc.size):
@@ -197,11 +226,12 @@ def _colour_reverse_block(
                 for i in range(out.size):
                     out[i] = zero
                 continue
-            y, h, w = basis[k - 1], harmonics[k, channel, a:e], weight[k - 1]
+            y, h = planes[(_BASIS + k) * BLOCK :], harmonics[k, channel, a:e]
+            w = planes[(_WEIGHT + k) * BLOCK :]
             for i in range(out.size):
                 out[i] = y[i] * gc[i]
                 w[i] += gc[i] * h[i]
-    _direction_to_position(degree, d, weight, d_position[:, a:e], d_centre)
+    _direction_to_position(degree, planes, d_position[:, a:e], d_centre)
 
 
 _colour_kernel = jit(_colour_block)
