@@ -6,6 +6,8 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
 
@@ -71,3 +73,17 @@ def _copy_mathjax() -> str:
 
 
 mathjax_path = _copy_mathjax()
+
+
+def _compile_kernels(app: Sphinx) -> None:
+    """What most notebooks call, by two processes at once and before the first of them: each alone would take longer."""
+    from endotsr.compile_ahead import compile_ahead
+    from endotsr.config import PAPER
+
+    compile_ahead(PAPER)
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    if nb_execution_mode != "off":
+        app.connect("builder-inited", _compile_kernels)
