@@ -6,8 +6,6 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-from sphinx.application import Sphinx
-
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
 
@@ -16,7 +14,7 @@ author = "the endotsr authors"
 copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
-extensions += ["paper_equations", "book_pages", "book_links", "api_pages"]  # in _extensions
+extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]  # in _extensions
 exclude_patterns = ["_build", "_extensions", "conf.py", "results/**"]  # results: tools and data of other pages
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
@@ -34,7 +32,7 @@ myst_heading_anchors = 3
 # tests, or with ENDOTSR_NOTEBOOK_SIZE=full at the size of the text. ENDOTSR_DOCS_EXECUTE=0 leaves the pictures out.
 os.environ.setdefault("ENDOTSR_NOTEBOOK_SIZE", "small")
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
-nb_execution_mode = "off" if os.environ.get("ENDOTSR_DOCS_EXECUTE") == "0" else "force"
+nb_execution_mode = "off" if os.environ.get("ENDOTSR_DOCS_EXECUTE") == "0" else "cache"
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_execution_timeout = 1200
@@ -73,17 +71,3 @@ def _copy_mathjax() -> str:
 
 
 mathjax_path = _copy_mathjax()
-
-
-def _compile_kernels(app: Sphinx) -> None:
-    """What most notebooks call, by two processes at once and before the first of them: each alone would take longer."""
-    from endotsr.compile_ahead import compile_ahead
-    from endotsr.config import PAPER
-
-    compile_ahead(PAPER)
-
-
-def setup(app: Sphinx) -> None:
-    """Called by Sphinx."""
-    if nb_execution_mode != "off":
-        app.connect("builder-inited", _compile_kernels)

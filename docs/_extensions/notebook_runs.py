@@ -1,0 +1,50 @@
+"""Runs the notebooks of a build before its pages are read, as many at once as there are cores.
+
+MyST-NB runs a notebook when it reads its page, one after the other. Here the runs come first, and its cache, which
+lives no longer than the build, hands them to the pages. A notebook that fails is not in the cache: its page runs it
+again and reports the error.
+"""
+
+import logging
+import shutil
+import tempfile
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+from sphinx.util.logging import getLogger
+
+logger = getLogger(__name__)
+
+
+def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
+    """Run those of `names` that are notebooks; the kernels that most of them call are compiled before."""
+    from jupyter_cache import get_cache
+    from jupyter_cache.executors import load_executor
+
+    from endotsr.compile_ahead import compile_ahead
+    from endotsr.config import PAPER
+
+    paths = [path for path in (Path(env.doc2path(name)) for name in names) if path.suffix == ".py"]
+    if len(paths) < 2 or app.config.nb_execution_mode != "cache":
+        return
+    compile_ahead(PAPER)
+    cache = get_cache(app.config.nb_execution_cache_path)
+    for path in paths:
+        cache.add_nb_to_project(str(path), read_data={"name": "jupytext", "type": "plugin"})
+    runs = load_executor("local-parallel", cache, logging.getLogger(__name__))
+    found = runs.run_and_cache(timeout=app.config.nb_execution_timeout)
+    logger.info("notebooks: %d ran, %d failed", len(found.succeeded), len(found.excepted) + len(found.errored))
+
+
+def forget_runs(app: Sphinx, error: Exception | None) -> None:
+    """A run is as good as the kernels it called, and no longer: the next build runs what it reads."""
+    shutil.rmtree(app.config.nb_execution_cache_path, ignore_errors=True)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Called by Sphinx."""
+    app.config.nb_execution_cache_path = tempfile.mkdtemp(prefix="endotsr-notebooks-")
+    app.connect("env-before-read-docs", run_notebooks)
+    app.connect("build-finished", forget_runs)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
