@@ -121,6 +121,18 @@ def test_rank_and_condition_are_those_of_the_normalised_atoms():
     assert report.condition == pytest.approx(np.linalg.cond(atoms / rms), rel=1e-6)
 
 
+def test_the_condition_is_that_of_the_atoms_that_are_not_dead():
+    report = report_atoms(np.arange(16) / 16, np.array([1.0, 8.0]))
+    assert report.dead == ["sin(2 pi 8 t)"]
+    assert report.rank == 3 and report.condition == pytest.approx(1.0)
+
+
+def test_frequencies_that_differ_by_rounding_count_once():
+    """Their difference is 1e-13 of an atom: more than one rounding, less than those of a thousand stamps."""
+    report = report_atoms(np.linspace(0, 1, 1000), np.array([1.0, 1.0 + 3e-14]))
+    assert report.rank == 2
+
+
 def test_hard_W2_one_stamp_makes_every_atom_dead():
     omega = frequencies(8, 1.0, 16.0)
     for times in ([0.3], [0.3, 0.3, 0.3]):

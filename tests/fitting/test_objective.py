@@ -19,7 +19,7 @@ from endotsr.splatting.render import RenderOut
 
 WIDTH, HEIGHT = 20, 16
 CAMERA = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, WIDTH / 2, HEIGHT / 2, WIDTH, HEIGHT)
-WEIGHTS = LossWeights(ssim=0.3, depth=0.7, smoothness=0.2, laplacian=1.5)
+WEIGHTS = LossWeights(ssim=0.3, depth=0.7, smoothness=0.2, laplacian=0.6)
 OFF = LossWeights(0.0, 0.0, 0.0, 0.0)
 
 

@@ -50,6 +50,10 @@ EQUIVALENT: tuple[Group, ...] = (
             "splatting.compositing.composite_forward: `lists.starts.size - 1` -> `lists.starts.size` in "
             "`share(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, "
             "background, *out)`",
+            "splatting.projection.projection_reverse_footprint: `n + BLOCK - 1` -> `n + BLOCK + 1` in `d_poses = "
+            "np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)`",
+            "equations.deformation._forward: `count + PIECE - 1` -> `count + PIECE` in `pieces = (count + PIECE - "
+            "1) // PIECE`",
         ),
     ),
     Group(
@@ -67,15 +71,15 @@ EQUIVALENT: tuple[Group, ...] = (
             "- np.log1p(-opacity) if opacity < 1.0 else np.inf`",
             "equations.calibration.calibration_views: `count <= 0` -> `count < 0` in `if n_train <= 0 or count <= 0`",
             "equations.fourier.frequencies: `count > 1` -> `count >= 1` in `omega[-1] = high if count > 1 else low`",
+            "equations.deformation._add_row: `u > far` -> `u >= far` in `u = far if u > far else u`",
+            "equations.deformation._reverse_row: `u > far` -> `u >= far` in `u = far if u > far else u`",
+            "fitting.adam._adam_row: `abs(m) < tiny` -> `abs(m) <= tiny` in `m = real(0) if abs(m) < tiny else m`",
         ),
     ),
     Group(
         "Scratch memory, or an array without a column, larger than what is read of it.",
         (
             "losses.smoothness._variation: `3` -> `4` in `scratch = np.empty((3, width), image.dtype)`",
-            "splatting.harmonics._colour_block: `e - a` -> `e` in `basis = np.empty((15, e - a), position.dtype)`",
-            "splatting.harmonics._colour_reverse_block: `e - a` -> `e + a` in `weight = np.zeros((15, e - a), "
-            "position.dtype)`",
             "fitting.deformation_step.deformation_adam_step: `3` -> `4` in `root = np.empty(3)`",
             "equations.pyramid._reduce: `2` -> `3` in `pairs = np.empty((m + 2, 2), fine.dtype)`",
             "equations.pyramid._expand: `2` -> `3` in `blend = np.empty(m + 2, coarse.dtype)`",
@@ -90,8 +94,46 @@ EQUIVALENT: tuple[Group, ...] = (
             "losses.similarity.masked_ssim_forward: `3` -> `4` in `slopes = np.empty((3, *padded), rendered.dtype)`",
             "splatting.binning.tile_lists: `1` -> `2` in `counts, pair_starts = (np.zeros((CHUNKS, tiles_x * "
             "tiles_y), np.int64), np.zeros(n + 1, np.int64))`",
-            "equations.matern.matern_penalty_reverse: `2` -> `3` in `factors = np.tile(factor, 2 * "
-            "axes).astype(coefficients.dtype)`",
+            "losses.smoothness._variation_reverse: `3` -> `4` in `rows = np.empty((3, width + 2), image.dtype)`",
+            "losses.smoothness._variation_reverse: `2` -> `3` in `rows = np.empty((3, width + 2), image.dtype)`",
+            "fitting.deformation_step._step: `3` -> `4` in `gradient = np.empty((3, PIECE), weight.dtype)`",
+            "fitting.deformation_step.deformation_adam_step: `3` -> `4` in `rate = np.empty((3, CHANNELS))`",
+            "losses.similarity._similarity: `4` -> `5` in `columns = np.empty((4, width + 2 * RADIUS), "
+            "difference.dtype)`",
+            "losses.similarity._similarity_reverse: `3` -> `4` in `smooth = np.empty((3, width), d_rendered.dtype)`",
+            "losses.similarity._similarity: `5` -> `6` in `lines = np.empty((5, width), difference.dtype)`",
+            "equations.laplacian._expand_adjoint: `2` -> `3` in `pairs = np.zeros((m + 2, 2), out.dtype)`",
+            "equations.laplacian._reduce_adjoint: `4` -> `5` in `gathered = np.zeros(m + 4, out.dtype)`",
+            "splatting.projection._project_reverse: `2` -> `3` in `jw, d_jw = (np.empty((2, 3), position.dtype), "
+            "np.empty((2, 3), position.dtype))`",
+            "splatting.projection._project_reverse: `3` -> `4` in `jw, d_jw = (np.empty((2, 3), position.dtype), "
+            "np.empty((2, 3), position.dtype))`",
+            "splatting.projection._project_reverse: `2` -> `3` in `jw, d_jw = (np.empty((2, 3), position.dtype), "
+            "np.empty((2, 3), position.dtype))` (2)",
+            "splatting.projection._project_reverse: `3` -> `4` in `jw, d_jw = (np.empty((2, 3), position.dtype), "
+            "np.empty((2, 3), position.dtype))` (2)",
+            "splatting.projection._project_reverse: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), "
+            "np.empty(3, position.dtype), np.empty(3, position.dtype))`",
+            "splatting.projection._project_reverse: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), "
+            "np.empty(3, position.dtype), np.empty(3, position.dtype))` (2)",
+            "splatting.projection._project_reverse: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), "
+            "np.empty(3, position.dtype), np.empty(3, position.dtype))` (3)",
+            "splatting.projection._project_reverse: `3` -> `4` in `small = np.empty(3, position.dtype)`",
+            "splatting.projection._project: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), np.empty(3, "
+            "position.dtype), np.empty(3, position.dtype))`",
+            "splatting.projection._project: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), np.empty(3, "
+            "position.dtype), np.empty(3, position.dtype))` (2)",
+            "splatting.projection._project: `3` -> `4` in `t0, t1, s = (np.empty(3, position.dtype), np.empty(3, "
+            "position.dtype), np.empty(3, position.dtype))` (3)",
+            "splatting.projection.projection_reverse_footprint: `4` -> `5` in `d_poses = np.zeros(((n + BLOCK - "
+            "1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)`",
+            "equations.laplacian._band_signs: `2` -> `3` in `blend = np.empty(m + 2, fine.dtype)`",
+            "splatting.compositing_rows._blend_reverse: `6` -> `7` in `buffer = np.zeros(6 * PLANE, records.dtype)`",
+            "splatting.compositing_rows._blend: `5` -> `6` in `buffer = np.zeros(5 * PLANE, records.dtype)`",
+            "splatting.compositing_rows._blend: `5` -> `6` in `lines = np.empty(5 * TILE_HEIGHT, records.dtype)`",
+            "splatting.compositing_rows._blend_reverse: `5` -> `6` in `lines = np.empty(5 * TILE_HEIGHT, "
+            "records.dtype)`",
+            "splatting.compositing._composite_reverse: `5` -> `6` in `kept = np.empty((length, 5), records.dtype)`",
         ),
     ),
     Group(
@@ -100,7 +142,6 @@ EQUIVALENT: tuple[Group, ...] = (
             "losses.similarity._clear_border: `-RADIUS` -> `RADIUS` in `for border in (slice(None, RADIUS), "
             "slice(-RADIUS, None))`",
             "equations.pyramid._gather_rows: `x` -> `x - 1` in `target[x] = real(0.0)`",
-            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `d_position[k, i] = zero`",
             "equations.deformation._forward: `i` -> `i - 1` in `out[i] = weight.dtype.type(0)`",
             "equations.matern._row_square_sums: `k` -> `k - 1` in `lanes[k] = 0.0`",
             "equations.matern._row_square_sums: `k` -> `k - 1` in `total += lanes[k]`",
@@ -113,6 +154,20 @@ EQUIVALENT: tuple[Group, ...] = (
             "splatting.binning.screen_boxes: `np.zeros((projected.depth.size, 4), np.int32)` -> "
             "`np.ones((projected.depth.size, 4), np.int32)` in `box = np.zeros((projected.depth.size, 4), "
             "np.int32)`",
+            "losses.smoothness._squared_steps: `np.zeros(width, depth.dtype)` -> `np.ones(width, depth.dtype)` in "
+            "`steps = np.zeros(width, depth.dtype)`",
+            "equations.atom_sums._combine: `k` -> `k - 1` in `total[k] = zero`",
+            "splatting.records._gather: `j` -> `j - 1` in `total[j] = zero`",
+            "equations.atom_sums._atom_totals: `k` -> `k - 1` in `lanes[k] = 0.0`",
+            "equations.laplacian._band_signs: `x` -> `x - 1` in `columns[x] = 0.0`",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_position[k, i] = d_scale[k, i] = zero`",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_position[k, i] = d_scale[k, i] = zero` (2)",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_rotation[k, 0, i] = d_rotation[k, 1, i] "
+            "= d_rotation[k, 2, i] = zero`",
+            "splatting.compositing_rows._blend_reverse: `np.zeros(GRADIENT * LANES, records.dtype)` -> "
+            "`np.ones(GRADIENT * LANES, records.dtype)` in `sums = np.zeros(GRADIENT * LANES, records.dtype)`",
+            "equations.laplacian._expand_adjoint: `x` -> `x - 1` in `target[x] *= scale`",
+            "equations.laplacian._difference: `0.0` -> `1.0` in `target[x] = d if keep[x] else real(0.0)`",
         ),
     ),
     Group(
@@ -124,6 +179,12 @@ EQUIVALENT: tuple[Group, ...] = (
             "np.where(statistics.dead, 1.0, statistics.rms))` (2)",
             "scene.density_control._rotations: `largest > 0.0` -> `largest >= 0.0` in `q = np.where(largest > "
             "0.0, quaternion / np.where(largest > 0.0, largest, 1.0), [[1.0], [0.0], [0.0], [0.0]])` (2)",
+            "equations.fourier.report_atoms: `1.0` -> `0.5` in `gain = np.where(statistics.dead, 0.0, 1.0 / "
+            "np.where(statistics.dead, 1.0, statistics.rms))`",
+            "scene.density_control._rotations: `1.0` -> `0.5` in `q = np.where(largest > 0.0, quaternion / "
+            "np.where(largest > 0.0, largest, 1.0), [[1.0], [0.0], [0.0], [0.0]])`",
+            "scene.density_control._rotations: `1.0` -> `0.5` in `q = np.where(largest > 0.0, quaternion / "
+            "np.where(largest > 0.0, largest, 1.0), [[1.0], [0.0], [0.0], [0.0]])` (2)",
         ),
     ),
     Group(
@@ -156,6 +217,33 @@ EQUIVALENT: tuple[Group, ...] = (
             "splatting.compositing_rows._spans: `u - half` -> `u` in `offset = u - half - real(left)`",
             "splatting.compositing_rows._spans: `one - log2_cutoff` -> `one` in `faintest = log2_cutoff - (one - "
             "log2_cutoff) * real(1e-06)`",
+            "splatting.binning._boxes: `0.001` -> `0.0005` in `margin, right, bottom = (real(0.001), real(width - "
+            "1), real(height - 1))`",
+            "splatting.compositing_rows._rows: `(reach + abs(record[V])) * real(1e-05) + real(0.001)` -> `(reach "
+            "+ abs(record[V])) * real(1e-05)` in `reach += (reach + abs(record[V])) * real(1e-05) + real(0.001)`",
+            "splatting.compositing_rows._rows: `reach + abs(record[V])` -> `reach` in `reach += (reach + "
+            "abs(record[V])) * real(1e-05) + real(0.001)`",
+            "splatting.compositing_rows._rows: `reach + abs(record[V])` -> `abs(record[V])` in `reach += (reach + "
+            "abs(record[V])) * real(1e-05) + real(0.001)`",
+            "splatting.compositing_rows._rows: `V` -> `V - 1` in `reach += (reach + abs(record[V])) * real(1e-05) "
+            "+ real(0.001)`",
+            "splatting.compositing_rows._rows: `1e-05` -> `5e-06` in `reach += (reach + abs(record[V])) * "
+            "real(1e-05) + real(0.001)`",
+            "splatting.compositing_rows._rows: `0.001` -> `0.0005` in `reach += (reach + abs(record[V])) * "
+            "real(1e-05) + real(0.001)`",
+            "splatting.compositing_rows._spans: `abs(u) * real(1e-05) + real(0.001)` -> `abs(u) * real(1e-05)` in "
+            "`spread, margin = (one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-05) + "
+            "real(0.001))`",
+            "splatting.compositing_rows._spans: `abs(u) * real(1e-05) + real(0.001)` -> `real(0.001)` in `spread, "
+            "margin = (one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-05) + real(0.001))`",
+            "splatting.compositing_rows._spans: `1e-05` -> `5e-06` in `spread, margin = (one / (half * "
+            "real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-05) + real(0.001))`",
+            "splatting.compositing_rows._spans: `0.001` -> `0.0005` in `spread, margin = (one / (half * "
+            "real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-05) + real(0.001))`",
+            "splatting.compositing_rows._spans: `one - log2_cutoff` -> `-log2_cutoff` in `faintest = log2_cutoff "
+            "- (one - log2_cutoff) * real(1e-06)`",
+            "splatting.compositing_rows._spans: `1e-06` -> `5e-07` in `faintest = log2_cutoff - (one - "
+            "log2_cutoff) * real(1e-06)`",
         ),
     ),
     Group(
@@ -182,6 +270,9 @@ EQUIVALENT: tuple[Group, ...] = (
             "** 2) / (5.0 + scaled ** 2)) ** 3`",
             "equations.matern.matern_weights: `2` -> `3` in `density = ((5.0 + (scaled * ratio) ** 2) / (5.0 + "
             "scaled ** 2)) ** 3` (2)",
+            "equations.matern.matern_weights: `(5.0 + (scaled * ratio) ** 2) / (5.0 + scaled ** 2)` -> `(5.0 + "
+            "(scaled * ratio) ** 2) * (5.0 + scaled ** 2)` in `density = ((5.0 + (scaled * ratio) ** 2) / (5.0 + "
+            "scaled ** 2)) ** 3`",
         ),
     ),
     Group(
@@ -189,6 +280,8 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "splatting.compositing_rows._fold_lanes: `base + _U64(lane)` -> `base` in `sums[base + _U64(lane)] += "
             "sums[base + _U64(lane + LANES // 4)]`",
+            "splatting.compositing_rows._fold_lanes: `base + _U64(lane)` -> `base` in `sums[base + _U64(lane)] += "
+            "sums[base + _U64(lane + LANES // 2)]`",
         ),
     ),
     Group(
@@ -202,7 +295,10 @@ EQUIVALENT: tuple[Group, ...] = (
     ),
     Group(
         "The index -1 is the last cell as well.",
-        ("splatting.binning._tile_starts: `starts.size - 1` -> `-1` in `starts[starts.size - 1] = total`",),
+        (
+            "splatting.binning._tile_starts: `starts.size - 1` -> `-1` in `starts[starts.size - 1] = total`",
+            "losses.smoothness._variation: `width - 1` -> `-1` in `steps[width - 1] = image.dtype.type(0)`",
+        ),
     ),
     Group(
         "A weight of 0 stands before it.",
@@ -225,11 +321,25 @@ EQUIVALENT: tuple[Group, ...] = (
             "d_position, d_centres[block], a, e)`",
             "losses.depth._residual: `i` -> `i - 1` in `signed[i] = with_sign if use[i] else zero`",
             "equations.atom_sums._atom_totals: `k` -> `k - 1` in `rest += lanes[k]`",
+            "splatting.binning._radix_order: `i` -> `i - 1` in `if visible[i]`",
+            "losses.photometric._absolute_difference: `i` -> `i - 1` in `line[i] = abs(seen[i] - wanted[i]) if "
+            "tissue[i] else zero`",
+            "losses.photometric._absolute_difference: `index` -> `index - 1` in `totals[index] = row_total(line)`",
+            "equations.matern._row_square_sums: `k` -> `k - 1` in `lanes[k] += v * v`",
+            "equations.atom_sums._atom_totals: `k` -> `k - 1` in `lanes[k] += np.float64(x[k]) * np.float64(y[k])`",
+            "losses.depth._residual: `i` -> `i - 1` in `size[i] = abs(residual) if use[i] else zero`",
+            "equations.deformation._reverse: `i` -> `i - 1` in `total += np.float64(d_m[i])`",
+            "equations.deformation._reverse: `c` -> `c - 1` in `row_sums[c, j] = total`",
+            "equations.deformation._reverse: `j` -> `j - 1` in `row_sums[c, j] = total`",
         ),
     ),
     Group(
         "Both forms are accurate to rounding on either side of the switch.",
-        ("equations.appearance._tanh_and_slope: `0.5` -> `0.25` in `value = small if size < real(0.5) else large`",),
+        (
+            "equations.appearance._tanh_and_slope: `0.5` -> `0.25` in `value = small if size < real(0.5) else large`",
+            "equations.matern.matern_weights: `math.sqrt(5.0)` -> `5.0` in `if scaled >= math.sqrt(5.0)`",
+            "equations.matern.matern_weights: `5.0` -> `2.5` in `if scaled >= math.sqrt(5.0)`",
+        ),
     ),
     Group(
         "So far out the basis value is below 2^-60, and 0 in its place changes nothing.",
@@ -238,6 +348,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "(real(0) if exponent < cut else value)`",
             "equations.deformation._basis_constants: `2` -> `3` in `return (real(-0.5 * LOG2_E), real(0), "
             "real(1), real(2 * LARGEST_U), real(1))`",
+            "equations.deformation._reverse_row: `exponent < cut` -> `exponent <= cut` in `value = (real(0) if "
+            "exponent < cut else value) * d_offset[i]`",
         ),
     ),
     Group(
@@ -265,6 +377,72 @@ EQUIVALENT: tuple[Group, ...] = (
             "`return np.zeros(0, np.int64)`",
             "fitting.objective.photometric_loss: `np.zeros((0, 0), colour.dtype)` -> `np.ones((0, 0), "
             "colour.dtype)` in `return ImageLoss(loss, terms, d_colour, np.zeros((0, 0), colour.dtype))`",
+            "fitting.objective.photometric_loss: `0` -> `1` in `return ImageLoss(loss, terms, d_colour, "
+            "np.zeros((0, 0), colour.dtype))`",
+        ),
+    ),
+    Group(
+        "A slice ends where its array ends.",
+        (
+            "equations.atom_sums._combine: `min(n, start + BLOCK)` -> `max(n, start + BLOCK)` in `stop = min(n, "
+            "start + BLOCK)`",
+            "equations.deformation._forward: `min(count, start + PIECE)` -> `max(count, start + PIECE)` in `stop "
+            "= min(count, start + PIECE)`",
+        ),
+    ),
+    Group(
+        "A variance may be taken about any value: the centre of the window only keeps the rounding small, and so "
+        "does a neighbour.",
+        (
+            "losses.similarity._column_moments: `RADIUS` -> `RADIUS - 1` in `centre = rows[RADIUS, i]`",
+            "losses.similarity._row_moments: `i + RADIUS` -> `i` in `centre = column_mean[i + RADIUS]`",
+        ),
+    ),
+    Group(
+        "Far beyond the largest finite exponent, and far from where the sum changes.",
+        (
+            "splatting.records._gather: `700` -> `701` in `half, one, zero, largest = (real(0.5), real(1), "
+            "real(0), real(700))`",
+        ),
+    ),
+    Group(
+        "Not a number makes the result not a number either way.",
+        (
+            "splatting.covariance._unit_quaternion: `zero + type(zero)(1)` -> `type(zero)(1)` in `one = zero + "
+            "type(zero)(1)`",
+        ),
+    ),
+    Group(
+        "What is not visible stays so, and its box is not read.",
+        (
+            "splatting.binning._boxes: `if not visible[i]` dropped",
+            "splatting.binning._boxes: `continue` dropped",
+        ),
+    ),
+    Group(
+        "A negative index is mirrored by the remainder as well.",
+        ("equations.pyramid._reflect: `abs(i)` -> `i` in `i = abs(i) % period`",),
+    ),
+    Group(
+        "A value that is chosen only where the argument is smaller.",
+        ("equations.appearance._tanh_and_slope: `1.0` -> `0.5` in `q = min(x * x, real(1.0))`",),
+    ),
+    Group(
+        "Overwritten by its last reader.",
+        (
+            "losses.similarity._similarity: `4` -> `3` in `mean_e, variance_e, mean_s, variance_s, dissimilarity "
+            "= (lines[0], lines[1], lines[2], lines[3], lines[4])`",
+        ),
+    ),
+    Group(
+        "One more pass sorts by digits that are all zero.",
+        ("splatting.binning._radix_order: `8` -> `9` in `for shift in range(0, 8 * key.itemsize, _RADIX_BITS)`",),
+    ),
+    Group(
+        "Directions are formed although no band of degree 0 reads them.",
+        (
+            "splatting.harmonics._colour_block: `degree > 0` -> `degree >= 0` in `if degree > 0`",
+            "splatting.harmonics._colour_reverse_block: `degree > 0` -> `degree >= 0` in `if degree > 0`",
         ),
     ),
 )

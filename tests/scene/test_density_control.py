@@ -245,7 +245,16 @@ def test_a_pruning_bound_of_zero_keeps_everything(rng, opacity):
 
 def test_rotations_of_quaternions_with_zeros_and_of_any_length():
     quaternion = np.array(
-        [[0, 1, 0, 0], [0, 0, 3, 0], [1, 0, 0, 1], [2, 0, -1, 0], [1e-200, 0, 1e-200, 0], [1, 2, 3, 4.0]]
+        [
+            [0, 1, 0, 0],
+            [0, 0, 3, 0],
+            [1, 0, 0, 1],
+            [2, 0, -1, 0],
+            [1e-200, 0, 1e-200, 0],
+            [1, 2, 3, 4.0],
+            [0, -1, 0, 0],
+            [-1, -2, -3, -4],
+        ]
     )
     wanted = Rotation.from_quat(np.roll(quaternion / np.abs(quaternion).max(axis=1, keepdims=True), -1, axis=1))
     np.testing.assert_allclose(_rotations(quaternion.T), np.moveaxis(wanted.as_matrix(), 0, -1), atol=1e-15)

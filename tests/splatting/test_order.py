@@ -16,7 +16,7 @@ from made_up_scenes import (
 
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.projection import projection_forward
+from endotsr.splatting.projection import Projected, projection_forward
 from endotsr.splatting.records import log_opacity
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
@@ -132,6 +132,15 @@ def test_hard_C7_largest_eigenvalue_of_round_and_long_splats(dtype):
         bound = 0 if dtype is np.float64 else 16 * np.ceil(1e-3 * radius / 16)
         assert (np.abs(box[:, 2 * axis] - first) <= bound).all()
         assert (np.abs(box[:, 2 * axis + 1] - last) <= bound).all()
+
+
+def test_the_radius_of_a_small_round_splat_has_the_floor_of_the_published_rule():
+    """3 sqrt(h + sqrt(0.1)) with h = 0.75 is 3.1, so 4 pixels: one tile more to the left than 3 would reach."""
+    one = np.ones(1)
+    covariance = np.array([[0.75], [0.0], [0.75]])
+    projected = Projected(np.array([[20.0], [20.0]]), covariance, 0.75**2 * one, one, np.ones(1, bool))
+    box, _ = screen_boxes(projected, np.log(0.5 * one), LEGACY, 64, 64)
+    assert box.tolist() == [[0, 31, 0, 31]]
 
 
 def test_tile_lists_hold_every_pair_once_in_depth_order():

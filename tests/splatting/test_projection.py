@@ -82,6 +82,18 @@ def test_hard_Q1_any_quaternion_length(dtype, u, exponents):
         np.testing.assert_array_equal(covariance_forward(np.ldexp(q, power), zero)[0].rotation, plain)
 
 
+@pytest.mark.parametrize("quaternion", [(1, 0, 0, 0), (0, 1, 0, 0), (1, 2, 3, 4), (0, 0, 2, 1)])
+def test_a_quaternion_and_its_negative_are_one_rotation_with_opposite_gradients(quaternion):
+    rng = np.random.default_rng(4)
+    q, s = np.array(quaternion, float)[:, None], np.zeros((3, 1))
+    upstream = Shape(rng.normal(size=(3, 3, 1)), rng.normal(size=(3, 1)))
+    shapes, saved = zip(*(covariance_forward(sign * q, s) for sign in (1, -1)), strict=True)
+    np.testing.assert_array_equal(shapes[0].rotation, shapes[1].rotation)
+    there, back = (covariance_reverse(upstream, one).quaternion for one in saved)
+    assert np.abs(there).max() > 0.1
+    np.testing.assert_array_equal(there, -back)
+
+
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_hard_Q1_zero_quaternion_is_the_identity_with_zero_gradient(dtype):
     q = np.array([[0.0, 0.0, 1.0], [0.0, -0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], dtype)

@@ -29,11 +29,15 @@ from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
 from endotsr.splatting.records import (
+    DEPTH,
     HALF_HEIGHT,
     INVERSE_C,
     LOG2_OPACITY,
     PRECISION,
+    RED,
     SLOPE,
+    SUM_RED,
+    SUM_S,
     U,
     V,
     log_opacity,
@@ -324,6 +328,64 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
                 assert first <= y <= last
                 assert low <= reached[0] and reached[-1] <= high
     assert passing > 1000
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side):
+    """Round footprints whose edge goes through a pixel's centre: half of them reach it, by a rounding."""
+    rng, f32 = np.random.default_rng(7), np.float32
+    log2_cutoff, lines = f32(np.log2(1 / 255)), np.empty(5 * compositing_rows.TILE_HEIGHT, f32)
+    reached = 0
+    for _ in range(300):
+        distance, log2_opacity = rng.uniform(0.5, 9.0), f32(rng.uniform(-4, 0))
+        sigma = distance / np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
+        column = int(rng.integers(10, 22))
+        record = np.zeros(12, f32)
+        record[U], record[V] = column + 0.5 - side * distance, 8.5
+        record[PRECISION] = record[INVERSE_C] = sigma**-2
+        record[LOG2_OPACITY], record[HALF_HEIGHT] = log2_opacity, distance
+        compositing_rows._spans_kernel(record, 0, 0, log2_cutoff, lines)
+        _, row2, shift, low, high = compositing_rows._line_kernel(lines, 8)
+        e = f32(column) + f32(0.5) - record[U] - f32(shift)
+        if f32(row2) - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
+            reached += 1
+            assert low <= column <= high
+    assert 50 < reached < 250
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("equal", ["cutoff", "stop"])
+def test_a_pair_exactly_at_the_cutoff_or_the_stop_counts_in_both_passes(equal, dtype):
+    """alpha = cutoff = 1/4 is drawn; T - alpha T = stop = 1/2 is not beyond the stop."""
+    changes = {"alpha_cutoff": 0.25} if equal == "cutoff" else {"alpha_cutoff": 0.01, "transmittance_stop": 0.5}
+    settings, alpha = PAPER._replace(**changes), 0.25 if equal == "cutoff" else 0.5
+    record = np.zeros((1, 12), dtype)
+    record[0, [U, V, PRECISION, INVERSE_C, HALF_HEIGHT]] = 3.5, 2.5, 2.0, 2.0, 3.0
+    record[0, LOG2_OPACITY], record[0, RED:DEPTH] = np.log2(alpha), 0.5
+    lists = tile_lists(np.array([[0, 7, 0, 5]], np.int32), np.zeros(1, np.int32), 32, 16, 8, 6)
+    out, saved = compositing_rows.composite_rows_forward(record, lists, settings, np.zeros(3, dtype), 8, 6)
+    assert out.colour[0, 2, 3] == 0.5 * alpha
+    seen = np.zeros((6, 8), dtype)
+    seen[2, 3] = 1
+    pairs = compositing_rows.composite_rows_reverse(np.stack([seen, 0 * seen, 0 * seen]), 0 * seen, None, saved)
+    assert pairs[0, SUM_RED] == alpha and pairs[0, SUM_S] == 0.5 * alpha
+
+
+def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
+    rng, height, width = np.random.default_rng(0), compositing_rows.TILE_HEIGHT, compositing_rows.TILE_WIDTH
+    pitch, plane = compositing_rows.PITCH, compositing_rows.PLANE
+    colour, d_colour = rng.normal(size=(2, 3, 3 * height, 3 * width))
+    depth, d_depth, transmittance, d_opacity = rng.normal(size=(4, 3 * height, 3 * width))
+    buffer = np.zeros(6 * plane)
+    images = (colour, depth, transmittance, d_colour, d_depth, d_opacity)
+    compositing_rows._read_tile_kernel(buffer, height, width, *images)
+    total = (d_colour * colour).sum(axis=0) + d_depth * depth - d_opacity * transmittance
+    for k, image in enumerate((np.ones_like(depth), total, *d_colour, d_depth)):
+        cells = np.zeros((height, pitch))
+        cells[:, :width] = image[height : 2 * height, width : 2 * width]
+        found = buffer[k * plane : (k + 1) * plane]
+        np.testing.assert_allclose(found[: cells.size], cells.ravel(), atol=1e-14)
+        assert not found[cells.size :].any()
 
 
 def test_the_half_height_is_that_of_the_ellipse():

@@ -27,7 +27,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "L1 and SSIM": ("losses.photometric", "losses.similarity"),
     "pyramid": ("equations.laplacian", "equations.pyramid"),
     "depth and smoothness": ("losses.depth", "losses.smoothness", "opencv"),
-    "Adam": ("fitting.adam",),
+    "Adam": ("fitting.adam", "fitting.coefficients_step"),
     "density control": ("scene.density_control",),
 }
 _PACKAGE, _HERE = "endotsr", "endotsr.bench"

@@ -47,7 +47,7 @@ def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
     return {
         "FDM": Work(FDM_FORWARD * fdm / 3, size * (fdm + DEFORMATION_CHANNELS * n)),
         "FDM reverse + Adam": Work((FDM_REVERSE + 3 * ADAM) * fdm / 3, size * 6 * fdm),
-        "Fourier": Work(FOURIER * spectral, size * 5 * spectral),
+        "Fourier": Work(FOURIER * spectral, size * 3 * spectral),  # A, C, and C for the penalty
         "projection": Work((PROJECTION + HARMONIC * bands) * n, size * (3 * base + 30) * n),
         "binning": Work(0, digits * (2 * size + 8) * seen + 16 * listed + gathered),
         "blend forward": Work(BLEND_FORWARD * blended, size * (RECORD * seen + 6 * pixels)),
@@ -55,7 +55,7 @@ def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
         "L1 and SSIM": Work(3 * SIMILARITY * pixels, size * 3 * 12 * pixels),
         "pyramid": Work(3 * PYRAMID * pixels, size * 3 * 4 * pixels),
         "depth and smoothness": Work(DEPTH_SMOOTHNESS * pixels, size * 12 * pixels),
-        "Adam": Work(ADAM * (base * n + 2 * spectral), size * 7 * (base * n + 2 * spectral)),
+        "Adam": Work(ADAM * (base * n + 2 * spectral), size * (7 * base * n + 6 * 2 * spectral)),
         "density control": Work(0, size * 8 * n),
     }
 
