@@ -9,7 +9,7 @@ from endotsr.bench.limits import limits, work
 from endotsr.bench.stages import ns_per_pair
 from endotsr.bench.stages import table as stage_table
 from endotsr.config import PAPER
-from endotsr.fitting import trainer
+from endotsr.fitting import optimise, trainer
 from endotsr.fitting.schedules import densify_now
 from endotsr.splatting import render
 from endotsr.splatting.render import Scene
@@ -33,11 +33,11 @@ def test_every_stage_takes_time(result):
 
 
 def test_functions_are_put_back():
-    before = trainer.render_forward, trainer.adam_update, render.tile_lists
+    before = trainer.render_forward, optimise.adam_update, render.tile_lists
     with pytest.raises(ZeroDivisionError), clock.StageClock().watching():
         assert render.tile_lists is not before[2]
         raise ZeroDivisionError
-    assert (trainer.render_forward, trainer.adam_update, render.tile_lists) == before
+    assert (trainer.render_forward, optimise.adam_update, render.tile_lists) == before
 
 
 def test_nested_stages_are_counted_once(monkeypatch):

@@ -6,7 +6,8 @@
 --only    kernels whose name starts so; may be given several times
 --sample  at most so many mutants of a kernel, evenly spread
 --survivors   only what survived the run in the JSON file and is not listed as equivalent, and what is not in the file;
-              the file is brought up to date (a run that is cut short by --minutes is continued so)
+              the file is brought up to date (a run that is cut short by --minutes is continued so); --sample then
+              chooses among what is not in the file
 The page docs/discrimination.md is made from the result by tests/mutation/page.py.
 """
 
@@ -108,7 +109,9 @@ class Plugin:
         chosen += [m for row in zip_longest(*groups) for m in row if m is not None]  # so that a stop is fair to all
         if self.options.survivors:
             self.before = of_today(self.before, functions)
-            chosen = [m for m in chosen if m.name in survivors(self.before) or m.name not in names(self.before)]
+            old, there = survivors(self.before), names(self.before)
+            chosen = [m for m in chosen if m.name not in there]
+            chosen += [m for k in wanted for m in mutants(k, functions[k]) if m.name in old]
         self.say(f"{len(chosen)} mutants of {len(wanted)} functions")
         checks = Checks(session.items, self.options.keep, self.say)
         work = [(m, partial(examine, m, functions[m.kernel], checks)) for m in chosen]
