@@ -37,8 +37,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "splatting.projection.projection_reverse_footprint: `n + BLOCK - 1` -> `n + BLOCK` in `d_poses = "
             "np.zeros(((n + BLOCK - 1) // BLOCK, 3 if pose_gradient else 0, 4), dtype)`",
             "splatting.harmonics.harmonics_reverse: `n + BLOCK - 1` -> `n + BLOCK + 1` in `d_centres = "
-            "np.empty(((n + BLOCK - 1) // BLOCK, 3), dtype)`",
-            "splatting.harmonics.harmonics_reverse: `n + BLOCK - 1` -> `n + BLOCK` in `d_centres = np.empty(((n + "
+            "np.zeros(((n + BLOCK - 1) // BLOCK, 3), dtype)`",
+            "splatting.harmonics.harmonics_reverse: `n + BLOCK - 1` -> `n + BLOCK` in `d_centres = np.zeros(((n + "
             "BLOCK - 1) // BLOCK, 3), dtype)`",
             "splatting.harmonics.harmonics_forward: `position.shape[1] + BLOCK - 1` -> `position.shape[1] + BLOCK "
             "+ 1` in `blocks = (position.shape[1] + BLOCK - 1) // BLOCK`",
@@ -168,6 +168,7 @@ EQUIVALENT: tuple[Group, ...] = (
             "`np.ones(GRADIENT * LANES, records.dtype)` in `sums = np.zeros(GRADIENT * LANES, records.dtype)`",
             "equations.laplacian._expand_adjoint: `x` -> `x - 1` in `target[x] *= scale`",
             "equations.laplacian._difference: `0.0` -> `1.0` in `target[x] = d if keep[x] else real(0.0)`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `gx[i] = gy[i] = gz[i] = zero` (3)",
         ),
     ),
     Group(

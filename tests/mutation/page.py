@@ -91,6 +91,7 @@ def page(result: dict[str, Any]) -> str:
     later = run.get("again", [])
     again = ""
     if later:
+        sample = sample.replace("at most", "at first at most")
         again = f" What survived, and what was not yet among them, was put to the tests of {later[-1]['commit']}"
         again += f" ({sum(r['seconds'] for r in later) / 60:.0f} minutes more)."
     lines = [

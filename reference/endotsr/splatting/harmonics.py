@@ -144,10 +144,12 @@ _basis_gradient_kernel = jit(_basis_gradient)
 
 
 def _direction_to_position_block(degree, planes, d_position, d_centre):
-    """From direction to position: drop the radial part, divide by the distance; the centre gets minus the sum."""
+    """From direction to position: drop the radial part, divide by the distance.
+
+    `d_centre` comes as 0 and gets minus the sum.
+    """
     zero = planes.dtype.type(0)
     gx, gy, gz = d_position[0], d_position[1], d_position[2]
-    d_centre[0] = d_centre[1] = d_centre[2] = zero
     if degree == 0:
         for i in range(gx.size):
             gx[i] = gy[i] = gz[i] = zero
@@ -296,7 +298,7 @@ def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsG
     d_harmonics = np.empty_like(saved.harmonics)
     d_residual = np.empty((3, 0 if saved.residual is None else n), dtype)
     d_position = np.empty((3, n), dtype)
-    d_centres = np.empty(((n + BLOCK - 1) // BLOCK, 3), dtype)
+    d_centres = np.zeros(((n + BLOCK - 1) // BLOCK, 3), dtype)
     share(
         _colour_reverse_blocks_kernel, d_centres.shape[0],
         saved.harmonics, saved.position, saved.centre, saved.degree, saved.clamped,
