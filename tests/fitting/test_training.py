@@ -290,7 +290,7 @@ def test_legacy_skip_leaves_out_the_step_on_densify_iterations(finished, sequenc
         before, steps = now.gaussians.harmonics[0].copy(), now.adam.step["position"]
         with monkeypatch.context() as patch:
             if skip:
-                patch.setattr(trainer, "_optimise", forbidden)
+                patch.setattr(trainer, "optimise", forbidden)
             training_step(now, shop)
         assert now.adam.step["position"] == steps + (0 if skip else 1)
         kept = {tuple(c) for c in now.gaussians.harmonics[0].T} & {tuple(c) for c in before.T}
