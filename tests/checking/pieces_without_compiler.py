@@ -8,9 +8,9 @@ import sys
 
 import numpy as np
 import pytest
-from test_ranges import PAIRS, both_passes, one_by_one_backwards
+from test_ranges import PAIRS, both_passes, case, share_one_by_one
 
-from endotsr.checking import one_thread, pair_stream
+from endotsr.checking import one_thread
 from endotsr.equations.deformation import CHANNELS, deformation_forward, deformation_reverse
 from endotsr.fitting.adam import adam_state, adam_update
 from endotsr.fitting.coefficients_step import coefficients_adam_step
@@ -35,18 +35,13 @@ def shorten(monkeypatch, length):
 @pytest.mark.parametrize("name", list(PAIRS))
 def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
     """To rounding: sums over pieces are added in another order."""
-    pair = PAIRS[name]
-    rng = pair_stream(name, 3)
-    inputs = pair.inputs(rng)
-    cotangents = {k: np.asarray(rng.standard_normal(np.shape(v))) for k, v in pair.forward(inputs).items()}
+    chosen = case(name)
     with one_thread():
-        whole = both_passes(pair, inputs, cotangents)
+        whole = both_passes(*chosen)
         shorten(monkeypatch, length)
-        cut = both_passes(pair, inputs, cotangents)
-        for module_name, module in list(sys.modules.items()):
-            if module_name.startswith("endotsr.") and module_name != "endotsr.sharing" and hasattr(module, "share"):
-                monkeypatch.setattr(module, "share", one_by_one_backwards)
-        alone = both_passes(pair, inputs, cotangents)
+        cut = both_passes(*chosen)
+        share_one_by_one(monkeypatch)
+        alone = both_passes(*chosen)
     for key, value in whole.items():
         largest = np.abs(value).max(initial=0.0)
         np.testing.assert_allclose(cut[key], value, rtol=1e-9, atol=1e-12 * largest, err_msg=key)
@@ -78,8 +73,7 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
         whole = stepped(False)
         shorten(monkeypatch, length)
         if ranges == "one by one":
-            for module in ("equations.deformation", "fitting.adam", "fitting.deformation_step"):
-                monkeypatch.setattr(sys.modules[f"endotsr.{module}"], "share", one_by_one_backwards)
+            share_one_by_one(monkeypatch)
         for fused in (False, True):
             for one, two in zip(stepped(fused), whole, strict=True):
                 np.testing.assert_array_equal(one, two)
@@ -103,6 +97,6 @@ def test_the_fused_step_of_coefficients_in_pieces(length, count, ranges, monkeyp
         whole = stepped()
         shorten(monkeypatch, length)
         if ranges == "one by one":
-            monkeypatch.setattr(sys.modules["endotsr.fitting.coefficients_step"], "share", one_by_one_backwards)
+            share_one_by_one(monkeypatch)
         for one, two in zip(stepped(), whole, strict=True):
             np.testing.assert_array_equal(one, two)

@@ -19,22 +19,31 @@ def one_by_one_backwards(kernel, tasks, *arguments):
         kernel(task, task + 1, *arguments)
 
 
+def share_one_by_one(monkeypatch):
+    """Every kernel gets its tasks so."""
+    for module_name, module in list(sys.modules.items()):
+        if module_name.startswith("endotsr.") and module_name != "endotsr.sharing" and hasattr(module, "share"):
+            monkeypatch.setattr(module, "share", one_by_one_backwards)
+
+
+def case(name):
+    """A pair with inputs and cotangents."""
+    pair, rng = PAIRS[name], pair_stream(name, 3)
+    inputs = pair.inputs(rng)
+    return pair, inputs, {k: np.asarray(rng.standard_normal(np.shape(v))) for k, v in pair.forward(inputs).items()}
+
+
 def both_passes(pair, inputs, cotangents):
     return dict(pair.forward(inputs)) | {f"gradient of {k}": v for k, v in pair.reverse(inputs, cotangents).items()}
 
 
 @pytest.mark.parametrize("name", list(PAIRS))
 def test_tasks_in_any_ranges_and_order_give_the_same_bits(name, monkeypatch):
-    pair = PAIRS[name]
-    rng = pair_stream(name, 3)
-    inputs = pair.inputs(rng)
-    cotangents = {k: np.asarray(rng.standard_normal(np.shape(v))) for k, v in pair.forward(inputs).items()}
+    chosen = case(name)
     with one_thread():
-        whole = both_passes(pair, inputs, cotangents)
-        for module_name, module in list(sys.modules.items()):
-            if module_name.startswith("endotsr.") and module_name != "endotsr.sharing" and hasattr(module, "share"):
-                monkeypatch.setattr(module, "share", one_by_one_backwards)
-        cut = both_passes(pair, inputs, cotangents)
+        whole = both_passes(*chosen)
+        share_one_by_one(monkeypatch)
+        cut = both_passes(*chosen)
     assert whole.keys() == cut.keys()
     for key, value in whole.items():
         assert np.array_equal(value, cut[key]), key
