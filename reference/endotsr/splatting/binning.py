@@ -120,15 +120,21 @@ def _radix_order(key, visible):
 # The counting sort of (tile, Gaussian) pairs runs over CHUNKS independent chunks of the depth order.
 
 
-def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, counts, pair_starts):
-    """Pairs of each (chunk, tile), and of each Gaussian at the next place of `pair_starts`."""
+def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, tile_box, counts, pair_starts):
+    """First and last tile column and row of each Gaussian; pairs of each (chunk, tile), and of each Gaussian at the
+    next place of `pair_starts`.
+
+    A division takes as long as all the rest, so it is done here once, and without sign: boxes lie in the picture.
+    """
     n = order.size
+    w, h = np.uint32(tile_width), np.uint32(tile_height)
     for chunk in range(first, last):
         mine = counts[chunk]
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            i = order[k]
-            tx0, tx1 = box[i, 0] // tile_width, box[i, 1] // tile_width
-            ty0, ty1 = box[i, 2] // tile_height, box[i, 3] // tile_height
+            i, tiles = order[k], tile_box[k]
+            tx0, tx1 = np.int64(np.uint32(box[i, 0]) // w), np.int64(np.uint32(box[i, 1]) // w)
+            ty0, ty1 = np.int64(np.uint32(box[i, 2]) // h), np.int64(np.uint32(box[i, 3]) // h)
+            tiles[0], tiles[1], tiles[2], tiles[3] = tx0, tx1, ty0, ty1
             pair_starts[k + 1] = (tx1 - tx0 + 1) * (ty1 - ty0 + 1)
             for ty in range(ty0, ty1 + 1):
                 for tx in range(tx0, tx1 + 1):
@@ -149,20 +155,19 @@ def _tile_starts(counts, starts, pair_starts):
         pair_starts[k + 1] += pair_starts[k]
 
 
-def _fill_lists(first, last, box, order, tile_width, tile_height, tiles_x, counts, pair_starts, ranks, slots):
+def _fill_lists(first, last, tile_box, tiles_x, counts, pair_starts, ranks, slots):
     """Every pair to its place; `counts` runs along."""
-    n = order.size
+    n = tile_box.shape[0]
     for chunk in range(first, last):
         position = counts[chunk]
         for k in range(chunk * n // CHUNKS, (chunk + 1) * n // CHUNKS):
-            i = order[k]
-            at = pair_starts[k]
-            for ty in range(box[i, 2] // tile_height, box[i, 3] // tile_height + 1):
-                for tx in range(box[i, 0] // tile_width, box[i, 1] // tile_width + 1):
+            tiles, at = tile_box[k], pair_starts[k]
+            for ty in range(tiles[2], tiles[3] + 1):
+                for tx in range(tiles[0], tiles[1] + 1):
                     t = ty * tiles_x + tx
-                    ranks[position[t]] = k
-                    slots[at] = position[t]
-                    position[t] += 1
+                    place = position[t]
+                    ranks[place], slots[at] = k, place
+                    position[t] = place + 1
                     at += 1
 
 
@@ -208,9 +213,10 @@ def tile_lists(
     tiles_x, tiles_y = -(-width // tile_width), -(-height // tile_height)
     n = order.size
     counts, pair_starts = np.zeros((CHUNKS, tiles_x * tiles_y), np.int64), np.zeros(n + 1, np.int64)
-    share(_count_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, counts, pair_starts)
+    tile_box = np.empty((n, 4), np.int32)  # first and last tile column and row, in depth order
+    share(_count_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, tile_box, counts, pair_starts)
     starts = np.empty(tiles_x * tiles_y + 1, np.int64)
     _starts_kernel(counts, starts, pair_starts)
     ranks, slots = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int32)
-    share(_fill_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, counts, pair_starts, ranks, slots)
+    share(_fill_kernel, CHUNKS, tile_box, tiles_x, counts, pair_starts, ranks, slots)
     return TileLists(starts, ranks, pair_starts, slots)
