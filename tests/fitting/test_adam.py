@@ -154,7 +154,7 @@ def test_bad_arguments_are_refused():
         adam_step(one, np.zeros((3, 2)), one.copy(), one.copy(), 1, 0.1, *BETAS)
     with pytest.raises(ValueError, match="second"):
         adam_step(one, one.copy(), one.copy(), one.astype(np.float32), 1, 0.1, *BETAS)
-    with pytest.raises(ValueError, match="contiguous"):
+    with pytest.raises(ValueError, match=r"parameter: .* got strided"):
         adam_step(one[:, :2], one[:, :2].copy(), one[:, :2].copy(), one[:, :2].copy(), 1, 0.1, *BETAS)
     with pytest.raises(ValueError, match="step"):
         adam_step(one, one.copy(), one.copy(), one.copy(), 0, 0.1, *BETAS)
@@ -216,5 +216,5 @@ def test_fused_step_refuses_arrays_that_disagree(rng):
     with pytest.raises(ValueError, match="d_offsets"):
         deformation_adam_step(out[:, :3].copy(), saved, state, rates, *BETAS)
     broken = AdamState({**state.first, "fdm_width": np.zeros((10, 2, 4))}, state.second, state.step)
-    with pytest.raises(ValueError, match="expected C-contiguous"):
+    with pytest.raises(ValueError, match="first fdm_width: expected C-contiguous"):
         deformation_adam_step(out, saved, broken, rates, *BETAS)

@@ -106,15 +106,24 @@ def adam_step(
     Raises: ValueError on unequal shapes or dtypes, arrays that are not contiguous, step < 1.
     Oracle: tests/oracle/adam.py.
     """
-    for name, array in (("gradient", gradient), ("first", first), ("second", second)):
-        if array.shape != parameter.shape or array.dtype != parameter.dtype:
-            raise ValueError(f"{name}: expected {parameter.dtype} {parameter.shape}, got {array.dtype} {array.shape}")
-    if not all(a.flags.c_contiguous for a in (parameter, gradient, first, second)):
-        raise ValueError("adam_step: arrays must be C-contiguous, or the update would go to a copy")
+    check_layout(parameter, {"parameter": parameter, "gradient": gradient, "first": first, "second": second})
     rate, root = step_factors(step, learning_rate, beta1, beta2)
     p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous
     tasks = (p.size + PIECE - 1) // PIECE
     share(_adam_kernel, tasks, p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
+
+
+def check_layout(like: FloatArray, arrays: Mapping[str, FloatArray]) -> None:
+    """All of one kind, in one piece: else a step would fail half way, or go to a copy.
+
+    like   has the shape and dtype that are expected
+
+    Raises: ValueError naming the first of `arrays` with another shape or dtype, or that is not C-contiguous.
+    """
+    for name, a in arrays.items():
+        if a.shape != like.shape or a.dtype != like.dtype or not a.flags.c_contiguous:
+            kind = "C-contiguous" if a.flags.c_contiguous else "strided"
+            raise ValueError(f"{name}: expected C-contiguous {like.dtype} {like.shape}, got {kind} {a.dtype} {a.shape}")
 
 
 def step_factors(step: int, learning_rate: float, beta1: float, beta2: float) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.equations.deformation import PIECE
-from endotsr.fitting.adam import AdamState, Rate, adam_row, step_factors
+from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, step_factors
 from endotsr.jit import jit
 from endotsr.sharing import share
 
@@ -43,9 +43,7 @@ def coefficients_adam_step(
     Raises: ValueError on shapes, dtypes or layouts that do not fit. Oracle: the three functions named above, bitwise.
     """
     first, second, dtype = state.first[name], state.second[name], parameter.dtype
-    for array in (parameter, first, second):
-        if array.shape != parameter.shape or array.dtype != dtype or not array.flags.c_contiguous:
-            raise ValueError(f"{name}: expected C-contiguous {dtype} {parameter.shape}")
+    check_layout(parameter, {name: parameter, f"first {name}": first, f"second {name}": second})
     axes, count, n = parameter.shape
     factors = np.zeros(0, dtype) if shrink is None else np.ascontiguousarray(shrink, dtype)
     if d_sums.shape != (axes, n) or atoms.shape != (count,) or factors.size not in (0, count):

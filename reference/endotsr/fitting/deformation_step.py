@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.equations.deformation import CHANNELS, PIECE, DeformationSaved, reverse_row
-from endotsr.fitting.adam import AdamState, Rate, adam_row, rate_parts, step_factors
+from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, rate_parts, step_factors
 from endotsr.jit import jit
 from endotsr.sharing import share
 
@@ -33,15 +33,19 @@ def deformation_adam_step(
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
 
-    The gradient by t is not formed. Oracle: `deformation_reverse` then `adam_update`, bitwise.
+    The gradient by t is not formed.
+    Raises: ValueError naming the array whose shape, dtype or layout does not fit.
+    Oracle: `deformation_reverse` then `adam_update`, bitwise.
     """
     parameters = (saved.weight, saved.centre, saved.width)
     first, second = [state.first[n] for n in NAMES], [state.second[n] for n in NAMES]
-    for array in (*parameters, *first, *second):
-        if array.shape != saved.weight.shape or array.dtype != d_offsets.dtype or not array.flags.c_contiguous:
-            raise ValueError(f"deformation_adam_step: expected C-contiguous {d_offsets.dtype} {saved.weight.shape}")
-    if d_offsets.shape != (CHANNELS, saved.weight.shape[2]):
-        raise ValueError(f"d_offsets: expected (10, {saved.weight.shape[2]}), got {d_offsets.shape}")
+    for k, name in enumerate(NAMES):
+        check_layout(saved.weight, {name: parameters[k], f"first {name}": first[k], f"second {name}": second[k]})
+    expected = (CHANNELS, saved.weight.shape[2])
+    if d_offsets.shape != expected or d_offsets.dtype != saved.weight.dtype:
+        raise ValueError(
+            f"d_offsets: expected {saved.weight.dtype} {expected}, got {d_offsets.dtype} {d_offsets.shape}"
+        )
     rate = np.empty((3, CHANNELS))
     root = np.empty(3)
     for k, name in enumerate(NAMES):
