@@ -371,6 +371,18 @@ def test_a_pair_exactly_at_the_cutoff_or_the_stop_counts_in_both_passes(equal, d
     assert pairs[0, SUM_RED] == alpha and pairs[0, SUM_S] == 0.5 * alpha
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(dtype):
+    """Records are fetched a batch at a time, each batch in its turn; small splats, so that the loops are short."""
+    count = 2 * compositing_rows.BATCH + 5
+    places = np.random.default_rng(20).uniform(1, 14, (2, count))
+    camera = plain_camera(16, 16)
+    scene = screen_scene(camera, *places, 3 + 0.01 * np.arange(count), 0.5, 0.4, rgb_for(21, count))
+    slow, fast = both(as_dtype(scene, dtype), camera)
+    assert_close_l2(fast, slow, 1e-12 if dtype == np.float64 else 1e-4)
+    assert np.abs(fast["opacity_logit"]).min() > 0  # every batch was blended
+
+
 def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
     rng, height, width = np.random.default_rng(0), compositing_rows.TILE_HEIGHT, compositing_rows.TILE_WIDTH
     pitch, plane = compositing_rows.PITCH, compositing_rows.PLANE
