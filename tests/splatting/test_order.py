@@ -16,8 +16,9 @@ from made_up_scenes import (
 
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.covariance import covariance_forward
+from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.projection import Projected, projection_forward
-from endotsr.splatting.records import log_opacity
+from endotsr.splatting.records import INVERSE_C, LOG2_OPACITY, PRECISION, log_opacity, pack_records
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 CAMERA = plain_camera(33, 29, 25.0)
@@ -182,6 +183,30 @@ def test_boxes_are_no_wider_than_the_ellipse_and_a_rounding():
         wide, narrow = first - box[seen, 2 * axis], box[seen, 2 * axis + 1] - last
         assert ((wide == 0) | (wide == 1)).all() and ((narrow == 0) | (narrow == 1)).all()
         assert (wide == 0).mean() > 0.95 and (narrow == 0).mean() > 0.95
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_pixel_on_the_very_edge_of_a_footprint_is_in_its_box(axis, side):
+    """Round footprints, near and far, whose edge goes through a pixel's centre.
+
+    With this cutoff the roundings of its two logarithms, one of the box and one of the pixels, draw apart: without a
+    margin many boxes would be too small.
+    """
+    rng, f32, n, settings = np.random.default_rng(8), np.float32, 2000, PAPER._replace(alpha_cutoff=3e-4)
+    log_cutoff, pixel = np.log(settings.alpha_cutoff), rng.integers(10, 90, n)
+    mean, one = np.full((2, n), 50.5, f32), np.ones(n, f32)
+    mean[axis] = pixel + 0.5 - side * 10 ** rng.uniform(-0.3, 6, n)
+    e = (pixel + 0.5).astype(f32) - mean[axis]
+    log_alpha = (log_cutoff + rng.uniform(0.01, 1, n)).astype(f32)
+    variance = (e.astype(float) ** 2 / (2 * (log_alpha - log_cutoff))).astype(f32)
+    projected = Projected(mean, np.stack([variance, 0 * one, variance]), variance * variance, one, one > 0)
+    box, seen = screen_boxes(projected, log_alpha, settings, 100, 100)
+    records = pack_records(np.arange(n, dtype=np.int32), projected, log_alpha, np.zeros((3, n), f32), log_cutoff)
+    steepness = f32(0.5 * LOG2_E) * records[:, (PRECISION, INVERSE_C)[axis]]
+    reached = records[:, LOG2_OPACITY] - steepness * e * e >= f32(np.log2(settings.alpha_cutoff))
+    assert reached.sum() > 1000
+    assert (seen & (box[:, 2 * axis] <= pixel) & (pixel <= box[:, 2 * axis + 1]))[reached].all()
 
 
 @pytest.mark.parametrize("support", ["everywhere", "ellipse"])

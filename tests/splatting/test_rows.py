@@ -21,7 +21,7 @@ from made_up_scenes import (
     turned_camera,
 )
 
-from endotsr.splatting import compositing_rows
+from endotsr.splatting import compositing, compositing_rows
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.covariance import covariance_forward
@@ -33,6 +33,7 @@ from endotsr.splatting.records import (
     HALF_HEIGHT,
     INVERSE_C,
     LOG2_OPACITY,
+    OPACITY,
     PRECISION,
     RED,
     SLOPE,
@@ -47,6 +48,10 @@ from endotsr.splatting.render import Scene, choose_path
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 BACKGROUND = np.array([0.9, 0.1, 0.4])
+PATHS = {
+    "definition": (compositing, compositing.composite_forward, compositing.composite_reverse),
+    "rows": (compositing_rows, compositing_rows.composite_rows_forward, compositing_rows.composite_rows_reverse),
+}
 CAMERA = plain_camera()
 
 
@@ -330,53 +335,66 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
     assert passing > 1000
 
 
+@pytest.mark.parametrize("cutoff", [1 / 255, 3e-4])  # of the second, the natural and the binary logarithm draw apart
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side):
-    """Round footprints whose edge goes through a pixel's centre: half of them reach it, by a rounding."""
+def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side, cutoff):
+    """Round footprints whose edge goes through the centre of a pixel of their own row, and of their own column."""
     rng, f32 = np.random.default_rng(7), np.float32
-    log2_cutoff, lines = f32(np.log2(1 / 255)), np.empty(5 * compositing_rows.TILE_HEIGHT, f32)
+    log2_cutoff, lines = f32(np.log2(cutoff)), np.empty(5 * compositing_rows.TILE_HEIGHT, f32)
     reached = 0
     for _ in range(300):
-        distance, log2_opacity = rng.uniform(0.5, 9.0), f32(rng.uniform(-4, 0))
-        sigma = distance / np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
-        column = int(rng.integers(10, 22))
-        record = np.zeros(12, f32)
-        record[U], record[V] = column + 0.5 - side * distance, 8.5
-        record[PRECISION] = record[INVERSE_C] = sigma**-2
-        record[LOG2_OPACITY], record[HALF_HEIGHT] = log2_opacity, distance
-        compositing_rows._spans_kernel(record, 0, 0, log2_cutoff, lines)
-        _, row2, shift, low, high = compositing_rows._line_kernel(lines, 8)
-        e = f32(column) + f32(0.5) - record[U] - f32(shift)
-        if f32(row2) - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
-            reached += 1
-            assert low <= column <= high
-    assert 50 < reached < 250
+        distance, log_alpha = 10 ** rng.uniform(-0.3, 6), f32(np.log(cutoff) + rng.uniform(0.01, 4))
+        column, row = int(rng.integers(10, 22)), int(rng.integers(3, 13))
+        u, v = f32(column + 0.5 - side * distance), f32(row + 0.5 - side * distance)
+        for e, dy in ((f32(column + 0.5) - u, f32(0)), (f32(0), f32(row + 0.5) - v)):
+            reach = log_alpha - f32(np.log(cutoff))
+            variance = f32((e.astype(float) ** 2 + dy.astype(float) ** 2) / (2 * reach))
+            record = np.zeros(12, f32)
+            record[U], record[V] = (u, f32(row + 0.5)) if e else (f32(column + 0.5), v)
+            record[PRECISION] = record[INVERSE_C] = f32(1) / variance
+            record[LOG2_OPACITY], record[HALF_HEIGHT] = log_alpha * f32(LOG2_E), np.sqrt(f32(2) * reach * variance)
+            first, last = compositing_rows._rows_kernel(record, 0)
+            compositing_rows._spans_kernel(record, 0, 0, log2_cutoff, lines)
+            _, row2, _, low, high = compositing_rows._line_kernel(lines, row)
+            if f32(row2) - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
+                reached += 1
+                assert first <= row <= last and low <= column <= high
+    assert reached > 200
+
+
+AT_THE_EDGE = {
+    "cutoff": ({"alpha_cutoff": 0.25}, 0.25),  # alpha = cutoff is drawn
+    "stop": ({"alpha_cutoff": 0.01, "transmittance_stop": 0.5}, 0.5),  # T - alpha T = stop is not beyond the stop
+    "clamp": ({"alpha_cutoff": 0.01, "alpha_max": 0.5}, 0.5),  # alpha = alpha_max is not clamped: the gradient passes
+}
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("equal", ["cutoff", "stop"])
-def test_a_pair_exactly_at_the_cutoff_or_the_stop_counts_in_both_passes(equal, dtype):
-    """alpha = cutoff = 1/4 is drawn; T - alpha T = stop = 1/2 is not beyond the stop."""
-    changes = {"alpha_cutoff": 0.25} if equal == "cutoff" else {"alpha_cutoff": 0.01, "transmittance_stop": 0.5}
-    settings, alpha = PAPER._replace(**changes), 0.25 if equal == "cutoff" else 0.5
+@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("edge", list(AT_THE_EDGE))
+def test_a_pair_exactly_at_the_cutoff_the_stop_or_the_clamp_counts_in_both_passes(edge, path, dtype):
+    changes, alpha = AT_THE_EDGE[edge]
+    settings = PAPER._replace(**changes)
     record = np.zeros((1, 12), dtype)
     record[0, [U, V, PRECISION, INVERSE_C, HALF_HEIGHT]] = 3.5, 2.5, 2.0, 2.0, 3.0
-    record[0, LOG2_OPACITY], record[0, RED:DEPTH] = np.log2(alpha), 0.5
-    lists = tile_lists(np.array([[0, 7, 0, 5]], np.int32), np.zeros(1, np.int32), 32, 16, 8, 6)
-    out, saved = compositing_rows.composite_rows_forward(record, lists, settings, np.zeros(3, dtype), 8, 6)
+    record[0, LOG2_OPACITY], record[0, OPACITY], record[0, RED:DEPTH] = np.log2(alpha), alpha, 0.5
+    module, forward, reverse = PATHS[path]
+    lists = tile_lists(np.array([[0, 7, 0, 5]], np.int32), np.zeros(1, np.int32), module.TILE_WIDTH, 16, 8, 6)
+    out, saved = forward(record, lists, settings, np.zeros(3, dtype), 8, 6)
     assert out.colour[0, 2, 3] == 0.5 * alpha
     seen = np.zeros((6, 8), dtype)
     seen[2, 3] = 1
-    pairs = compositing_rows.composite_rows_reverse(np.stack([seen, 0 * seen, 0 * seen]), 0 * seen, None, saved)
+    pairs = reverse(np.stack([seen, 0 * seen, 0 * seen]), 0 * seen, 0 * seen, saved)
     assert pairs[0, SUM_RED] == alpha and pairs[0, SUM_S] == 0.5 * alpha
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(dtype):
+@pytest.mark.parametrize("height", [16, 1])
+def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(height, dtype):
     """Records are fetched a batch at a time, each batch in its turn; small splats, so that the loops are short."""
     count = 2 * compositing_rows.BATCH + 5
-    places = np.random.default_rng(20).uniform(1, 14, (2, count))
-    camera = plain_camera(16, 16)
+    places = np.random.default_rng(20).uniform(0, [[16], [height]], (2, count))
+    camera = plain_camera(16, height)
     scene = screen_scene(camera, *places, 3 + 0.01 * np.arange(count), 0.5, 0.4, rgb_for(21, count))
     slow, fast = both(as_dtype(scene, dtype), camera)
     assert_close_l2(fast, slow, 1e-12 if dtype == np.float64 else 1e-4)

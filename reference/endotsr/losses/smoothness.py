@@ -114,7 +114,7 @@ def _variation(first, stop, image, mask, totals):
 
 
 def _variation_reverse(first, stop, image, mask, weight, d_image):
-    """Adds weight x (sign of the steps that end here - sign of the steps that start here) outside tissue."""
+    """weight x (sign of the steps that end here - sign of the steps that start here) outside tissue, 0 on tissue."""
     height, width = mask.shape
     zero = image.dtype.type(0)
     rows = np.empty((3, width + 2), image.dtype)  # with one more sample at either end
@@ -131,7 +131,7 @@ def _variation_reverse(first, stop, image, mask, weight, d_image):
             slope = _sign(own - line[i]) + _sign(own - line[i + 2])
             slope += _sign(own - above[i + 1]) + _sign(own - below[i + 1])
             change = weight * slope
-            out[i] += zero if tissue[i] else change
+            out[i] = zero if tissue[i] else change
 
 
 def _outside_tissue(row, tissue, out):
