@@ -30,7 +30,13 @@ from endotsr.splatting.covariance import (
     covariance_matrix,
     covariance_reverse,
 )
-from endotsr.splatting.projection import footprint, projection_forward, projection_reverse
+from endotsr.splatting.projection import (
+    AXIS_LIMIT,
+    footprint,
+    projection_forward,
+    projection_reverse,
+    projection_reverse_footprint,
+)
 from endotsr.splatting.records import INVERSE_C, PRECISION, SLOPE, log_opacity, pack_records
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import EXACT, PAPER
@@ -254,22 +260,82 @@ def test_hard_P2_the_clamp_acts_on_the_jacobian_and_not_on_the_centre():
     np.testing.assert_array_equal(same, [max(abs(x), abs(y)) < 1 for x, y in PLACES])
 
 
-@pytest.mark.parametrize("dtype, far", [(np.float64, 1e70), (np.float32, 1e20)])
-@pytest.mark.parametrize("place", ["x", "y", "quaternion", "log_scale"])
+@pytest.mark.parametrize("dtype, far", [(np.float64, 1e70), (np.float64, -1e70), (np.float32, 1e20)])
+@pytest.mark.parametrize("place", ["x", "y", "z", "quaternion", "log_scale"])
 def test_out_of_range_or_not_a_number_is_not_visible_and_all_zero(place, dtype, far):
     position, q, s = (
         np.array([[0.1], [0.2], [3.0]], dtype),
         np.array([[1.0], [0], [0], [0]], dtype),
         np.zeros((3, 1), dtype),
     )
-    if place in "xy":
-        position["xy".index(place)] = far
+    if place in "xyz":
+        position["xyz".index(place)] = far if place < "z" else np.inf  # a finite depth has no end
     (q if place == "quaternion" else s)[0] = np.nan if len(place) > 1 else 0.5
     shape, _ = covariance_forward(q, s)
     projected, _ = projection_forward(position, shape, plain_camera(), PAPER)
     assert not projected.visible[0]
     for name in ("mean2d", "covariance2d", "determinant", "depth"):
         assert not getattr(projected, name).any(), name
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_centre_exactly_at_the_limit_is_drawn(side, axis, dtype):
+    camera, limit = plain_camera(focal=1.0)._replace(fy=1.0, cx=0.0, cy=0.0), dtype(AXIS_LIMIT[np.dtype(dtype)])
+    position = np.array([[0, 0], [0, 0], [1, 1]], dtype)
+    position[axis] = side * limit, side * np.nextafter(limit, dtype(np.inf))
+    shape = Shape(np.repeat(np.eye(3, dtype=dtype)[:, :, None], 2, axis=2), np.ones((3, 2), dtype))
+    assert projection_forward(position, shape, camera, PAPER)[0].visible.tolist() == [True, False]
+
+
+def on_screen(position, rotation, camera):
+    """(2, 3, N) images of the unit axes, px: J W R."""
+    x, y, z = camera.rotation @ position + camera.translation[:, None]
+    zero = np.zeros_like(z)
+    j = np.array([[camera.fx / z, zero, -camera.fx * x / z**2], [zero, camera.fy / z, -camera.fy * y / z**2]])
+    return np.einsum("ijn,jk,kln->iln", j, camera.rotation, rotation)
+
+
+@pytest.mark.parametrize("dtype, bound", [(np.float64, 1e-9), (np.float32, 1e-3)])
+def test_an_axis_beyond_the_limit_is_as_long_as_the_limit_with_zero_gradient(dtype, bound):
+    camera, n, limit = turned_camera(), 90, AXIS_LIMIT[np.dtype(dtype)]
+    scene = as_dtype(random_scene(21, n, camera), dtype)
+    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
+    unit = on_screen(scene.position.astype(float), shape.rotation.astype(float), camera)
+    longest = limit / np.abs(unit).sum(axis=0)  # (3, N) scene units
+    huge, factor = (np.arange(n) % 3, np.arange(n)), np.resize([0.5, 0.9, 1.1, 2.0, 1e3], n)
+    given, taken = shape.scale.copy(), shape.scale.copy()
+    given[huge], taken[huge] = (factor * longest[huge]), np.minimum(factor, 1 - bound / 100) * longest[huge]
+    d_mean2d, d_footprint = np.zeros((2, n), dtype), np.random.default_rng(22).normal(size=(3, n)).astype(dtype)
+    found, wanted = (
+        projection_forward(scene.position, Shape(shape.rotation, s), camera, EXACT) for s in (given, taken)
+    )
+    for one, two in zip(found[0], wanted[0], strict=True):
+        np.testing.assert_allclose(one, two, rtol=bound)
+    a, b = (projection_reverse_footprint(d_mean2d, d_footprint, d_mean2d[0], saved) for _, saved in (found, wanted))
+    clipped, seen = np.zeros((3, n), bool), found[0].visible
+    clipped[huge] = factor > 1
+    assert seen.sum() > 80 and b.scale[:, seen].all()
+    np.testing.assert_array_equal((a.scale == 0)[:, seen], clipped[:, seen])
+    assert not a.rotation[:, clipped].any()
+    np.testing.assert_allclose(a.scale[~clipped], b.scale[~clipped], rtol=bound)
+    np.testing.assert_allclose(a.rotation[:, ~clipped], b.rotation[:, ~clipped], rtol=bound)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_axis_exactly_at_the_limit_is_not_clipped(axis, dtype):
+    """The kink from both sides: the same footprint, and a gradient at the limit but none just beyond it."""
+    camera, limit = plain_camera(focal=1.0)._replace(fy=1.0), dtype(AXIS_LIMIT[np.dtype(dtype)])
+    seen = []
+    for length in (limit, np.nextafter(limit, dtype(np.inf))):
+        shape = Shape(np.eye(3, dtype=dtype)[:, :, None], np.ones((3, 1), dtype))
+        shape.scale[axis] = length
+        out, saved = projection_forward(np.array([[0], [0], [1]], dtype), shape, camera, EXACT)
+        back = projection_reverse_footprint(np.zeros((2, 1), dtype), np.ones((3, 1), dtype), np.zeros(1, dtype), saved)
+        seen.append((*out.covariance2d[:, 0], out.determinant[0], back.scale[axis, 0] != 0))
+    assert seen[0][:-1] == seen[1][:-1] and seen[0][-1] and not seen[1][-1]
 
 
 def test_the_footprint_of_what_is_not_visible_is_zero():
