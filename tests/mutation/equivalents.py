@@ -74,6 +74,11 @@ EQUIVALENT: tuple[Group, ...] = (
             "equations.deformation._add_row: `u > far` -> `u >= far` in `u = far if u > far else u`",
             "equations.deformation._reverse_row: `u > far` -> `u >= far` in `u = far if u > far else u`",
             "fitting.adam._adam_row: `abs(m) < tiny` -> `abs(m) <= tiny` in `m = real(0) if abs(m) < tiny else m`",
+            "splatting.records._gather: `conic_epsilon > zero` -> `conic_epsilon >= zero` in `if conic_epsilon > zero`",
+            "splatting.projection._project_reverse: `scale[k, i] * length <= axis_limit` -> `scale[k, i] * length "
+            "< axis_limit` in `s[k] = scale[k, i] if scale[k, i] * length <= axis_limit else axis_limit / length`",
+            "splatting.projection._project: `s[k] * length > axis_limit` -> `s[k] * length >= axis_limit` in `if "
+            "s[k] * length > axis_limit`",
         ),
     ),
     Group(
@@ -169,6 +174,17 @@ EQUIVALENT: tuple[Group, ...] = (
             "equations.laplacian._expand_adjoint: `x` -> `x - 1` in `target[x] *= scale`",
             "equations.laplacian._difference: `0.0` -> `1.0` in `target[x] = d if keep[x] else real(0.0)`",
             "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `gx[i] = gy[i] = gz[i] = zero` (3)",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_rotation[k, 0, i] = d_rotation[k, 1, i] "
+            "= d_rotation[k, 2, i] = zero` (2)",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_rotation[k, 0, i] = d_rotation[k, 1, i] "
+            "= d_rotation[k, 2, i] = zero` (3)",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_jw[0, k] = d_jw[1, k] = zero`",
+            "splatting.projection._project_reverse: `k` -> `k - 1` in `d_jw[0, k] = d_jw[1, k] = zero` (2)",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `gx[i] = gy[i] = gz[i] = zero`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `gx[i] = gy[i] = gz[i] = zero` (2)",
+            "equations.laplacian._reduce_adjoint: `x` -> `x - 1` in `target[x] = real(0.0)`",
+            "splatting.compositing_rows._blend_reverse: `j` -> `j - 1` in `out[j] = zero`",
+            "splatting.harmonics._colour_reverse_block: `i` -> `i - 1` in `out[i] = zero`",
         ),
     ),
     Group(
@@ -245,6 +261,23 @@ EQUIVALENT: tuple[Group, ...] = (
             "- (one - log2_cutoff) * real(1e-06)`",
             "splatting.compositing_rows._spans: `1e-06` -> `5e-07` in `faintest = log2_cutoff - (one - "
             "log2_cutoff) * real(1e-06)`",
+            "splatting.compositing_rows._rows: `record[V] + reach - half` -> `record[V] + reach` in `high = "
+            "min(record[V] + reach - half - real(top), real(TILE_HEIGHT - 1))`",
+            "splatting.compositing_rows._rows: `high >= zero` -> `high > zero` in `return (first, np.int32(high) "
+            "if high >= zero else np.int32(-1))`",
+            "splatting.compositing_rows._rows: `-1` -> `1` in `return (first, np.int32(high) if high >= zero else "
+            "np.int32(-1))`",
+            "splatting.compositing_rows._rows: `1` -> `2` in `return (first, np.int32(high) if high >= zero else "
+            "np.int32(-1))`",
+            "splatting.compositing_rows._spans: `math.sqrt(max(spread * (exponent - faintest), zero)) + margin` "
+            "-> `math.sqrt(max(spread * (exponent - faintest), zero))` in `width = math.sqrt(max(spread * "
+            "(exponent - faintest), zero)) + margin`",
+            "splatting.compositing_rows._spans: `high >= zero` -> `high > zero` in `lines[k + _U64(4 * "
+            "TILE_HEIGHT)] = high if high >= zero else -one`",
+            "splatting.compositing_rows._blend: `1` -> `2` in `for x in range(low, high + 1, LANES)`",
+            "splatting.compositing_rows._blend_reverse: `1` -> `2` in `for x in range(low, high + 1, LANES)`",
+            "splatting.binning._boxes: `1e-05` -> `5e-06` in `ex += (ex + abs(x)) * real(1e-05) + margin`",
+            "splatting.binning._boxes: `1e-05` -> `5e-06` in `ey += (ey + abs(y)) * real(1e-05) + margin`",
         ),
     ),
     Group(
@@ -274,6 +307,12 @@ EQUIVALENT: tuple[Group, ...] = (
             "equations.matern.matern_weights: `(5.0 + (scaled * ratio) ** 2) / (5.0 + scaled ** 2)` -> `(5.0 + "
             "(scaled * ratio) ** 2) * (5.0 + scaled ** 2)` in `density = ((5.0 + (scaled * ratio) ** 2) / (5.0 + "
             "scaled ** 2)) ** 3`",
+            "equations.matern.matern_weights: `5.0 + scaled ** 2` -> `5.0 - scaled ** 2` in `density = ((5.0 + "
+            "(scaled * ratio) ** 2) / (5.0 + scaled ** 2)) ** 3`",
+            "equations.matern.matern_weights: `scaled ** 2` -> `scaled * 2` in `density = ((5.0 + (scaled * "
+            "ratio) ** 2) / (5.0 + scaled ** 2)) ** 3`",
+            "equations.matern.matern_weights: `5.0` -> `2.5` in `density = ((5.0 + (scaled * ratio) ** 2) / (5.0 "
+            "+ scaled ** 2)) ** 3` (2)",
         ),
     ),
     Group(
@@ -299,11 +338,21 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "splatting.binning._tile_starts: `starts.size - 1` -> `-1` in `starts[starts.size - 1] = total`",
             "losses.smoothness._variation: `width - 1` -> `-1` in `steps[width - 1] = image.dtype.type(0)`",
+            "losses.smoothness._squared_steps: `width - 1` -> `-1` in `steps[width - 1] = zero`",
+            "equations.pyramid._expand_row_adjoint: `m - 1` -> `-1` in `out[m - 1] += odd_rest * own[m - 1, 1]`",
         ),
     ),
     Group(
         "A weight of 0 stands before it.",
-        ("equations.deformation._reverse_row: `0` -> `1` in `ratio = real(0) if exponent < cut else ratio`",),
+        (
+            "equations.deformation._reverse_row: `0` -> `1` in `ratio = real(0) if exponent < cut else ratio`",
+            "splatting.harmonics._basis_gradient: `degree > 1` -> `degree >= 1` in `for k in range(gx.size if "
+            "degree > 1 else 0)`",
+            "splatting.harmonics._basis_gradient: `0` -> `1` in `for k in range(gx.size if degree > 1 else 0)`",
+            "splatting.harmonics._basis_gradient: `degree > 2` -> `degree >= 2` in `for k in range(gx.size if "
+            "degree > 2 else 0)`",
+            "splatting.harmonics._basis_gradient: `0` -> `1` in `for k in range(gx.size if degree > 2 else 0)`",
+        ),
     ),
     Group(
         "Without a cutoff its logarithm is not used.",
@@ -332,6 +381,40 @@ EQUIVALENT: tuple[Group, ...] = (
             "equations.deformation._reverse: `i` -> `i - 1` in `total += np.float64(d_m[i])`",
             "equations.deformation._reverse: `c` -> `c - 1` in `row_sums[c, j] = total`",
             "equations.deformation._reverse: `j` -> `j - 1` in `row_sums[c, j] = total`",
+            "splatting.binning._radix_order: `i` -> `i - 1` in `histogram[np.int64(np.uint64(keys[i]) >> "
+            "np.uint64(shift) & mask)] += 1`",
+            "equations.atom_sums._atom_totals: `block` -> `block - 1` in `partial[block, a] = rest`",
+            "equations.laplacian._band_signs: `x` -> `x - 1` in `columns[x] += np.float64(abs(band))`",
+            "equations.laplacian._band_signs: `x` -> `x - 1` in `total += columns[x]`",
+            "equations.laplacian._band_signs: `task` -> `task - 1` in `sums[task] = total`",
+            "losses.smoothness._variation: `i` -> `i - 1` in `steps[i] += abs(other[i] - line[i])`",
+            "losses.smoothness._squared_steps: `i` -> `i - 1` in `steps[i] += squared if use[i] & use_below[i] "
+            "else zero`",
+            "losses.smoothness._variation: `index` -> `index - 1` in `totals[index] = row_total(steps)`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `sum_x += gx[i]`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `sum_y += gy[i]`",
+            "splatting.harmonics._direction_to_position_block: `i` -> `i - 1` in `sum_z += gz[i]`",
+            "losses.similarity._similarity: `i` -> `i - 1` in `dissimilarity[i] = p_loss + p * q_loss if "
+            "tissue[i] else zero`",
+            "losses.similarity._similarity: `index` -> `index - 1` in `totals[index] = row_total(dissimilarity)`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(LANES)` -> `_U64(LANES)` in `sums[k + "
+            "_U64(LANES)] += se`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(2 * LANES)` -> `_U64(2 * LANES)` in `sums[k "
+            "+ _U64(2 * LANES)] += sy`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(3 * LANES)` -> `_U64(3 * LANES)` in `sums[k "
+            "+ _U64(3 * LANES)] += se * e`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(4 * LANES)` -> `_U64(4 * LANES)` in `sums[k "
+            "+ _U64(4 * LANES)] += se * dy`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(5 * LANES)` -> `_U64(5 * LANES)` in `sums[k "
+            "+ _U64(5 * LANES)] += sy * dy`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(6 * LANES)` -> `_U64(6 * LANES)` in `sums[k "
+            "+ _U64(6 * LANES)] += weight * g0`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(7 * LANES)` -> `_U64(7 * LANES)` in `sums[k "
+            "+ _U64(7 * LANES)] += weight * g1`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(8 * LANES)` -> `_U64(8 * LANES)` in `sums[k "
+            "+ _U64(8 * LANES)] += weight * g2`",
+            "splatting.compositing_rows._blend_row_reverse: `k + _U64(9 * LANES)` -> `_U64(9 * LANES)` in `sums[k "
+            "+ _U64(9 * LANES)] += weight * gz`",
         ),
     ),
     Group(
@@ -340,6 +423,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "equations.appearance._tanh_and_slope: `0.5` -> `0.25` in `value = small if size < real(0.5) else large`",
             "equations.matern.matern_weights: `math.sqrt(5.0)` -> `5.0` in `if scaled >= math.sqrt(5.0)`",
             "equations.matern.matern_weights: `5.0` -> `2.5` in `if scaled >= math.sqrt(5.0)`",
+            "equations.appearance._tanh_and_slope: `size < real(0.5)` -> `size <= real(0.5)` in `value = small if "
+            "size < real(0.5) else large`",
         ),
     ),
     Group(
@@ -351,6 +436,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "real(1), real(2 * LARGEST_U), real(1))`",
             "equations.deformation._reverse_row: `exponent < cut` -> `exponent <= cut` in `value = (real(0) if "
             "exponent < cut else value) * d_offset[i]`",
+            "equations.deformation._reverse_row: `exponent < cut` -> `exponent <= cut` in `ratio = real(0) if "
+            "exponent < cut else ratio`",
         ),
     ),
     Group(
@@ -380,6 +467,8 @@ EQUIVALENT: tuple[Group, ...] = (
             "colour.dtype)` in `return ImageLoss(loss, terms, d_colour, np.zeros((0, 0), colour.dtype))`",
             "fitting.objective.photometric_loss: `0` -> `1` in `return ImageLoss(loss, terms, d_colour, "
             "np.zeros((0, 0), colour.dtype))`",
+            "fitting.objective.photometric_loss: `0` -> `1` in `return ImageLoss(loss, terms, d_colour, "
+            "np.zeros((0, 0), colour.dtype))` (2)",
         ),
     ),
     Group(
@@ -418,11 +507,18 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "splatting.binning._boxes: `if not visible[i]` dropped",
             "splatting.binning._boxes: `continue` dropped",
+            "splatting.binning._boxes: `continue` dropped (4)",
         ),
     ),
     Group(
         "A negative index is mirrored by the remainder as well.",
-        ("equations.pyramid._reflect: `abs(i)` -> `i` in `i = abs(i) % period`",),
+        (
+            "equations.pyramid._reflect: `abs(i)` -> `i` in `i = abs(i) % period`",
+            "equations.pyramid._reduce_row_adjoint: `-2` -> `2` in `inside[reflect(-2, w)] += padded[0]`",
+            "equations.pyramid._reduce_row_adjoint: `-1` -> `1` in `inside[reflect(-1, w)] += padded[1]`",
+            "equations.pyramid._reduce_row: `-2` -> `2` in `padded[0] = inside[reflect(-2, w)]`",
+            "equations.pyramid._reduce_row: `-1` -> `1` in `padded[1] = inside[reflect(-1, w)]`",
+        ),
     ),
     Group(
         "A value that is chosen only where the argument is smaller.",
@@ -444,6 +540,52 @@ EQUIVALENT: tuple[Group, ...] = (
         (
             "splatting.harmonics._colour_block: `degree > 0` -> `degree >= 0` in `if degree > 0`",
             "splatting.harmonics._colour_reverse_block: `degree > 0` -> `degree >= 0` in `if degree > 0`",
+        ),
+    ),
+    Group(
+        "Basis functions of a band above the degree are formed, and nothing reads them.",
+        (
+            "splatting.harmonics._basis: `degree > 1` -> `degree >= 1` in `for k in range(count if degree > 1 else 0)`",
+            "splatting.harmonics._basis: `0` -> `1` in `for k in range(count if degree > 1 else 0)`",
+            "splatting.harmonics._basis: `degree > 2` -> `degree >= 2` in `for k in range(count if degree > 2 else 0)`",
+            "splatting.harmonics._basis: `0` -> `1` in `for k in range(count if degree > 2 else 0)`",
+        ),
+    ),
+    Group(
+        "There are three rows or none.",
+        ("splatting.projection._project_reverse: `0` -> `1` in `if d_poses.shape[1] > 0`",),
+    ),
+    Group(
+        "What is left out only saves time: finished pixels take nothing, and of a band above the degree the basis "
+        "functions are 0.",
+        (
+            "splatting.compositing_rows._blend: `if _finished_kernel(buffer)` dropped",
+            "splatting.compositing_rows._blend_reverse: `continue` dropped",
+            "splatting.harmonics._colour_reverse_block: `if k >= bands` dropped",
+            "splatting.harmonics._colour_reverse_block: `k >= bands` -> `k > bands` in `if k >= bands`",
+        ),
+    ),
+    Group(
+        "The same neighbours, or the same pairs of axes.",
+        (
+            "losses.smoothness._squared_steps_reverse: `2` -> `3` in `for neighbour in range(y - 1, y + 2, 2)`",
+            "splatting.projection._project: `k + 1` -> `k - 1` in `n = (k + 1) % 3`",
+            "splatting.projection._project: `1` -> `2` in `n = (k + 1) % 3`",
+        ),
+    ),
+    Group(
+        "Far beyond the picture either way.",
+        (
+            "splatting.binning._boxes: `right + tile` -> `right` in `limit_x, limit_y = (right + tile, bottom + tile)`",
+            "splatting.binning._boxes: `bottom + tile` -> `bottom` in `limit_x, limit_y = (right + tile, bottom + "
+            "tile)`",
+        ),
+    ),
+    Group(
+        "Infinite with either sign.",
+        (
+            "splatting.projection._project: `det + z` -> `det - z` in `if not (abs(mean_x) <= axis_limit and "
+            "abs(mean_y) <= axis_limit and math.isfinite(det + z))`",
         ),
     ),
 )
