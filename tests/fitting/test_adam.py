@@ -215,6 +215,11 @@ def test_fused_step_refuses_arrays_that_disagree(rng):
     rates = dict.fromkeys(NAMES, 1e-3)
     with pytest.raises(ValueError, match="d_offsets"):
         deformation_adam_step(out[:, :3].copy(), saved, state, rates, *BETAS)
-    broken = AdamState({**state.first, "fdm_width": np.zeros((10, 2, 4))}, state.second, state.step)
-    with pytest.raises(ValueError, match="first fdm_width: expected C-contiguous"):
-        deformation_adam_step(out, saved, broken, rates, *BETAS)
+    short = np.zeros((10, 2, 4))
+    for kind, curves, broken in (
+        ("", saved._replace(width=short), state),
+        ("first ", saved, AdamState({**state.first, "fdm_width": short}, state.second, state.step)),
+        ("second ", saved, AdamState(state.first, {**state.second, "fdm_width": short}, state.step)),
+    ):
+        with pytest.raises(ValueError, match=f"^{kind}fdm_width: expected C-contiguous"):
+            deformation_adam_step(out, curves, broken, rates, *BETAS)
