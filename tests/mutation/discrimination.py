@@ -102,6 +102,8 @@ class Plugin:
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """In place of pytest's own loop."""
+        if session.testsfailed:
+            raise session.Interrupted(f"{session.testsfailed} files of tests could not be read: nothing is examined")
         functions = kernels() | planted()
         wanted = [k for k in kernels() if not self.options.only or k.startswith(tuple(self.options.only))]
         chosen = [d for d in defect_mutants(functions) if not self.options.only or d.kernel in wanted]

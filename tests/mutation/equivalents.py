@@ -139,6 +139,7 @@ EQUIVALENT: tuple[Group, ...] = (
             "splatting.compositing_rows._blend_reverse: `5` -> `6` in `lines = np.empty(5 * TILE_HEIGHT, "
             "records.dtype)`",
             "splatting.compositing._composite_reverse: `5` -> `6` in `kept = np.empty((length, 5), records.dtype)`",
+            "splatting.binning.tile_lists: `4` -> `5` in `tile_box = np.empty((n, 4), np.int32)`",
         ),
     ),
     Group(
