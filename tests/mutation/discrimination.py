@@ -72,7 +72,7 @@ def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
                     break
         if not any(killed.values()) and mutant.name not in reasons():
             spent = 0.0
-            for suite, check in later:
+            for suite, check in sorted(later, key=lambda entry: entry[1].seconds):  # as many as there is time for
                 spent += check.seconds
                 if spent > LATER:
                     break
