@@ -589,6 +589,21 @@ EQUIVALENT: tuple[Group, ...] = (
             "abs(mean_y) <= axis_limit and math.isfinite(det + z))`",
         ),
     ),
+    Group(
+        "The cell holds 0 from the start.",
+        (
+            "splatting.binning._boxes: `i` -> `i - 1` in `box[i, 0], box[i, 1], box[i, 2], box[i, 3] = (0, width "
+            "- 1, 0, height - 1)`",
+            "splatting.binning._boxes: `i` -> `i - 1` in `box[i, 0], box[i, 1], box[i, 2], box[i, 3] = (0, width "
+            "- 1, 0, height - 1)` (3)",
+            "splatting.binning._boxes: `0` -> `1` in `box[i, 0], box[i, 1], box[i, 2], box[i, 3] = (0, width - 1, "
+            "0, height - 1)`",
+        ),
+    ),
+    Group(
+        "Both lengths of the array are 0, or neither is.",
+        ("splatting.compositing_rows._read_tile: `0` -> `1` in `if d_opacity.shape[0] > 0`",),
+    ),
 )
 
 
