@@ -21,9 +21,10 @@ from made_up_scenes import (
     turned_camera,
 )
 
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_rows, compositing_tiles
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.splatting.compositing_tiles import TILE_HEIGHT, TILE_WIDTH
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.harmonics import harmonics_forward
@@ -262,7 +263,7 @@ def test_hard_C8_lossless_box_fast_path(name, dtype):
         if not tight:
             records[:, HALF_HEIGHT] = 1e6
         lists = tile_lists(
-            box, order, compositing_rows.TILE_WIDTH, compositing_rows.TILE_HEIGHT, camera.width, camera.height
+            box, order, TILE_WIDTH, TILE_HEIGHT, camera.width, camera.height
         )
         out, _ = compositing_rows.composite_rows_forward(
             records, lists, PAPER, BACKGROUND.astype(dtype), camera.width, camera.height
@@ -298,7 +299,7 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
     """Where the centre is far off, rounding of the edge is many times a pixel's margin, unless that grows with it."""
     rng, f32 = np.random.default_rng(int(distance)), np.float32
     log2_cutoff, (left, top) = f32(np.log2(1 / 255)), (320, 160)
-    lines, passing = np.empty(5 * compositing_rows.TILE_HEIGHT, f32), 0
+    lines, passing = np.empty(5 * TILE_HEIGHT, f32), 0
     for _ in range(400):
         angle = rng.choice([0, np.pi / 2, np.pi, -np.pi / 2]) + rng.normal(0, 1e-6)  # edges along rows and columns
         aim = np.array([left + 16, top + 8]) + rng.uniform(-8, 8, 2)
@@ -319,12 +320,14 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
             assert np.ceil(max(low, 0)) - first in (0, 1) or low > 15
             assert last - np.floor(min(high, 15)) in (0, 1) or high < 0
         a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
-        for y in range(compositing_rows.TILE_HEIGHT):
-            _, row2, shift, low, high = compositing_rows._line_kernel(lines, y)
-            x = np.arange(compositing_rows.TILE_WIDTH)
-            e = (f32(left) + x.astype(f32) + f32(0.5)) - record[U] - f32(shift)
+        for y in range(TILE_HEIGHT):
+            dy, row2, e, low, high = compositing_rows._line_kernel(lines, y)
+            shift, chunk, lane = record[SLOPE] * dy, *np.divmod(np.arange(TILE_WIDTH) - low, 16)
+            e = (f32(e) + (16 * chunk).astype(f32)) + lane.astype(f32)
             reached = np.flatnonzero(f32(row2) - a2 * e * e >= log2_cutoff)
             passing += reached.size
+            if distance <= 100:
+                np.testing.assert_allclose(e, left + np.arange(TILE_WIDTH) + 0.5 - record[U] - shift, atol=1e-4)
             if distance <= 100 and first <= y <= last and row2 > log2_cutoff:
                 middle, half = record[U] + shift - 0.5 - left, np.sqrt((row2 - log2_cutoff) / a2)
                 assert low >= min(max(np.floor(middle - half) - 1, 0), 32)
@@ -340,7 +343,7 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
 def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side, cutoff):
     """Round footprints whose edge goes through the centre of a pixel of their own row, and of their own column."""
     rng, f32 = np.random.default_rng(7), np.float32
-    log2_cutoff, lines = f32(np.log2(cutoff)), np.empty(5 * compositing_rows.TILE_HEIGHT, f32)
+    log2_cutoff, lines = f32(np.log2(cutoff)), np.empty(5 * TILE_HEIGHT, f32)
     reached = 0
     for _ in range(300):
         distance, log_alpha = 10 ** rng.uniform(-0.3, 6), f32(np.log(cutoff) + rng.uniform(0.01, 4))
@@ -391,7 +394,7 @@ def test_a_pair_exactly_at_the_cutoff_the_stop_or_the_clamp_counts_in_both_passe
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("height", [16, 1])
 def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(height, dtype):
-    """Records are fetched a batch at a time, each batch in its turn; small splats, so that the loops are short."""
+    """Every batch is blended, and every record is asked for in its turn; small splats, so that the loops are short."""
     count = 2 * compositing_rows.BATCH + 5
     places = np.random.default_rng(20).uniform(0, [[16], [height]], (2, count))
     camera = plain_camera(16, height)
@@ -402,13 +405,14 @@ def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(height, dtype
 
 
 def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
-    rng, height, width = np.random.default_rng(0), compositing_rows.TILE_HEIGHT, compositing_rows.TILE_WIDTH
-    pitch, plane = compositing_rows.PITCH, compositing_rows.PLANE
+    rng, height, width = np.random.default_rng(0), TILE_HEIGHT, TILE_WIDTH
+    pitch, plane = compositing_tiles.PITCH, compositing_tiles.PLANE
     colour, d_colour = rng.normal(size=(2, 3, 3 * height, 3 * width))
     depth, d_depth, transmittance, d_opacity = rng.normal(size=(4, 3 * height, 3 * width))
-    buffer = np.zeros(6 * plane)
+    buffer = np.full(6 * plane, 7.0)
+    compositing_tiles.clear(buffer, height, width)
     images = (colour, depth, transmittance, d_colour, d_depth, d_opacity)
-    compositing_rows._read_tile_kernel(buffer, height, width, *images)
+    compositing_tiles.read_tile(buffer, height, width, *images)
     total = (d_colour * colour).sum(axis=0) + d_depth * depth - d_opacity * transmittance
     for k, image in enumerate((np.ones_like(depth), total, *d_colour, d_depth)):
         cells = np.zeros((height, pitch))

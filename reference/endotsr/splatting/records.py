@@ -15,6 +15,7 @@ from endotsr.sharing import share
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.projection import Projected
+from endotsr.vectors import prefetch
 
 FloatArray = NDArray[np.floating]
 
@@ -25,6 +26,8 @@ RECORD = 12
 # columns of a gradient record: sums over pixels, s = dL/d(exponent), e = dx - m dy, w = alpha T
 SUM_S, SUM_SE, SUM_SY, SUM_SEE, SUM_SEY, SUM_SYY, SUM_RED, SUM_GREEN, SUM_BLUE, SUM_DEPTH = range(10)
 GRADIENT = 10
+
+AHEAD = 16  # pairs between asking for a gradient record and adding it
 
 
 def _log_sigmoid(first, stop, logit, out):
@@ -96,6 +99,8 @@ def _gather(
         for j in range(GRADIENT):
             total[j] = zero
         for p in range(pair_starts[k], pair_starts[k + 1]):
+            if p + AHEAD < slots.size:  # tile order is random order here, and each row would be waited for
+                prefetch(pair_gradients, slots[p + AHEAD])
             row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
                 total[j] += row[j]
