@@ -30,7 +30,8 @@ _KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simula
 def kernel_source_hash() -> str:
     """First 16 hex digits of the SHA-256 over every source file that may define or inline a kernel."""
     root = Path(__file__).parent
-    files = [Path(__file__), root / "vectors.py", *(f for room in _KERNEL_ROOMS for f in sorted((root / room).glob("*.py")))]
+    files = [root / "jit.py", root / "vectors.py"]
+    files += [f for room in _KERNEL_ROOMS for f in sorted((root / room).glob("*.py"))]
     digest = hashlib.sha256(numba.__version__.encode())
     for file in files:
         digest.update(file.name.encode())

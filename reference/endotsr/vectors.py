@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 REGISTER = 64  # bytes of a vector register of AVX-512; narrower machines take two or four
 _INT32 = ir.IntType(32)
+_instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
 
 
 def lanes(like: NDArray[np.floating]) -> int:
@@ -56,19 +57,19 @@ def _lanes_of(like: Any) -> int:
     return REGISTER // (like.dtype.bitwidth // 8)
 
 
-def _make_local(context: Any, builder: Any, kind: types.Array, size: int) -> Any:
+def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:
     """A place on the stack, as a one-dimensional array without an owner."""
     number = context.get_data_type(kind.dtype)
     place = cgutils.alloca_once(builder, ir.ArrayType(number, size))
     place.align = REGISTER
-    array = make_array(kind)(context, builder)  # type: ignore[abstract]
+    array = make_array(kind)(context, builder)
     shape, stride = context.get_constant(types.intp, size), context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     data = builder.bitcast(place, number.as_pointer())
     populate_array(array, data=data, shape=[shape], strides=[stride], itemsize=stride, meminfo=None)
     return array._getvalue()
 
 
-@intrinsic(prefer_literal=True)
+@_instructions(prefer_literal=True)
 def _local_array(typing: Any, size: Any, like: Any) -> Any:
     if not isinstance(size, types.IntegerLiteral):
         return None
@@ -76,7 +77,7 @@ def _local_array(typing: Any, size: Any, like: Any) -> Any:
     return kind(size, like), lambda context, builder, signature, arguments: _make_local(context, builder, kind, count)
 
 
-@intrinsic
+@_instructions
 def _vector(typing: Any, like: Any) -> Any:
     kind = types.Array(like.dtype, 1, "C")
     return kind(like), lambda context, builder, signature, arguments: _make_local(
@@ -84,13 +85,13 @@ def _vector(typing: Any, like: Any) -> Any:
     )
 
 
-@intrinsic
+@_instructions
 def _fold(typing: Any, values: Any) -> Any:
     """Loads the vector once; halves are shuffles of the register."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         number, count = context.get_data_type(values.dtype), _lanes_of(values)
-        array = make_array(values)(context, builder, arguments[0])  # type: ignore[abstract]
+        array = make_array(values)(context, builder, arguments[0])
         place = builder.bitcast(array.data, ir.VectorType(number, count).as_pointer())
         folded = builder.load(place, align=values.dtype.bitwidth // 8)
         while count > 1:
@@ -103,12 +104,12 @@ def _fold(typing: Any, values: Any) -> Any:
     return values.dtype(values), generate
 
 
-@intrinsic
+@_instructions
 def _prefetch(typing: Any, table: Any, row: Any) -> Any:
     """First and last number of the row: it may lie in two cache lines."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = make_array(table)(context, builder, arguments[0])  # type: ignore[abstract]
+        array = make_array(table)(context, builder, arguments[0])
         stride = cgutils.unpack_tuple(builder, array.strides, table.ndim)[0]
         byte = ir.IntType(8).as_pointer()
         start = builder.gep(builder.bitcast(array.data, byte), [builder.mul(arguments[1], stride)])

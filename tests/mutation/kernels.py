@@ -11,11 +11,11 @@ ROOMS = {
     ),
     "splatting": (
         "camera", "covariance", "projection", "harmonics", "exponential", "records", "binning", "compositing",
-        "compositing_rows", "render",
+        "compositing_rows", "compositing_tiles", "render",
     ),
     "losses": ("rows", "photometric", "similarity", "depth", "smoothness"),
     "scene": ("density_control",),
-    "fitting": ("adam", "deformation_step", "model", "objective", "schedules"),
+    "fitting": ("adam", "coefficients_step", "deformation_step", "model", "objective", "schedules"),
 }  # fmt: skip
 # functions in which only a named defect is planted
 MORE = ("fitting.trainer.workshop",)

@@ -262,9 +262,7 @@ def test_hard_C8_lossless_box_fast_path(name, dtype):
         records = pack_records(order, projected, log_alpha, rgb, np.log(PAPER.alpha_cutoff))
         if not tight:
             records[:, HALF_HEIGHT] = 1e6
-        lists = tile_lists(
-            box, order, TILE_WIDTH, TILE_HEIGHT, camera.width, camera.height
-        )
+        lists = tile_lists(box, order, TILE_WIDTH, TILE_HEIGHT, camera.width, camera.height)
         out, _ = compositing_rows.composite_rows_forward(
             records, lists, PAPER, BACKGROUND.astype(dtype), camera.width, camera.height
         )
@@ -330,8 +328,8 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
                 np.testing.assert_allclose(e, left + np.arange(TILE_WIDTH) + 0.5 - record[U] - shift, atol=1e-4)
             if distance <= 100 and first <= y <= last and row2 > log2_cutoff:
                 middle, half = record[U] + shift - 0.5 - left, np.sqrt((row2 - log2_cutoff) / a2)
-                assert low >= min(max(np.floor(middle - half) - 1, 0), 32)
-                assert high <= max(min(np.floor(middle + half) + 1, 31), -1)
+                assert low >= min(max(np.floor(middle - half) - 1, 0), TILE_WIDTH)
+                assert high <= max(min(np.floor(middle + half) + 1, TILE_WIDTH - 1), -1)
             if reached.size:
                 assert first <= y <= last
                 assert low <= reached[0] and reached[-1] <= high

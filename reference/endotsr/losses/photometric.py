@@ -50,11 +50,12 @@ def masked_l1_forward(rendered: FloatArray, observed: FloatArray, mask: BoolArra
 
 def masked_l1_reverse(d_loss: float, saved: MaskedL1Saved) -> FloatArray:
     """d_rendered (C, H, W): d_loss x sign(rendered - observed) / count on tissue, 0 elsewhere and at equality."""
-    d_rendered = np.zeros_like(saved.rendered)
-    if saved.count > 0:
-        step = saved.rendered.dtype.type(float(d_loss) / saved.count)
-        rows = d_rendered.shape[0] * d_rendered.shape[1]
-        share(_sign_kernel, rows, saved.rendered, saved.observed, saved.mask, step, d_rendered)
+    if saved.count == 0:
+        return np.zeros_like(saved.rendered)
+    d_rendered = np.empty_like(saved.rendered)
+    step = saved.rendered.dtype.type(float(d_loss) / saved.count)
+    rows = d_rendered.shape[0] * d_rendered.shape[1]
+    share(_sign_kernel, rows, saved.rendered, saved.observed, saved.mask, step, d_rendered)
     return d_rendered
 
 

@@ -94,12 +94,12 @@ def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float
 def masked_ssim_reverse(d_ssim: float, saved: SsimSaved) -> FloatArray:
     """d_rendered (C, H, W) for the derivative d_ssim of a loss by the mean SSIM; 0 outside the mask."""
     target = saved.target
-    d_rendered = np.zeros(target.image.shape, saved.difference.dtype)
-    if target.count > 0:
-        scale = d_rendered.dtype.type(float(d_ssim) / target.count)
-        weights = window(d_rendered.dtype)
-        rows = target.image.shape[0] * target.image.shape[1]
-        share(_similarity_reverse_kernel, rows, *saved[:3], target.mask, weights, scale, d_rendered)
+    if target.count == 0:
+        return np.zeros(target.image.shape, saved.difference.dtype)
+    d_rendered = np.empty(target.image.shape, saved.difference.dtype)
+    scale = d_rendered.dtype.type(float(d_ssim) / target.count)
+    rows = target.image.shape[0] * target.image.shape[1]
+    share(_similarity_reverse_kernel, rows, *saved[:3], target.mask, window(d_rendered.dtype), scale, d_rendered)
     return d_rendered
 
 

@@ -73,7 +73,8 @@ def smoothness_forward(
 def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads:
     """Derivatives by the rendered depth (both terms) and the rendered image (TV only)."""
     depth, rendered, factor = saved.rendered_depth, saved.rendered, saved.total_variation_factor
-    d_depth, d_rendered = np.zeros_like(depth), np.zeros_like(rendered)
+    new = np.empty_like if factor != 0 else np.zeros_like  # total variation writes every pixel
+    d_depth, d_rendered = new(depth), new(rendered)
     if factor != 0:
         d_variation = float(d_loss) * factor
         for image, d_image in ((depth[None], d_depth[None]), (rendered, d_rendered)):

@@ -316,7 +316,7 @@ _blend_reverse_kernel = jit(_blend_reverse, contract=True)
 def composite_rows_forward(
     records: FloatArray, lists: TileLists, settings: RasterSettings, background: FloatArray, width: int, height: int
 ) -> tuple[Composite, RowsSaved]:
-    """As `composite_forward`, on tiles of 32x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
+    """As `composite_forward`, on tiles of 64x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
 
     Edges: within one rounding of the cutoff or the stop the two paths may decide differently; the jump is then
            at most T alpha |c - behind|, see tests/splatting.

@@ -9,7 +9,7 @@ import numpy as np
 
 from endotsr.jit import jit, jit_inline
 
-TILE_WIDTH = 32
+TILE_WIDTH = 64
 TILE_HEIGHT = 16
 PADDING = 16  # pixels; the longest vector
 PITCH = TILE_WIDTH + PADDING
@@ -57,7 +57,7 @@ def _write_rows(buffer, top, left, bottom, columns, background, colour, depth, o
             transmittance[row, column] = t
             opacity[row, column] = one - t
             depth[row, column] = buffer[j + _U64(4 * PLANE)]
-        for x in range(columns):  # a loop of its own: with more images at once the compiler would not make it vector code
+        for x in range(columns):  # a loop of its own: more images at once would not become vector code
             j, column = at + _U64(x), _U64(left + x)
             t = abs(buffer[j])
             colour[0, row, column] = buffer[j + _U64(PLANE)] + t * red

@@ -17,9 +17,11 @@ from endotsr.sharing import share
 from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.covariance import Shape
 from endotsr.splatting.settings import RasterSettings
+from endotsr.vectors import local_array
 
 FloatArray = NDArray[np.floating]
 
+AXES = 3
 BLOCK = 256  # Gaussians whose pose gradients are added up together
 # px. A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
 # A centre farther out is not drawn.
@@ -92,7 +94,7 @@ def _project(
     limit_x, limit_y, axis_limit = constants[6], constants[7], constants[9]
     real = position.dtype.type
     one, zero = real(1), real(0)
-    t0, t1, s = np.empty(3, position.dtype), np.empty(3, position.dtype), np.empty(3, position.dtype)
+    t0, t1, s = local_array(AXES, position), local_array(AXES, position), local_array(AXES, position)
     for i in range(np.uintp(first), np.uintp(stop)):  # unsigned: no index may count from the end
         px, py, pz = position[0, i], position[1, i], position[2, i]
         x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
@@ -156,9 +158,10 @@ def _project_reverse(
     limit_x, limit_y, clamp_factor, axis_limit = constants[6], constants[7], constants[8], constants[9]
     real = position.dtype.type
     one, two, zero = real(1), real(2), real(0)
-    jw, d_jw = np.empty((2, 3), position.dtype), np.empty((2, 3), position.dtype)
-    t0, t1, s = np.empty(3, position.dtype), np.empty(3, position.dtype), np.empty(3, position.dtype)
-    small = np.empty(3, position.dtype)
+    jw0, jw1 = local_array(AXES, position), local_array(AXES, position)  # rows of J W
+    d_jw0, d_jw1 = local_array(AXES, position), local_array(AXES, position)
+    t0, t1, s = local_array(AXES, position), local_array(AXES, position), local_array(AXES, position)
+    small = local_array(AXES, position)
     for i in range(np.uintp(first * BLOCK), np.uintp(min(position.shape[1], last * BLOCK))):
         for k in range(3):
             d_position[k, i] = d_scale[k, i] = zero
@@ -175,13 +178,13 @@ def _project_reverse(
         j00, j02 = fx * inverse_z, -fx * slope_x * inverse_z
         j11, j12 = fy * inverse_z, -fy * slope_y * inverse_z
         for k in range(3):
-            jw[0, k] = j00 * pose[0, k] + j02 * pose[2, k]
-            jw[1, k] = j11 * pose[1, k] + j12 * pose[2, k]
-            d_jw[0, k] = d_jw[1, k] = zero
+            jw0[k] = j00 * pose[0, k] + j02 * pose[2, k]
+            jw1[k] = j11 * pose[1, k] + j12 * pose[2, k]
+            d_jw0[k] = d_jw1[k] = zero
         b, c = zero, low_pass
         for k in range(3):
-            t0[k] = jw[0, 0] * rotation[0, k, i] + jw[0, 1] * rotation[1, k, i] + jw[0, 2] * rotation[2, k, i]
-            t1[k] = jw[1, 0] * rotation[0, k, i] + jw[1, 1] * rotation[1, k, i] + jw[1, 2] * rotation[2, k, i]
+            t0[k] = jw0[0] * rotation[0, k, i] + jw0[1] * rotation[1, k, i] + jw0[2] * rotation[2, k, i]
+            t1[k] = jw1[0] * rotation[0, k, i] + jw1[1] * rotation[1, k, i] + jw1[2] * rotation[2, k, i]
             length = abs(t0[k]) + abs(t1[k])
             s[k] = scale[k, i] if scale[k, i] * length <= axis_limit else axis_limit / length
             b += (t0[k] * s[k]) * (t1[k] * s[k])
@@ -203,13 +206,13 @@ def _project_reverse(
             d_t1 = s[k] * s[k] * (g_a * m * e + g_m * (e - m * t1[k]) - g_r * t1[k])
             d_scale[k, i] = s[k] * (two * g_m * t1[k] * e - g_a * e * e - g_r * t1[k] * t1[k])
             for j in range(3):
-                d_rotation[j, k, i] = jw[0, j] * d_t0 + jw[1, j] * d_t1
-                d_jw[0, j] += d_t0 * rotation[j, k, i]
-                d_jw[1, j] += d_t1 * rotation[j, k, i]
-        d_j00 = d_jw[0, 0] * pose[0, 0] + d_jw[0, 1] * pose[0, 1] + d_jw[0, 2] * pose[0, 2]
-        d_j02 = d_jw[0, 0] * pose[2, 0] + d_jw[0, 1] * pose[2, 1] + d_jw[0, 2] * pose[2, 2]
-        d_j11 = d_jw[1, 0] * pose[1, 0] + d_jw[1, 1] * pose[1, 1] + d_jw[1, 2] * pose[1, 2]
-        d_j12 = d_jw[1, 0] * pose[2, 0] + d_jw[1, 1] * pose[2, 1] + d_jw[1, 2] * pose[2, 2]
+                d_rotation[j, k, i] = jw0[j] * d_t0 + jw1[j] * d_t1
+                d_jw0[j] += d_t0 * rotation[j, k, i]
+                d_jw1[j] += d_t1 * rotation[j, k, i]
+        d_j00 = d_jw0[0] * pose[0, 0] + d_jw0[1] * pose[0, 1] + d_jw0[2] * pose[0, 2]
+        d_j02 = d_jw0[0] * pose[2, 0] + d_jw0[1] * pose[2, 1] + d_jw0[2] * pose[2, 2]
+        d_j11 = d_jw1[0] * pose[1, 0] + d_jw1[1] * pose[1, 1] + d_jw1[2] * pose[1, 2]
+        d_j12 = d_jw1[0] * pose[2, 0] + d_jw1[1] * pose[2, 1] + d_jw1[2] * pose[2, 2]
         # J02 = -fx clip(x/z) / z: free, it depends on x and twice on z; clamped, only once on z
         inverse_z2 = inverse_z * inverse_z
         free_x, free_y = abs(raw_x) <= limit_x, abs(raw_y) <= limit_y
@@ -231,9 +234,9 @@ def _project_reverse(
             d_pose = d_poses[i // np.uintp(BLOCK)]
             for k in range(3):
                 p = position[k, i]
-                d_pose[0, k] += j00 * d_jw[0, k] + d_x * p
-                d_pose[1, k] += j11 * d_jw[1, k] + d_y * p
-                d_pose[2, k] += j02 * d_jw[0, k] + j12 * d_jw[1, k] + d_z * p
+                d_pose[0, k] += j00 * d_jw0[k] + d_x * p
+                d_pose[1, k] += j11 * d_jw1[k] + d_y * p
+                d_pose[2, k] += j02 * d_jw0[k] + j12 * d_jw1[k] + d_z * p
             d_pose[0, 3] += d_x
             d_pose[1, 3] += d_y
             d_pose[2, 3] += d_z

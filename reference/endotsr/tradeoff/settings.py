@@ -53,7 +53,7 @@ OMITTED = {
     "culling": "exact in every setting: a Gaussian that reaches no pixel is never visited",
     "reuse of the depth order between frames": "not offered: the order is exact in every frame",
     "T stored or replayed in the reverse pass": "fixed by the path: `definition` keeps T, the fast path replays it",
-    "tile size of the fast path": "32x16 pixels, a constant that its vector code is compiled for; "
+    "tile size of the fast path": "64x16 pixels, a constant that its vector code is compiled for; "
     "the dial turns the tiles of `definition`",
     "fast-math": "not offered: sums keep their order, so that results repeat bit for bit",
 }
