@@ -19,6 +19,7 @@ from endotsr.equations.fourier import AtomStatistics, atom_statistics, dictionar
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
+from endotsr.sharing import together
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
@@ -73,26 +74,49 @@ def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: fl
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
-    position, quaternion, log_scale = gaussians.position, gaussians.quaternion, gaussians.log_scale
-    dtype = position.dtype
-    deformation = motion = appearance = residual = None
-    if gaussians.fdm_weight is not None:
-        assert gaussians.fdm_centre is not None and gaussians.fdm_width is not None
-        offsets, deformation = deformation_forward(
-            gaussians.fdm_weight, gaussians.fdm_centre, gaussians.fdm_width, t, model.basis
-        )
-        position = position + offsets[POSITION_CHANNELS]
-        quaternion = quaternion + offsets[QUATERNION_CHANNELS]
-        log_scale = log_scale + offsets[LOG_SCALE_CHANNELS]
-    if gaussians.motion_coefficients is not None:
-        phi, _ = dictionary_forward(t, spectral.omega)
-        translation, motion = motion_forward(gaussians.motion_coefficients, phi.astype(dtype))
+    ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = together(
+        lambda: _deformed(gaussians, model, t),
+        lambda: _translation(gaussians, spectral, t),
+        lambda: _residual(gaussians, spectral, model, t),
+    )
+    if translation is not None:
         position = position + translation
-    if gaussians.colour_coefficients is not None:
-        phi_bar = normalised_atoms(t, spectral.omega, spectral.statistics)
-        residual, appearance = appearance_forward(gaussians.colour_coefficients, phi_bar.astype(dtype), model.beta)
     scene = Scene(position, quaternion, log_scale, gaussians.opacity_logit, gaussians.harmonics, residual)
     return scene, SceneSaved(deformation, appearance, motion)
+
+
+def _deformed(
+    gaussians: Gaussians, model: ModelConfig, t: float
+) -> tuple[tuple[FloatArray, FloatArray, FloatArray], DeformationSaved | None]:
+    """Position, quaternion and log-scale with the offsets of the FDM, if there is one."""
+    position, quaternion, log_scale = gaussians.position, gaussians.quaternion, gaussians.log_scale
+    weight, centre, width = gaussians.fdm_weight, gaussians.fdm_centre, gaussians.fdm_width
+    if weight is None:
+        return (position, quaternion, log_scale), None
+    assert centre is not None and width is not None
+    offsets, saved = deformation_forward(weight, centre, width, t, model.basis)
+    position = position + offsets[POSITION_CHANNELS]
+    return (position, quaternion + offsets[QUATERNION_CHANNELS], log_scale + offsets[LOG_SCALE_CHANNELS]), saved
+
+
+def _translation(gaussians: Gaussians, spectral: Spectral, t: float) -> tuple[FloatArray | None, MotionSaved | None]:
+    """C phi(t), if there is a spectral motion."""
+    coefficients = gaussians.motion_coefficients
+    if coefficients is None:
+        return None, None
+    phi, _ = dictionary_forward(t, spectral.omega)
+    return motion_forward(coefficients, phi.astype(coefficients.dtype))
+
+
+def _residual(
+    gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float
+) -> tuple[FloatArray | None, AppearanceSaved | None]:
+    """The bounded colour residual, if there is one."""
+    coefficients = gaussians.colour_coefficients
+    if coefficients is None:
+        return None, None
+    phi_bar = normalised_atoms(t, spectral.omega, spectral.statistics)
+    return appearance_forward(coefficients, phi_bar.astype(coefficients.dtype), model.beta)
 
 
 def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool = True) -> SceneGrads:

@@ -13,6 +13,7 @@ from endotsr.fitting.deformation_step import NAMES as FDM_FIELDS
 from endotsr.fitting.deformation_step import deformation_adam_step
 from endotsr.fitting.model import SceneGrads, SceneSaved, Spectral
 from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.sharing import together
 from endotsr.splatting.render import RenderGrads
 
 
@@ -33,21 +34,32 @@ def optimise(
     back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
     rates   learning rate of every array
     """
-    o, rho = config.optimiser, spectral.rho
+    o = config.optimiser
     settings = (o.beta1, o.beta2, o.epsilon)
-    adam_update(adam, arrays(gaussians), back.by_field, rates, *settings)
-    if saved.appearance is not None:
-        assert grads.residual is not None
-        coefficients, atoms, _ = saved.appearance
-        d_argument = argument_gradient(grads.residual, saved.appearance)
-        coefficients_adam_step(d_argument, atoms, None, coefficients, adam, "colour_coefficients", rates, *settings)
-    if saved.motion is not None:
-        coefficients, atoms = saved.motion
-        weight = config.loss.lambda_msp
-        shrink = penalty_factors(weight, rho, gaussians.count, coefficients.dtype) if weight > 0 else None
-        d_sums = grads.position
-        coefficients_adam_step(d_sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
-    if saved.deformation is not None:
-        assert back.offsets is not None
-        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-        deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings)
+
+    def step_deformation() -> None:
+        if saved.deformation is not None:
+            assert back.offsets is not None
+            fdm_rates = {name: rates[name] for name in FDM_FIELDS}
+            deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings)
+
+    def step_appearance() -> None:
+        if saved.appearance is not None:
+            assert grads.residual is not None
+            coefficients, atoms, _ = saved.appearance
+            d_argument = argument_gradient(grads.residual, saved.appearance)
+            coefficients_adam_step(d_argument, atoms, None, coefficients, adam, "colour_coefficients", rates, *settings)
+
+    def step_motion() -> None:
+        if saved.motion is not None:
+            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.position
+            rho, dtype = spectral.rho, coefficients.dtype
+            shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
+            coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
+
+    together(  # arrays of their own; the longest sweep first
+        step_deformation,
+        step_appearance,
+        step_motion,
+        lambda: adam_update(adam, arrays(gaussians), back.by_field, rates, *settings),
+    )

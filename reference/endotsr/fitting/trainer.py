@@ -42,7 +42,9 @@ from endotsr.scene.density_control import (
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals, initialise
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.render import RenderOut, check_finite, render_forward, render_reverse
+from endotsr.sharing import together
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderGrads, RenderOut, check_finite, render_forward, render_reverse
 
 FloatArray = NDArray[np.floating]
 OnIteration = Callable[[dict[str, Any]], None]
@@ -202,10 +204,11 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     timer.mark("losses")
     grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved)
     timer.mark("render reverse")
-    if statistics_active(iteration, config):
-        gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
-    back = scene_reverse(grads, scene_saved, coefficients=False)
-    penalty = _spectral_penalty(state.gaussians, shop)
+    back, penalty, _ = together(
+        lambda: scene_reverse(grads, scene_saved, coefficients=False),
+        lambda: _spectral_penalty(state.gaussians, shop),
+        lambda: _watch_density(state, grads, camera, statistics_active(iteration, config)),
+    )
     timer.mark("scene reverse")
     entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
     dense = densify_now(iteration, config)
@@ -266,6 +269,12 @@ def _spectral_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
     """L_msp; None without component S."""
     coefficients = gaussians.motion_coefficients
     return None if coefficients is None else matern_penalty_forward(coefficients, shop.spectral.rho)[0]
+
+
+def _watch_density(state: TrainingState, grads: RenderGrads, camera: Camera, active: bool) -> None:
+    """The statistics that density control goes by."""
+    if active:
+        gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
 
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:
