@@ -13,22 +13,35 @@ passed to functions inlined into that one (`jit_inline`), not returned, stored, 
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-REGISTER = 64  # bytes of a vector register of AVX-512; narrower machines take two or four
+SHORTEST = 8  # lanes: loops over fewer do not become vector code
 _INT32 = ir.IntType(32)
 _instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
 
 
+def _register_bytes() -> int:
+    """64 with AVX-512; else 32, which sixteen short registers of other machines hold as well."""
+    features = numba.config.CPU_FEATURES  # type: ignore[attr-defined]  # what Numba was told to compile for
+    if features is None:
+        features = get_host_cpu_features().flatten()
+    return 64 if "+avx512f" in features else 32
+
+
+REGISTER = _register_bytes()
+
+
 def lanes(like: NDArray[np.floating]) -> int:
-    """Numbers in one vector: 16 of float32, 8 of float64."""
-    return REGISTER // like.itemsize
+    """Numbers in one vector: 16 of float32 with AVX-512, else 8; 8 of float64."""
+    return max(SHORTEST, REGISTER // like.itemsize)
 
 
 def vector(like: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -54,14 +67,14 @@ def prefetch(table: NDArray[Any], row: int) -> None:
 
 
 def _lanes_of(like: Any) -> int:
-    return REGISTER // (like.dtype.bitwidth // 8)
+    return max(SHORTEST, REGISTER // (like.dtype.bitwidth // 8))
 
 
 def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:
     """A place on the stack, as a one-dimensional array without an owner."""
     number = context.get_data_type(kind.dtype)
     place = cgutils.alloca_once(builder, ir.ArrayType(number, size))
-    place.align = REGISTER
+    place.align = 64
     array = make_array(kind)(context, builder)
     shape, stride = context.get_constant(types.intp, size), context.get_constant(types.intp, kind.dtype.bitwidth // 8)
     data = builder.bitcast(place, number.as_pointer())

@@ -47,6 +47,7 @@ from endotsr.splatting.records import (
 )
 from endotsr.splatting.render import Scene, choose_path
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.vectors import lanes
 
 BACKGROUND = np.array([0.9, 0.1, 0.4])
 PATHS = {
@@ -320,8 +321,9 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
         a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
         for y in range(TILE_HEIGHT):
             dy, row2, e, low, high = compositing_rows._line_kernel(lines, y)
-            shift, chunk, lane = record[SLOPE] * dy, *np.divmod(np.arange(TILE_WIDTH) - low, 16)
-            e = (f32(e) + (16 * chunk).astype(f32)) + lane.astype(f32)
+            shift, count = record[SLOPE] * dy, lanes(lines)
+            chunk, lane = np.divmod(np.arange(TILE_WIDTH) - low, count)
+            e = (f32(e) + (count * chunk).astype(f32)) + lane.astype(f32)
             reached = np.flatnonzero(f32(row2) - a2 * e * e >= log2_cutoff)
             passing += reached.size
             if distance <= 100:

@@ -1,9 +1,9 @@
-"""The fast path of compositing: the same sums as `compositing`, sixteen pixels of a row at a time.
+"""The fast path of compositing: the same sums as `compositing`, a vector of pixels of a row at a time.
 
 Used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Reasons, in order of gain:
 
 * A Gaussian visits only the rows of its ellipse alpha >= cutoff, and in a row only its span, in chunks of one
-  vector (16 pixels in float32, 8 in float64). The span is widened beyond rounding and every lane tests
+  vector (16 or 8 pixels). The span is widened beyond rounding and every lane tests
   alpha >= cutoff itself, so no pixel is missed and none too many is drawn.
 * The lane loop is vector code: a tile lies in flat planes (`compositing_tiles`), and what a loop adds up lies in
   registers of the kernel's own (`vectors`), so that nothing has to be guarded or reloaded.

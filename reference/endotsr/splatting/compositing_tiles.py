@@ -2,7 +2,8 @@
 
 The planes of a tile (T, red, ...) stand in one buffer at constant offsets and are indexed with unsigned integers: no
 alias or wrap-around checks, so the loops over pixels become vector code. Beyond the last column lies padding with
-T = 0, so that a vector may start at any column.
+T = 0, so that a vector may start at any column. A tile is as wide as the first-level cache allows: a Gaussian across
+an edge is visited twice.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from endotsr.jit import jit, jit_inline
 
 TILE_WIDTH = 64
 TILE_HEIGHT = 16
-PADDING = 16  # pixels; the longest vector
+PADDING = 16  # pixels; lanes of the longest vector
 PITCH = TILE_WIDTH + PADDING
 PLANE = PITCH * TILE_HEIGHT + PADDING  # not a multiple of 4 KiB between any two planes: they would share cache sets
 FORWARD_PLANES = 5  # T, red, green, blue, depth
