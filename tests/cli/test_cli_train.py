@@ -117,7 +117,7 @@ def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
     process.send_signal(how)
     said = process.communicate(timeout=120)[1]
     # a process that was through before the signal arrived has nothing to say
-    assert process.returncode in (0, -how if how == signal.SIGKILL else 130)
+    assert process.returncode in (0, -how if how == signal.SIGKILL else 130), said
     if process.returncode == 130:
         assert RunFolder(out).record()["status"] == "interrupted"
         assert "--resume" in said.strip().splitlines()[-1] and "Traceback" not in said
