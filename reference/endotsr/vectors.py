@@ -41,7 +41,11 @@ REGISTER = _register_bytes()
 
 def lanes(like: NDArray[np.floating]) -> int:
     """Numbers in one vector: 16 of float32 with AVX-512, else 8; 8 of float64."""
-    return max(SHORTEST, REGISTER // like.itemsize)
+    return _lanes(like.itemsize)
+
+
+def _lanes(bytes_each: int) -> int:
+    return max(SHORTEST, REGISTER // bytes_each)
 
 
 def vector(like: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -67,7 +71,7 @@ def prefetch(table: NDArray[Any], row: int) -> None:
 
 
 def _lanes_of(like: Any) -> int:
-    return max(SHORTEST, REGISTER // (like.dtype.bitwidth // 8))
+    return _lanes(like.dtype.bitwidth // 8)
 
 
 def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:

@@ -1,5 +1,7 @@
 """What the benchmarks count and fit; no test looks at a time."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,23 @@ def test_nested_stages_are_counted_once(monkeypatch):
         outer()
     found = watch.repeats[0]
     assert (found["projection"], found["binning"], found[clock.REST]) == (2.0 + 8.0, 4.0, 1.0 + 16.0)
+
+
+def test_stages_of_two_threads_share_the_time(monkeypatch):
+    now = iter([0.0, 1.0, 3.0, 7.0, 15.0, 31.0])
+    monkeypatch.setattr(clock.time, "perf_counter", lambda: next(now))
+    watch = clock.StageClock()
+    inner = watch.counted(lambda: None, "binning")
+
+    def wait_for_another_thread():
+        other = threading.Thread(target=inner)
+        other.start()
+        other.join()
+
+    with watch.iteration():
+        watch.counted(wait_for_another_thread, "projection")()
+    found = watch.repeats[0]
+    assert (found["projection"], found["binning"], found[clock.REST]) == (2.0 + 2.0 + 8.0, 2.0, 1.0 + 16.0)
 
 
 def test_representative_iteration_has_everything_but_densification():
