@@ -23,6 +23,9 @@ from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
+from endotsr.jit import jit_inline
+
+GROUP = 64  # items of a loop whose results wait in a local array
 SHORTEST = 8  # lanes: loops over fewer do not become vector code
 _INT32 = ir.IntType(32)
 _instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
@@ -68,6 +71,20 @@ def fold(values: NDArray[np.floating]) -> np.floating:
 
 def prefetch(table: NDArray[Any], row: int) -> None:
     """Ask for a row of a C-ordered table ahead of its use; changes nothing. The row must exist."""
+
+
+def _write_group(results: NDArray[np.floating], start: int, count: int, out: NDArray[np.floating]) -> None:
+    """The columns of `results`, GROUP numbers each, to columns start ... start + count - 1 of the rows of `out`.
+
+    For loops that read and write many arrays: with the results of a group of items in a local array, the loop over
+    the group becomes vector code, as nothing that it reads can change.
+    """
+    for column in range(out.shape[0]):
+        for item in range(count):
+            out[np.uint64(column), np.uint64(start + item)] = results[np.uint64(column * GROUP + item)]
+
+
+write_group = jit_inline(_write_group)
 
 
 def _lanes_of(like: Any) -> int:
