@@ -6,9 +6,21 @@ import pytest
 from numba.core.errors import TypingError
 
 from endotsr.jit import jit, jit_inline
-from endotsr.vectors import fold, lanes, local_array, prefetch, vector
+from endotsr.vectors import (
+    GROUP,
+    bits_at_least,
+    fold,
+    lanes,
+    local_array,
+    lowest_bit,
+    prefetch,
+    vector,
+    write_group,
+)
 
 ROOM = 24
+THREE = 3 * GROUP
+ALL = 64
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
@@ -92,3 +104,58 @@ def test_a_local_array_in_a_loop(dtype):
 def test_the_size_of_a_local_array_must_be_a_constant():
     with pytest.raises(TypingError, match="local_array"):
         jit(_asked_size)(np.zeros(3), 5)
+
+
+def _bits(values, start, bound):
+    """Bits of 24 numbers, and of 64."""
+    return bits_at_least(values, start, ROOM, bound), bits_at_least(values, 0, ALL, bound)
+
+
+@DTYPES
+def test_bits_tell_which_numbers_reach_the_bound(dtype):
+    rng = np.random.default_rng(3)
+    values = rng.choice([-1.0, 0.0, 0.25, 0.5, np.inf, -np.inf, np.nan], 80).astype(dtype)
+    for start, bound in ((0, 0.25), (7, 0.0), (40, 0.3), (5, np.inf), (56, -np.inf)):
+        some, many = jit(_bits)(values, start, dtype(bound))
+        assert [int(some) >> k & 1 for k in range(64)] == [*(values[start : start + ROOM] >= bound), *[False] * 40]
+        assert [int(many) >> k & 1 for k in range(64)] == list(values[:64] >= bound)
+        assert (some, many) == _bits(values, start, dtype(bound))
+
+
+def _numbers_of(bits, out):
+    count = 0
+    while bits != np.uint64(0):
+        out[count] = lowest_bit(bits)
+        bits &= bits - np.uint64(1)
+        count += 1
+    return count
+
+
+@pytest.mark.parametrize("numbers", [[], [0], [63], [0, 63], [1, 2, 31, 32, 33, 62], list(range(64))])
+def test_the_lowest_bit_again_and_again_gives_all_of_them(numbers):
+    bits, out = np.uint64(sum(1 << k for k in numbers)), np.zeros(64, np.int64)
+    assert list(out[: _numbers_of(bits, out)]) == list(out[: jit(_numbers_of)(bits, out)]) == numbers
+
+
+def _sums_of(first, stop, values, out):
+    """Rows of `out`: the number, its square and its cube; group by group."""
+    results = local_array(THREE, values)
+    for start in range(first, stop, GROUP):
+        count = min(GROUP, stop - start)
+        for item in range(count):
+            value = values[start + item]
+            results[item], results[GROUP + item], results[2 * GROUP + item] = value, value**2, value**3
+        write_group(results, start, count, out)
+
+
+@DTYPES
+@pytest.mark.parametrize("first, stop", [(0, 0), (3, 4), (0, GROUP), (5, 5 + 3 * GROUP), (1, 2 * GROUP)])
+def test_the_results_of_groups_come_to_their_columns(first, stop, dtype):
+    values = np.random.default_rng(4).normal(size=4 * GROUP).astype(dtype)
+    wanted = np.full((3, values.size), 7, dtype)
+    for row, power in zip(wanted, (1, 2, 3), strict=True):
+        row[first:stop] = values[first:stop] ** power
+    for function in (_sums_of, jit(_sums_of)):
+        out = np.full((3, values.size), 7, dtype)
+        function(first, stop, values, out)
+        np.testing.assert_allclose(out, wanted, rtol=1e-6)

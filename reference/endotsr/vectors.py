@@ -69,6 +69,16 @@ def fold(values: NDArray[np.floating]) -> np.floating:
     return values[0]
 
 
+def bits_at_least(values: NDArray[np.floating], start: int, count: int, bound: float) -> np.uint64:
+    """Bit k tells whether values[start + k] >= bound, k < count <= 64; in compiled code `count` is a named constant."""
+    return np.uint64(sum(1 << k for k in range(count) if values[start + k] >= bound))
+
+
+def lowest_bit(bits: np.uint64) -> np.uint64:
+    """Number of the lowest bit that is 1; there must be one."""
+    return np.uint64((int(bits) & -int(bits)).bit_length() - 1)
+
+
 def prefetch(table: NDArray[Any], row: int) -> None:
     """Ask for a row of a C-ordered table ahead of its use; changes nothing. The row must exist."""
 
@@ -138,6 +148,36 @@ def _fold(typing: Any, values: Any) -> Any:
     return values.dtype(values), generate
 
 
+@_instructions(prefer_literal=True)
+def _bits_at_least(typing: Any, values: Any, start: Any, count: Any, bound: Any) -> Any:
+    """One comparison of a vector."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    size = count.literal_value
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = make_array(values)(context, builder, arguments[0])
+        first = context.cast(builder, arguments[1], signature.args[1], types.intp)
+        vector_type = ir.VectorType(context.get_data_type(values.dtype), size)
+        place = builder.bitcast(builder.gep(array.data, [first]), vector_type.as_pointer())
+        numbers = builder.load(place, align=values.dtype.bitwidth // 8)
+        limit = context.cast(builder, arguments[3], signature.args[3], values.dtype)
+        limits = builder.insert_element(ir.Constant(vector_type, ir.Undefined), limit, ir.Constant(_INT32, 0))
+        same = ir.Constant(ir.VectorType(_INT32, size), [0] * size)
+        limits = builder.shuffle_vector(limits, ir.Constant(vector_type, ir.Undefined), same)
+        reached = builder.bitcast(builder.fcmp_ordered(">=", numbers, limits), ir.IntType(size))
+        return reached if size == 64 else builder.zext(reached, ir.IntType(64))
+
+    return types.uint64(values, start, count, bound), generate
+
+
+@_instructions
+def _lowest_bit(typing: Any, bits: Any) -> Any:
+    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.cttz(
+        arguments[0], ir.Constant(ir.IntType(1), 1)
+    )
+
+
 @_instructions
 def _prefetch(typing: Any, table: Any, row: Any) -> Any:
     """First and last number of the row: it may lie in two cache lines."""
@@ -179,6 +219,16 @@ def _compile_local_array(size, like):
 @_compiled(fold)
 def _compile_fold(values):
     return lambda values: _fold(values)
+
+
+@_compiled(bits_at_least, prefer_literal=True)
+def _compile_bits_at_least(values, start, count, bound):
+    return lambda values, start, count, bound: _bits_at_least(values, start, count, bound)
+
+
+@_compiled(lowest_bit)
+def _compile_lowest_bit(bits):
+    return lambda bits: _lowest_bit(bits)
 
 
 @_compiled(prefetch)

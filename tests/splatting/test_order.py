@@ -202,7 +202,7 @@ def test_a_pixel_on_the_very_edge_of_a_footprint_is_in_its_box(axis, side):
     variance = (e.astype(float) ** 2 / (2 * (log_alpha - log_cutoff))).astype(f32)
     projected = Projected(mean, np.stack([variance, 0 * one, variance]), variance * variance, one, one > 0)
     box, seen = screen_boxes(projected, log_alpha, settings, 100, 100)
-    records = pack_records(np.arange(n, dtype=np.int32), projected, log_alpha, np.zeros((3, n), f32), log_cutoff)
+    records = pack_records(np.arange(n, dtype=np.int32), projected, log_alpha, np.zeros((3, n), f32))
     steepness = f32(0.5 * LOG2_E) * records[:, (PRECISION, INVERSE_C)[axis]]
     reached = records[:, LOG2_OPACITY] - steepness * e * e >= f32(np.log2(settings.alpha_cutoff))
     assert reached.sum() > 1000

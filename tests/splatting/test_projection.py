@@ -337,7 +337,7 @@ def test_hard_C2_mahalanobis_form_never_negative_and_accurate_along_needles(dtyp
     position, shape = needles(12, count, dtype, -2.0, 3.5)
     out, _ = projection_forward(position, shape, CAMERA, EXACT)
     records = pack_records(
-        np.arange(count, dtype=np.int32), out, log_opacity(np.zeros(count, dtype)), np.zeros((3, count), dtype), 0.0
+        np.arange(count, dtype=np.int32), out, log_opacity(np.zeros(count, dtype)), np.zeros((3, count), dtype)
     )
     rng = np.random.default_rng(13)
     for i in range(count):

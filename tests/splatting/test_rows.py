@@ -31,11 +31,11 @@ from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
 from endotsr.splatting.records import (
     DEPTH,
-    HALF_HEIGHT,
     INVERSE_C,
     LOG2_OPACITY,
     OPACITY,
     PRECISION,
+    RECORD,
     RED,
     SLOPE,
     SUM_RED,
@@ -245,7 +245,7 @@ def test_auto_takes_the_fast_path_exactly_where_it_computes_the_settings():
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("name", ["random_65x47", "needles", "huge", "on_borders"])
 def test_hard_C8_lossless_box_fast_path(name, dtype):
-    """Boxes of the whole image and rows of the whole tile in place of the tight ones: the same image, bit by bit."""
+    """Boxes of the whole image in place of the tight ones: the same image, bit by bit."""
     scene, camera = SCENES[name]()
     scene = as_dtype(scene, dtype)
     shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
@@ -260,9 +260,7 @@ def test_hard_C8_lossless_box_fast_path(name, dtype):
             visible = projected.visible
             box = np.tile(np.array([0, camera.width - 1, 0, camera.height - 1], np.int32), (visible.size, 1))
         order = depth_order(projected.depth, visible)
-        records = pack_records(order, projected, log_alpha, rgb, np.log(PAPER.alpha_cutoff))
-        if not tight:
-            records[:, HALF_HEIGHT] = 1e6
+        records = pack_records(order, projected, log_alpha, rgb)
         lists = tile_lists(box, order, TILE_WIDTH, TILE_HEIGHT, camera.width, camera.height)
         out, _ = compositing_rows.composite_rows_forward(
             records, lists, PAPER, BACKGROUND.astype(dtype), camera.width, camera.height
@@ -293,6 +291,36 @@ def test_a_picture_of_whole_tiles_has_no_tile_beside_it(width, height):
     assert_close(fast[1], slow[1], 1e-12)
 
 
+def row_of(lines, y):
+    """Of row y of what `_spans` filled: dy, exponent, e, first and last column (-1 where it is not reached)."""
+    dy, exponent, e, low, reach = lines.reshape(5, TILE_HEIGHT)[:, y]
+    return dy, exponent, e, int(low), int(low + reach) if reach >= 0 else -1
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_every_chunk_of_every_row_is_visited_once(dtype):
+    """The words of visits against a loop over rows and over the chunks of each."""
+    rng, count = np.random.default_rng(4), lanes(np.empty(0, dtype))
+    lines = np.empty(5 * TILE_HEIGHT, dtype)
+    for _ in range(50):
+        column = rng.integers(0, TILE_WIDTH + 1, TILE_HEIGHT)
+        rows = lines.reshape(5, TILE_HEIGHT)
+        rows[:3] = rng.normal(size=(3, TILE_HEIGHT))
+        rows[3] = column
+        rows[4] = rng.choice([-1.0, 0.0, count - 0.5, float(count), 1e9], TILE_HEIGHT)
+        rows[4] = np.minimum(rows[4], TILE_WIDTH - 1 - column)
+        found, wanted = [], []
+        for word in range(TILE_WIDTH // (compositing_rows.CHUNKS * count)):
+            visits = int(compositing_rows._visits_kernel(lines, word))
+            bits = [bit for bit in range(64) if visits >> bit & 1]
+            found += [compositing_rows._visit_kernel(lines, word, np.uint64(bit)) for bit in bits]
+        for y in range(TILE_HEIGHT):
+            dy, row2, e, low, high = row_of(lines, y)
+            for x in range(low, high + 1, count):
+                wanted.append((y * compositing_tiles.PITCH + x, e + dtype(x - low), dy, row2))
+        assert sorted(found) == sorted(wanted)
+
+
 @pytest.mark.parametrize("distance", [0.0, 1e2, 1e3, 1e4, 3e4, 1e5, 1e6])
 def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
     """Where the centre is far off, rounding of the edge is many times a pixel's margin, unless that grows with it."""
@@ -306,21 +334,16 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
         log2_opacity = f32(rng.uniform(-4, 0))
         # a round footprint whose edge goes through `aim`, or one of about three pixels around it
         sigma = max(distance, 3.0) / np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
-        record = np.zeros(12, f32)
+        record = np.zeros(RECORD, f32)
         record[SLOPE] = slope = rng.choice([0.0, 0.7, -5.0])  # sheared, the same edge still goes through `aim`
         record[U], record[V] = centre[0] - slope * (aim[1] - centre[1]), centre[1]
         record[PRECISION] = record[INVERSE_C] = sigma**-2
         record[LOG2_OPACITY] = log2_opacity
-        record[HALF_HEIGHT] = sigma * np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
-        first, last = compositing_rows._rows_kernel(record, top)
         compositing_rows._spans_kernel(record, top, left, log2_cutoff, lines)
-        if distance <= 100:  # and no wider than the ellipse and a rounding: more rows would only take time
-            low, high = record[V] - 0.5 - top + np.array([-1, 1]) * record[HALF_HEIGHT]
-            assert np.ceil(max(low, 0)) - first in (0, 1) or low > 15
-            assert last - np.floor(min(high, 15)) in (0, 1) or high < 0
+        half_height = sigma * np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
         a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
         for y in range(TILE_HEIGHT):
-            dy, row2, e, low, high = compositing_rows._line_kernel(lines, y)
+            dy, row2, e, low, high = row_of(lines, y)
             shift, count = record[SLOPE] * dy, lanes(lines)
             chunk, lane = np.divmod(np.arange(TILE_WIDTH) - low, count)
             e = (f32(e) + (count * chunk).astype(f32)) + lane.astype(f32)
@@ -328,12 +351,13 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
             passing += reached.size
             if distance <= 100:
                 np.testing.assert_allclose(e, left + np.arange(TILE_WIDTH) + 0.5 - record[U] - shift, atol=1e-4)
-            if distance <= 100 and first <= y <= last and row2 > log2_cutoff:
+            if distance <= 100 and high >= low:  # no more rows than the ellipse has, but for a rounding
+                assert abs(top + y + 0.5 - record[V]) <= half_height * (1 + 1e-5) + 1e-3
+            if distance <= 100 and row2 > log2_cutoff:
                 middle, half = record[U] + shift - 0.5 - left, np.sqrt((row2 - log2_cutoff) / a2)
                 assert low >= min(max(np.floor(middle - half) - 1, 0), TILE_WIDTH)
                 assert high <= max(min(np.floor(middle + half) + 1, TILE_WIDTH - 1), -1)
             if reached.size:
-                assert first <= y <= last
                 assert low <= reached[0] and reached[-1] <= high
     assert passing > 1000
 
@@ -352,16 +376,15 @@ def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side, cutoff):
         for e, dy in ((f32(column + 0.5) - u, f32(0)), (f32(0), f32(row + 0.5) - v)):
             reach = log_alpha - f32(np.log(cutoff))
             variance = f32((e.astype(float) ** 2 + dy.astype(float) ** 2) / (2 * reach))
-            record = np.zeros(12, f32)
+            record = np.zeros(RECORD, f32)
             record[U], record[V] = (u, f32(row + 0.5)) if e else (f32(column + 0.5), v)
             record[PRECISION] = record[INVERSE_C] = f32(1) / variance
-            record[LOG2_OPACITY], record[HALF_HEIGHT] = log_alpha * f32(LOG2_E), np.sqrt(f32(2) * reach * variance)
-            first, last = compositing_rows._rows_kernel(record, 0)
+            record[LOG2_OPACITY] = log_alpha * f32(LOG2_E)
             compositing_rows._spans_kernel(record, 0, 0, log2_cutoff, lines)
-            _, row2, _, low, high = compositing_rows._line_kernel(lines, row)
+            _, row2, _, low, high = row_of(lines, row)
             if f32(row2) - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
                 reached += 1
-                assert first <= row <= last and low <= column <= high
+                assert low <= column <= high
     assert reached > 200
 
 
@@ -378,8 +401,8 @@ AT_THE_EDGE = {
 def test_a_pair_exactly_at_the_cutoff_the_stop_or_the_clamp_counts_in_both_passes(edge, path, dtype):
     changes, alpha = AT_THE_EDGE[edge]
     settings = PAPER._replace(**changes)
-    record = np.zeros((1, 12), dtype)
-    record[0, [U, V, PRECISION, INVERSE_C, HALF_HEIGHT]] = 3.5, 2.5, 2.0, 2.0, 3.0
+    record = np.zeros((1, RECORD), dtype)
+    record[0, [U, V, PRECISION, INVERSE_C]] = 3.5, 2.5, 2.0, 2.0
     record[0, LOG2_OPACITY], record[0, OPACITY], record[0, RED:DEPTH] = np.log2(alpha), alpha, 0.5
     module, forward, reverse = PATHS[path]
     lists = tile_lists(np.array([[0, 7, 0, 5]], np.int32), np.zeros(1, np.int32), module.TILE_WIDTH, 16, 8, 6)
@@ -420,16 +443,3 @@ def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
         found = buffer[k * plane : (k + 1) * plane]
         np.testing.assert_allclose(found[: cells.size], cells.ravel(), atol=1e-14)
         assert not found[cells.size :].any()
-
-
-def test_the_half_height_is_that_of_the_ellipse():
-    scene, camera = random_65x47()
-    scene.opacity_logit[:20] = -7.0  # fainter than the cutoff: no height
-    shape, _ = covariance_forward(scene.quaternion, scene.log_scale)
-    projected, _ = projection_forward(scene.position, shape, camera, PAPER)
-    log_alpha, order = log_opacity(scene.opacity_logit), np.flatnonzero(projected.visible).astype(np.int32)
-    records = pack_records(order, projected, log_alpha, np.zeros((3, 200)), np.log(PAPER.alpha_cutoff))
-    reach = np.maximum(log_alpha[order] - np.log(PAPER.alpha_cutoff), 0)
-    assert 0 < (reach == 0).sum() < order.size
-    wanted = np.sqrt(2 * reach * projected.covariance2d[2, order])
-    np.testing.assert_allclose(records[:, HALF_HEIGHT], wanted, rtol=1e-12)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from endotsr.config import PAPER, Config
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS
 
-RECORD, GRADIENT = 12, 10  # numbers of a Gaussian that blending reads, and of a pair that it writes
+RECORD, GRADIENT = 11, 10  # numbers of a Gaussian that blending reads, and of a pair that it writes
 RADIX_BITS = 11  # of a digit of the depth sort
 
 # Floating-point operations, counted in the formulas.

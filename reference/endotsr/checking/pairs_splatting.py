@@ -237,8 +237,7 @@ def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
         log_alpha = log_opacity(inputs["opacity_logit"])
         box, visible = screen_boxes(projected, log_alpha, settings, WIDTH, HEIGHT)
         order = depth_order(inputs["depth"], visible)
-        log_cutoff = np.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0
-        records = pack_records(order, projected, log_alpha, inputs["colour"], log_cutoff)
+        records = pack_records(order, projected, log_alpha, inputs["colour"])
         lists = tile_lists(box, order, *tile, WIDTH, HEIGHT)
         composite = composite_rows_forward if rows else composite_forward
         out, saved = composite(records, lists, settings, inputs["background"], WIDTH, HEIGHT)

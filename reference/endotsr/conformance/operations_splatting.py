@@ -4,7 +4,6 @@ A setting that begins with an underscore is not part of a case: `_path` chooses 
 the reference answers, which must not matter.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -101,8 +100,7 @@ def composite_of(inputs: Inputs, settings: Settings):
     log_alpha = log_opacity(inputs["opacity_logit"])
     box, visible = screen_boxes(projected, log_alpha, raster, width, height)
     order = depth_order(inputs["depth"], visible)
-    log_cutoff = math.log(raster.alpha_cutoff) if raster.alpha_cutoff > 0 else 0.0
-    records = pack_records(order, projected, log_alpha, inputs["colour"], log_cutoff)
+    records = pack_records(order, projected, log_alpha, inputs["colour"])
     rows = path_of(settings) == "rows"
     module = compositing_rows if rows else compositing
     lists = tile_lists(box, order, module.TILE_WIDTH, module.TILE_HEIGHT, width, height)

@@ -209,7 +209,7 @@ def composite_forward(
 ) -> tuple[Composite, CompositeSaved]:
     """Blend records into images; 16x16 tiles (specification B5).
 
-    records     (n, 12) from `pack_records`, nearest first
+    records     (n, 11) from `pack_records`, nearest first
     lists       tiles of 16x16 pixels
     background  (3,) colour behind everything
     returns     Composite

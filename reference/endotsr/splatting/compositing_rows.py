@@ -5,6 +5,8 @@ Used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` 
 * A Gaussian visits only the rows of its ellipse alpha >= cutoff, and in a row only its span, in chunks of one
   vector (16 or 8 pixels). The span is widened beyond rounding and every lane tests
   alpha >= cutoff itself, so no pixel is missed and none too many is drawn.
+* The chunks of a tile that a Gaussian visits are the bits of a word: one loop over all of them. A loop over rows with
+  one over the chunks of each would end at an unforeseen place once a row.
 * The lane loop is vector code: a tile lies in flat planes (`compositing_tiles`), and what a loop adds up lies in
   registers of the kernel's own (`vectors`), so that nothing has to be guarded or reloaded.
 * Records are asked for some pairs ahead: depth order is random order in memory, and each would be waited for.
@@ -43,7 +45,6 @@ from endotsr.splatting.records import (
     DEPTH,
     GRADIENT,
     GREEN,
-    HALF_HEIGHT,
     INVERSE_C,
     LOG2_OPACITY,
     PRECISION,
@@ -63,11 +64,12 @@ from endotsr.splatting.records import (
     V,
 )
 from endotsr.splatting.settings import RasterSettings
-from endotsr.vectors import fold, lanes, local_array, prefetch, vector
+from endotsr.vectors import bits_at_least, fold, lanes, local_array, lowest_bit, prefetch, vector
 
 FloatArray = NDArray[np.floating]
 
 LINES = 5 * TILE_HEIGHT  # numbers that `_spans` writes
+CHUNKS = 64 // TILE_HEIGHT  # of each row, in one word of visits
 BATCH = 32  # pairs between two tests whether the whole tile is finished
 AHEAD = 8  # pairs between asking for a record and using it
 
@@ -93,28 +95,17 @@ def supports(settings: RasterSettings) -> bool:
     )
 
 
-def _rows(record, top):
-    """First and last tile row (inclusive) whose samples the ellipse may reach; margin beyond rounding."""
-    real = record.dtype.type
-    half, zero = real(0.5), real(0)
-    reach = record[HALF_HEIGHT]
-    reach += (reach + abs(record[V])) * real(1e-5) + real(1e-3)
-    low = max(record[V] - reach - half - real(top), zero)
-    high = min(record[V] + reach - half - real(top), real(TILE_HEIGHT - 1))
-    first = np.int32(low)  # library calls for ceil and floor would cost more than the rest
-    first += np.int32(real(first) < low)
-    return first, np.int32(high) if high >= zero else np.int32(-1)
-
-
 def _spans(record, top, left, log2_cutoff, lines):
     """Of all rows of a tile at once (vector code): dy, exponent and e of the first pixel, and the columns to visit.
 
-    lines  (LINES,) filled with dy, log2 alpha on the centre line, e = dx - m dy at the first column, first and last
-           tile column (first > last where the row is not reached)
+    lines  (LINES,) filled with dy, log2 alpha on the centre line, e = dx - m dy at the first column, that column, and
+           how many follow it; -1 where the row is not reached
 
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
     beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm. Where a huge
     footprint just reaches a row, the reach is a difference of nearly equal numbers: `faintest` allows for its rounding.
+    A row below the cutoff on its centre line has no pixel above it, rounding included: the rest of the exponent is
+    taken away from that very number.
     """
     real = record.dtype.type
     half, one, zero = real(0.5), real(1), real(0)
@@ -136,19 +127,29 @@ def _spans(record, top, left, log2_cutoff, lines):
         lines[k + _U64(TILE_HEIGHT)] = exponent
         lines[k + _U64(2 * TILE_HEIGHT)] = real(left) + column + half - u - shift
         lines[k + _U64(3 * TILE_HEIGHT)] = column
-        lines[k + _U64(4 * TILE_HEIGHT)] = high if high >= zero else -one
+        lines[k + _U64(4 * TILE_HEIGHT)] = high - column if exponent >= log2_cutoff else -one
 
 
-def _line(lines, y):
-    """Row y of what `_spans` filled: dy, exponent, e, first and last column."""
-    k = _U64(y)
-    dy, exponent, e = lines[k], lines[k + _U64(TILE_HEIGHT)], lines[k + _U64(2 * TILE_HEIGHT)]
-    return dy, exponent, e, np.int32(lines[k + _U64(3 * TILE_HEIGHT)]), np.int32(lines[k + _U64(4 * TILE_HEIGHT)])
+def _visits(lines, word):
+    """Bit TILE_HEIGHT c + y tells whether row y has a chunk CHUNKS word + c."""
+    bits = _U64(0)
+    for c in range(CHUNKS):
+        nearest = lines.dtype.type((CHUNKS * word + c) * lanes(lines))
+        bits |= bits_at_least(lines, 4 * TILE_HEIGHT, TILE_HEIGHT, nearest) << _U64(TILE_HEIGHT * c)
+    return bits
 
 
-_rows_kernel = jit_inline(_rows)
+def _visit(lines, word, bit):
+    """Of a visit: place of its first pixel in a plane, e there, dy, log2 alpha on the centre line."""
+    y, c = bit % _U64(TILE_HEIGHT), bit // _U64(TILE_HEIGHT) + _U64(CHUNKS * word)
+    columns, first_column = c * _U64(lanes(lines)), _U64(np.int32(lines[y + _U64(3 * TILE_HEIGHT)]))
+    e = lines[y + _U64(2 * TILE_HEIGHT)] + lines.dtype.type(np.int32(columns))
+    return y * _U64(PITCH) + first_column + columns, e, lines[y], lines[y + _U64(TILE_HEIGHT)]
+
+
 _spans_kernel = jit_inline(_spans)
-_line_kernel = jit_inline(_line)
+_visits_kernel = jit_inline(_visits)
+_visit_kernel = jit_inline(_visit)
 
 
 def _record(records, ranks, p, end):
@@ -203,16 +204,14 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
             if (p - start) % BATCH == 0 and finished(buffer):
                 break
             record = _record_kernel(records, ranks, p, end)
-            first, last = _rows_kernel(record, top)
             _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for y in range(first, last + np.int32(1)):
-                _, row2, e, low, high = _line_kernel(lines, y)
-                for x in range(low, high + 1, lanes(records)):
-                    _blend_row_kernel(
-                        buffer, _U64(y * PITCH + x), e, a2, row2, record, log2_cutoff, stop, alpha_max
-                    )  # fmt: skip
-                    e += real(lanes(records))
+            for word in range(TILE_WIDTH // (CHUNKS * lanes(records))):
+                visits = _visits_kernel(lines, word)
+                while visits != _U64(0):
+                    place, e, _, row2 = _visit_kernel(lines, word, lowest_bit(visits))
+                    visits &= visits - _U64(1)
+                    _blend_row_kernel(buffer, place, e, a2, row2, record, log2_cutoff, stop, alpha_max)
         write_tile(buffer, top, left, background, colour, depth, opacity, transmittance)
 
 
@@ -294,16 +293,16 @@ def _blend_reverse(
                 for lane in range(lanes(records)):
                     column[_U64(lane)] = zero
             record = _record_kernel(records, ranks, p, end)
-            first, last = _rows_kernel(record, top)
             _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for y in range(first, last + np.int32(1)):
-                dy, row2, e, low, high = _line_kernel(lines, y)
-                for x in range(low, high + 1, lanes(records)):
+            for word in range(TILE_WIDTH // (CHUNKS * lanes(records))):
+                visits = _visits_kernel(lines, word)
+                while visits != _U64(0):
+                    place, e, dy, row2 = _visit_kernel(lines, word, lowest_bit(visits))
+                    visits &= visits - _U64(1)
                     _blend_row_reverse_kernel(
-                        buffer, sums, _U64(y * PITCH + x), e, dy, a2, row2, record, log2_cutoff, stop, alpha_max
+                        buffer, sums, place, e, dy, a2, row2, record, log2_cutoff, stop, alpha_max
                     )  # fmt: skip
-                    e += real(lanes(records))
             for j in range(GRADIENT):
                 pair_gradients[_U64(p), _U64(j)] = fold(sums[j])
 

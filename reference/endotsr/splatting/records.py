@@ -1,7 +1,7 @@
 """What compositing reads and writes for each Gaussian, packed in depth order.
 
 The exponent of a Gaussian on the screen is -q/2 with q = r dy^2 + A (dx - m dy)^2, A = c/det, m = b/c,
-r = 1/c: a sum of squares, so q >= 0 always and a needle keeps its digits (B5). One record of 12 numbers
+r = 1/c: a sum of squares, so q >= 0 always and a needle keeps its digits (B5). One record of 11 numbers
 per Gaussian stands in one or two cache lines; its gradient record has 10.
 """
 
@@ -20,8 +20,8 @@ from endotsr.vectors import prefetch
 FloatArray = NDArray[np.floating]
 
 # columns of a record
-U, V, PRECISION, SLOPE, INVERSE_C, LOG2_OPACITY, RED, GREEN, BLUE, DEPTH, HALF_HEIGHT, OPACITY = range(12)
-RECORD = 12
+U, V, PRECISION, SLOPE, INVERSE_C, LOG2_OPACITY, RED, GREEN, BLUE, DEPTH, OPACITY = range(11)
+RECORD = 11
 
 # columns of a gradient record: sums over pixels, s = dL/d(exponent), e = dx - m dy, w = alpha T
 SUM_S, SUM_SE, SUM_SY, SUM_SEE, SUM_SEY, SUM_SYY, SUM_RED, SUM_GREEN, SUM_BLUE, SUM_DEPTH = range(10)
@@ -49,9 +49,9 @@ def log_opacity(opacity_logit: FloatArray) -> FloatArray:
     return out
 
 
-def _pack(first, stop, order, mean2d, covariance2d, determinant, log_opacity, colour, depth, log_cutoff, out):
+def _pack(first, stop, order, mean2d, covariance2d, determinant, log_opacity, colour, depth, out):
     real = mean2d.dtype.type
-    one, zero, two, log2_e = real(1), real(0), real(2), real(LOG2_E)
+    one, log2_e = real(1), real(LOG2_E)
     for k in range(first, stop):
         i = order[k]
         b, c = covariance2d[1, i], covariance2d[2, i]
@@ -61,7 +61,6 @@ def _pack(first, stop, order, mean2d, covariance2d, determinant, log_opacity, co
         record[LOG2_OPACITY] = log_opacity[i] * log2_e
         record[RED], record[GREEN], record[BLUE] = colour[0, i], colour[1, i], colour[2, i]
         record[DEPTH] = depth[i]
-        record[HALF_HEIGHT] = math.sqrt(max(two * (log_opacity[i] - log_cutoff) * c, zero))
         record[OPACITY] = math.exp(log_opacity[i])
 
 
@@ -73,15 +72,14 @@ def pack_records(
     projected: Projected,
     log_opacity: FloatArray,
     colour: FloatArray,
-    log_cutoff: float,
 ) -> FloatArray:
-    """Records (n, 12) of the Gaussians named by `order`, nearest first; n <= N."""
+    """Records (n, 11) of the Gaussians named by `order`, nearest first; n <= N."""
     dtype = projected.depth.dtype
     out = np.empty((order.size, RECORD), dtype)
     share(
         _pack_kernel, order.size,
         order, projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, colour,
-        projected.depth, dtype.type(log_cutoff), out,
+        projected.depth, out,
     )  # fmt: skip
     return out
 

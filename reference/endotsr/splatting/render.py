@@ -4,7 +4,6 @@ Comes in: deformed raw parameters and a camera. Goes out: colour, depth, opacity
 every parameter and, when asked for, to the background and the camera pose. Knows nothing of time.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
@@ -130,8 +129,7 @@ def render_forward(
     log_alpha = log_opacity(scene.opacity_logit)
     box, visible = screen_boxes(projected, log_alpha, settings, width, height)
     order = depth_order(projected.depth, visible)
-    log_cutoff = math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0
-    records = pack_records(order, projected, log_alpha, colour, log_cutoff)
+    records = pack_records(order, projected, log_alpha, colour)
     if choose_path(settings, path) == "rows":
         lists = tile_lists(box, order, compositing_rows.TILE_WIDTH, compositing_rows.TILE_HEIGHT, width, height)
         out, saved = compositing_rows.composite_rows_forward(records, lists, settings, back, width, height)
