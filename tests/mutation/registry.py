@@ -28,7 +28,7 @@ def _rotation_transposed() -> tuple[tuple[str, str], ...]:
 
 
 D_Z = "inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))"
-PROJECT, PROJECT_REVERSE = "splatting.projection._project", "splatting.projection._project_reverse"
+PROJECT, PROJECT_REVERSE = "splatting.projection_kernels._project", "splatting.projection_kernels._project_reverse"
 COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
 ROWS_REVERSE = "splatting.compositing_rows._blend_row_reverse"
 
