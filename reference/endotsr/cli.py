@@ -4,16 +4,13 @@ Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit c
 comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM).
 """
 
-import contextlib
 import importlib
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator
 
 from endotsr import __version__
 from endotsr.errors import CalibrationError, InputError
+from endotsr.stopping import signals_stop
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
@@ -38,7 +35,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"endotsr {__version__}")
         return 0
     try:
-        with _terminate_as_interrupt():
+        with signals_stop():
             return _command(argv[0])(argv[1:])
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
@@ -63,23 +60,6 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     except MemoryError:
         return _fail("not enough memory; a smaller --scale or fewer --frames needs less")
-
-
-@contextlib.contextmanager
-def _terminate_as_interrupt() -> Iterator[None]:
-    """Inside, SIGTERM (a batch system, a shutdown) does what Ctrl-C does: a run says how to go on."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _command(name: str):

@@ -1,5 +1,6 @@
 """Training from the command line: what a run leaves behind, and how it goes on after it was stopped."""
 
+import ctypes
 import errno
 import json
 import os
@@ -124,6 +125,45 @@ def test_stopped_process_resumes_bitwise_equal(how, finished_run, tmp_path):
     assert main(resume(out)) == 0
     assert_same_run(finished_run, out)
     assert not [p.name for p in out.iterdir() if p.name.startswith(".")]
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("then", ["goes on", "fails"])
+def test_a_signal_that_a_callback_swallows_still_stops_the_run(then, how, tmp_path, capsys, monkeypatch):
+    """Python drops an exception within a callback of compiled code; the run must not go on, nor end as a failure."""
+    out, update, dropped = tmp_path / "run", progress.Progress.update, []
+    monkeypatch.setattr(sys, "unraisablehook", lambda about: dropped.append(about.exc_type))
+    callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(how))
+
+    def interrupt(self, entry):
+        update(self, entry)
+        if entry["iteration"] == 3:
+            callback()
+            if then == "fails":
+                raise RuntimeError("no symbol")
+
+    monkeypatch.setattr(progress.Progress, "update", interrupt)
+    handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    code, said = run_line(capsys, *train_only(out))
+    assert (
+        dropped == [KeyboardInterrupt]
+        and (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
+    )
+    assert code == 130 and "--resume" in said.strip().splitlines()[-1]
+    assert RunFolder(out).record()["status"] == "interrupted"
+    assert len((out / "log.jsonl").read_text().splitlines()) == 3
+    monkeypatch.undo()
+    assert main(resume(out)) == 0  # the signal is forgotten
+
+
+def test_an_error_without_a_signal_is_a_failure(tmp_path, monkeypatch):
+    def fail(self, entry):
+        raise RuntimeError("no symbol")
+
+    monkeypatch.setattr(progress.Progress, "update", fail)
+    with pytest.raises(RuntimeError, match="no symbol"):
+        main(train_only(tmp_path / "run"))
+    assert RunFolder(tmp_path / "run").record()["status"] == "failed"
 
 
 @pytest.mark.parametrize("checkpoint", [1, 3])

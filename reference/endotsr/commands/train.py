@@ -26,6 +26,7 @@ from endotsr.runs import (
     versions,
 )
 from endotsr.simulator.settings import SimulatorSettings
+from endotsr.stopping import stop_asked
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
@@ -200,6 +201,8 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         log.append(entry | {"seconds": round(tick - last_tick, 5)})
         last_tick = tick
         progress.update(entry)
+        if stop_asked():
+            raise KeyboardInterrupt
 
     def on_checkpoint(reached: Any) -> None:
         nonlocal saved
@@ -213,14 +216,13 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         if saved != last.iteration:
             on_checkpoint(last)
         folder.update(status="finished", finished=now(), iterations_done=last.iteration, **_costs(offset, began))
-    except KeyboardInterrupt:
-        _mark(folder, "interrupted")
-        raise KeyboardInterrupt(_way_on(folder, saved)) from None
-    except OSError as error:
+    except (KeyboardInterrupt, Exception) as error:
+        if isinstance(error, KeyboardInterrupt) or stop_asked():
+            _mark(folder, "interrupted")
+            raise KeyboardInterrupt(_way_on(folder, saved)) from None
         _mark(folder, "failed")
-        raise RunStopped(f"{os_error_line(error, folder.path)}; {_way_on(folder, saved)}") from None
-    except FloatingPointError:
-        _mark(folder, "failed")
+        if isinstance(error, OSError):
+            raise RunStopped(f"{os_error_line(error, folder.path)}; {_way_on(folder, saved)}") from None
         raise
     finally:
         progress.close()
