@@ -63,7 +63,8 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
         for t in (0.2, 0.6):
             _, saved = deformation_forward(*parameters.values(), t=t)
             if fused:
-                deformation_adam_step(d_offsets, saved, state, rates, 0.9, 0.999, 1e-15)
+                ahead = deformation_adam_step(d_offsets, saved, state, rates, 0.9, 0.999, 1e-15, 0.4)
+                np.testing.assert_array_equal(ahead, deformation_forward(*parameters.values(), t=0.4)[0])
             else:
                 grads = dict(zip(NAMES, deformation_reverse(d_offsets, saved)[:3], strict=True))
                 adam_update(state, parameters, grads, rates, 0.9, 0.999, 1e-15)

@@ -107,7 +107,10 @@ def test_a_step_of_everything_equals_the_gradients_of_the_definition_put_to_adam
 
     few = scene_reverse(grads, saved, coefficients=False)
     assert few.by_field.keys() == back.by_field.keys() - {"colour_coefficients", "motion_coefficients"}
-    optimise(gaussians, adams[0], spectral, config, saved, grads, few, rates)
+    ahead = optimise(gaussians, adams[0], spectral, config, saved, grads, few, rates, 0.7)
+    later, _ = scene_at(copy, spectral, config.model, 0.7)
+    for here, there in zip(scene_at(gaussians, spectral, config.model, 0.7, ahead)[0], later, strict=True):
+        np.testing.assert_array_equal(here, there)
     assert adams[0].step == adams[1].step
     for name, array in arrays(copy).items():
         np.testing.assert_array_equal(arrays(gaussians)[name], array, err_msg=name)

@@ -19,10 +19,13 @@ from endotsr.config import (
     OptimiserConfig,
     TrainingConfig,
 )
+from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
 from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.fitting.model import render_at
+from endotsr.fitting.model import render_at, scene_at
+from endotsr.fitting.optimise import optimise
+from endotsr.fitting.schedules import densify_now
 from endotsr.fitting.trainer import (
     calibrated_weight,
     new_training,
@@ -42,7 +45,7 @@ RESIDUALS = ("colour_coefficients", "motion_coefficients")
 FDM = ("fdm_weight", "fdm_centre", "fdm_width")
 
 
-def settings(iterations=LENGTH, optimiser=None, loss=None, **model):
+def settings(iterations=LENGTH, optimiser=None, loss=None, training=None, **model):
     loss = {"smoothness_from": 10, "detail_from": 15, "detail_full": 30} | (loss or {})
     return Config(
         model=ModelConfig(**({"bases": 5, "frequencies": 3, "initial_width": 0.1} | model)),
@@ -51,7 +54,11 @@ def settings(iterations=LENGTH, optimiser=None, loss=None, **model):
         density=DensityConfig(start=10, interval=10, until=45),
         initialisation=InitialisationConfig(first_frame_points=250, other_frame_points=60),
         training=TrainingConfig(
-            iterations=iterations, residual_activation=BORN, harmonics_interval=15, checkpoint_every=10
+            iterations=iterations,
+            residual_activation=BORN,
+            harmonics_interval=15,
+            checkpoint_every=10,
+            **(training or {}),
         ),
     )
 
@@ -275,6 +282,46 @@ def test_automatic_weight_is_deterministic_and_equals_the_same_number_given(sequ
     monkeypatch.setattr(trainer, "calibrated_weight", forbidden)
     resumed, _ = run(sequence, automatic, loaded)
     assert_same(resumed, state)
+
+
+# --- offsets taken ahead ---
+
+
+def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(finished, sequence):
+    state, shop = copy.deepcopy(finished[2][30]), workshop(sequence, settings())
+    training_step(state, shop)
+    ahead, model = state.ahead, settings().model
+    marked = ahead._replace(offsets=ahead.offsets + 1)
+    here, _ = scene_at(state.gaussians, shop.spectral, model, ahead.t)
+    used, saved = scene_at(state.gaussians, shop.spectral, model, ahead.t, marked)
+    np.testing.assert_allclose(used.log_scale, here.log_scale + 1, rtol=1e-5)
+    assert saved.deformation == scene_at(state.gaussians, shop.spectral, model, ahead.t)[1].deformation
+    other = state.gaussians._replace(fdm_weight=state.gaussians.fdm_weight.copy())
+    for gaussians, t in ((other, ahead.t), (state.gaussians, ahead.t + 1e-3)):
+        for one, two in zip(
+            scene_at(gaussians, shop.spectral, model, t, marked)[0],
+            scene_at(gaussians, shop.spectral, model, t)[0],
+            strict=True,
+        ):
+            np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("training", [{}, {"bridge_share": 0.5, "time_jitter": 0.3}])
+def test_every_step_but_those_after_density_control_finds_its_offsets_taken(training, sequence, monkeypatch):
+    """And a run without them has the same numbers."""
+    config, calls, counts = settings(iterations=25, training=training), [], [0]
+
+    def counted(*given):
+        calls.append(given)
+        return deformation_forward(*given)
+
+    monkeypatch.setattr(model_module, "deformation_forward", counted)
+    state, _ = run(sequence, config, on_iteration=lambda entry: counts.append(len(calls)))
+    controlled = [k for k in range(1, 25) if densify_now(k, config)]
+    assert [k for k in range(1, 26) if counts[k] > counts[k - 1]] == [1, *(k + 1 for k in controlled)]
+    assert 0 < len(controlled) < 6
+    monkeypatch.setattr(trainer, "optimise", lambda *given: optimise(*given[:-1]))
+    assert_same(run(sequence, config)[0], state)
 
 
 # --- the rule of the released code ---

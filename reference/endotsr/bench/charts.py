@@ -11,7 +11,6 @@ INK, FAINT = "#24303a", "#c9d1d8"
 # Stages of one kind share a hue: time bases blue, splatting orange to red, losses green, optimiser violet.
 COLOURS = {
     "FDM": "#0b6e99",
-    "FDM reverse + Adam": "#58a6c9",
     "Fourier": "#a9d3e6",
     "projection": "#7f2704",
     "binning": "#b8480f",

@@ -19,8 +19,7 @@ from typing import Any
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")
 STAGES: dict[str, tuple[str, ...]] = {
-    "FDM": ("equations.deformation",),
-    "FDM reverse + Adam": ("fitting.deformation_step",),
+    "FDM": ("equations.deformation", "fitting.deformation_step"),  # the sweep: reverse, its Adam step, next forward
     "Fourier": ("equations.fourier", "equations.appearance", "equations.motion", "equations.matern"),
     "projection": ("splatting.covariance", "splatting.projection", "splatting.harmonics"),
     "binning": ("splatting.binning", "splatting.records"),  # sort, lists, records, gather of pair gradients

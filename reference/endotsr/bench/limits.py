@@ -45,8 +45,7 @@ def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
     digits = -(-8 * size // RADIX_BITS)
     gathered = RECORD * seen * size + GRADIENT * listed * size + 12 * seen * size
     return {
-        "FDM": Work(FDM_FORWARD * fdm / 3, size * (fdm + DEFORMATION_CHANNELS * n)),
-        "FDM reverse + Adam": Work((FDM_REVERSE + 3 * ADAM) * fdm / 3, size * 6 * fdm),
+        "FDM": Work((FDM_FORWARD + FDM_REVERSE + 3 * ADAM) * fdm / 3, size * (6 * fdm + 2 * DEFORMATION_CHANNELS * n)),
         "Fourier": Work(FOURIER * spectral, size * 3 * spectral),  # A, C, and C for the penalty
         "projection": Work((PROJECTION + HARMONIC * bands) * n, size * (3 * base + 30) * n),
         "binning": Work(0, digits * (2 * size + 8) * seen + 16 * listed + gathered),

@@ -20,7 +20,7 @@ CURVES: dict[str, tuple[str, ...]] = {
     "splat": SPLAT,
     "blending": ("blend forward", "blend reverse"),
     "binning": ("binning",),
-    "time bases": ("FDM", "FDM reverse + Adam"),
+    "time bases": ("FDM",),
     "Fourier": ("Fourier",),
     "losses": ("L1 and SSIM", "pyramid", "depth and smoothness"),
 }

@@ -1,14 +1,16 @@
-"""Fast path of training: the reverse pass of the deformation and its Adam step in one sweep.
+"""Fast path of training: the reverse pass of the deformation, its Adam step and the next forward pass in one sweep.
 
 The gradient of the FDM is (3, 10, B, N), three quarters of all gradients, and is needed once. Here it exists
-for one piece of one row at a time, in the first-level cache. The arithmetic is that of
-`deformation_reverse` followed by `adam_update`, in the same order: the results are equal bit by bit (tested).
+for one piece of one row at a time, in the first-level cache. The curves of the next iteration are taken there as well,
+from the numbers just changed: the arrays need not come from memory a second time. The arithmetic is that of
+`deformation_reverse`, `adam_update` and `deformation_forward`, in the same order: all results are equal bit by bit
+(tested).
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.deformation import CHANNELS, PIECE, DeformationSaved, reverse_row
+from endotsr.equations.deformation import CHANNELS, PIECE, DeformationSaved, add_row, reverse_row
 from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, rate_parts, step_factors
 from endotsr.jit import jit
 from endotsr.sharing import share
@@ -25,17 +27,20 @@ def deformation_adam_step(
     beta1: float,
     beta2: float,
     epsilon: float,
-) -> None:
+    ahead: float | None = None,
+) -> FloatArray | None:
     """Update the FDM arrays held in `saved`, and their moments in `state`, in place.
 
     d_offsets  (10, N) gradient of the loss by the offsets
     saved      from `deformation_forward`; its weight, centre and width ARE the parameters
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
+    ahead      normalised time for which the offsets of the new arrays are wanted
+    returns    those offsets, (10, N); None without `ahead`
 
     The gradient by t is not formed.
     Raises: ValueError naming the array whose shape, dtype or layout does not fit.
-    Oracle: `deformation_reverse` then `adam_update`, bitwise.
+    Oracle: `deformation_reverse`, `adam_update`, `deformation_forward`, bitwise.
     """
     parameters = (saved.weight, saved.centre, saved.width)
     first, second = [state.first[n] for n in NAMES], [state.second[n] for n in NAMES]
@@ -55,7 +60,11 @@ def deformation_adam_step(
     moments = (*first, *second)
     inputs = (*parameters, saved.t, saved.basis == "quartic", d_offsets)
     settings = (rate, root, float(beta1), float(beta2), float(epsilon))
-    share(_step_kernel, saved.weight.shape[0] * saved.weight.shape[1], *inputs, *moments, *settings)
+    count = saved.weight.shape[2]
+    offsets = np.zeros((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
+    tasks = CHANNELS * ((count + PIECE - 1) // PIECE)
+    share(_step_kernel, tasks, *inputs, *moments, *settings, float(ahead or 0.0), offsets)
+    return offsets if ahead is not None else None
 
 
 def _adam_piece(parameter, gradient, first, second, c, j, start, rate, root, beta1, beta2, epsilon):
@@ -72,22 +81,25 @@ _adam_piece_kernel = jit(_adam_piece)
 
 def _step(
     first, last, weight, centre, width, t, quartic, d_offsets, m_w, m_m, m_s, v_w, v_m, v_s,
-    rate, root, beta1, beta2, epsilon,
+    rate, root, beta1, beta2, epsilon, ahead, offsets,
 ):  # fmt: skip
-    """Each task owns one (channel, basis) row of all nine arrays."""
+    """Each task owns one piece of one channel, of all nine arrays; `offsets` has no columns where none are wanted."""
     bases, count = weight.shape[1:]
-    time = weight.dtype.type(t)
+    pieces = (count + PIECE - 1) // PIECE
+    time, time_ahead = weight.dtype.type(t), weight.dtype.type(ahead)
     gradient = np.empty((3, PIECE), weight.dtype)
     d_w, d_m, d_s = gradient[0], gradient[1], gradient[2]
-    for row in range(first, last):
-        c, j = row // bases, row % bases
-        for start in range(0, count, PIECE):
-            stop = min(count, start + PIECE)
+    for task in range(first, last):
+        c, start = task // pieces, (task % pieces) * PIECE
+        stop = min(count, start + PIECE)
+        for j in range(bases):
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
             reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)
             _adam_piece_kernel(weight, d_w, m_w, v_w, c, j, start, rate[0, c], root[0], beta1, beta2, epsilon)
             _adam_piece_kernel(centre, d_m, m_m, v_m, c, j, start, rate[1, c], root[1], beta1, beta2, epsilon)
             _adam_piece_kernel(width, d_s, m_s, v_s, c, j, start, rate[2, c], root[2], beta1, beta2, epsilon)
+            if offsets.shape[1] > 0:
+                add_row(w, m, s, time_ahead, quartic, offsets[c, start:stop])
 
 
 _step_kernel = jit(_step)

@@ -43,6 +43,14 @@ class SceneSaved(NamedTuple):
     motion: MotionSaved | None
 
 
+class OffsetsAhead(NamedTuple):
+    """Offsets of the FDM at a later time, taken when its arrays were changed. Good until they change again."""
+
+    fdm_weight: FloatArray  # the array itself: tells whether the Gaussians are still the same
+    t: float  # normalised time
+    offsets: FloatArray  # (10, N)
+
+
 class SceneGrads(NamedTuple):
     """Gradients by the raw parameters; `offsets` is what the FDM's reverse pass takes."""
 
@@ -69,13 +77,17 @@ def raster_settings(config: Config) -> RasterSettings:
     return PRESETS[raster.preset]._replace(near=raster.near, **own)
 
 
-def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float) -> tuple[Scene, SceneSaved]:
+def scene_at(
+    gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float, ahead: OffsetsAhead | None = None
+) -> tuple[Scene, SceneSaved]:
     """The Gaussians at time t (normalised; any value, in [0, 1] meant).
+
+    ahead   of `optimise`; used instead of a forward pass of the FDM if it is for these Gaussians and this time
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = together(
-        lambda: _deformed(gaussians, model, t),
+        lambda: _deformed(gaussians, model, t, ahead),
         lambda: _translation(gaussians, spectral, t),
         lambda: _residual(gaussians, spectral, model, t),
     )
@@ -86,7 +98,7 @@ def scene_at(gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: fl
 
 
 def _deformed(
-    gaussians: Gaussians, model: ModelConfig, t: float
+    gaussians: Gaussians, model: ModelConfig, t: float, ahead: OffsetsAhead | None
 ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], DeformationSaved | None]:
     """Position, quaternion and log-scale with the offsets of the FDM, if there is one."""
     position, quaternion, log_scale = gaussians.position, gaussians.quaternion, gaussians.log_scale
@@ -94,7 +106,10 @@ def _deformed(
     if weight is None:
         return (position, quaternion, log_scale), None
     assert centre is not None and width is not None
-    offsets, saved = deformation_forward(weight, centre, width, t, model.basis)
+    if ahead is not None and ahead.fdm_weight is weight and ahead.t == t:
+        offsets, saved = ahead.offsets, DeformationSaved(weight, centre, width, float(t), model.basis)
+    else:
+        offsets, saved = deformation_forward(weight, centre, width, t, model.basis)
     position = position + offsets[POSITION_CHANNELS]
     return (position, quaternion + offsets[QUATERNION_CHANNELS], log_scale + offsets[LOG_SCALE_CHANNELS]), saved
 

@@ -1,7 +1,8 @@
 """One Adam step of everything that is trained, from the gradients by the deformed scene.
 
 Where the gradient of an array is much larger than what it is made of (time bases, Fourier coefficients), the reverse
-pass and the step are one sweep, and the gradient is never stored.
+pass and the step are one sweep, and the gradient is never stored. The sweep over the time bases takes the curves of
+the next iteration as well.
 """
 
 from endotsr.config import Config
@@ -11,7 +12,7 @@ from endotsr.fitting.adam import AdamState, Rate, adam_update
 from endotsr.fitting.coefficients_step import coefficients_adam_step
 from endotsr.fitting.deformation_step import NAMES as FDM_FIELDS
 from endotsr.fitting.deformation_step import deformation_adam_step
-from endotsr.fitting.model import SceneGrads, SceneSaved, Spectral
+from endotsr.fitting.model import OffsetsAhead, SceneGrads, SceneSaved, Spectral
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.sharing import together
 from endotsr.splatting.render import RenderGrads
@@ -26,22 +27,29 @@ def optimise(
     grads: RenderGrads,
     back: SceneGrads,
     rates: dict[str, Rate],
-) -> None:
+    next_time: float | None = None,
+) -> OffsetsAhead | None:
     """Change the Gaussians and their moments in place.
 
     saved   of `scene_at`, for these very Gaussians
     grads   gradients by the deformed scene
     back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
     rates   learning rate of every array
+    next_time  normalised time of the next iteration, if it is known
+    returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
     """
     o = config.optimiser
     settings = (o.beta1, o.beta2, o.epsilon)
 
-    def step_deformation() -> None:
-        if saved.deformation is not None:
-            assert back.offsets is not None
-            fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-            deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings)
+    def step_deformation() -> OffsetsAhead | None:
+        if saved.deformation is None:
+            return None
+        assert back.offsets is not None
+        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
+        offsets = deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
+        if next_time is None or offsets is None:
+            return None
+        return OffsetsAhead(saved.deformation.weight, next_time, offsets)
 
     def step_appearance() -> None:
         if saved.appearance is not None:
@@ -57,9 +65,10 @@ def optimise(
             shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
 
-    together(  # arrays of their own; the longest sweep first
+    ahead, *_ = together(  # arrays of their own; the longest sweep first
         step_deformation,
         step_appearance,
         step_motion,
         lambda: adam_update(adam, arrays(gaussians), back.by_field, rates, *settings),
     )
+    return ahead

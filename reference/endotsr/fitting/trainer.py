@@ -5,6 +5,7 @@ everything else (targets, atoms, rates) is a function of the state, the sequence
 resumed run equals an uninterrupted one bit by bit, and no result depends on the number of threads.
 """
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import AdamState, adam_state, add_array
 from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
-from endotsr.fitting.model import Spectral, raster_settings, scene_at, scene_reverse, spectral_from
+from endotsr.fitting.model import OffsetsAhead, Spectral, raster_settings, scene_at, scene_reverse, spectral_from
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
 from endotsr.fitting.optimise import optimise
 from endotsr.fitting.schedules import (
@@ -77,6 +78,7 @@ class TrainingState:
     rng: np.random.Generator
     statistics: DensityStatistics
     lambda_lap: float | None  # full detail weight; None until an `auto` weight is calibrated
+    ahead: OffsetsAhead | None = None  # taken while the FDM was changed; not part of a checkpoint
 
 
 @dataclass
@@ -195,7 +197,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     targets = shop.targets_of(index)
     camera = shop.sequence.cameras[index]
     timer.mark("view")
-    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t)
+    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t, state.ahead)
     timer.mark("scene")
     settings = raster_settings(config)
     rendered, render_saved = render_forward(scene, camera, settings, degree=active_degree(iteration, config))
@@ -211,10 +213,13 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     )
     timer.mark("scene reverse")
     entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
-    dense = densify_now(iteration, config)
+    dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
         rates = learning_rates(iteration, config)
-        optimise(state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates)
+        following = None if dense else _draw_view(copy.deepcopy(state.rng), shop)[1]  # of the same generator
+        state.ahead = optimise(
+            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, following
+        )
     timer.mark("optimiser")
     if dense:
         _control_density(state, shop)
