@@ -168,7 +168,7 @@ def _deformation(rng, dtype, bases, count):
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-@pytest.mark.parametrize(("bases", "count", "steps"), [(3, 7, 3), (1, PIECE + 6, 1), (2, 2 * PIECE, 1)])
+@pytest.mark.parametrize(("bases", "count", "steps"), [(3, 7, 3), (1, PIECE + 6, 1), (2, 2 * PIECE, 1), (3, 1, 2)])
 def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dtype, bases, count, steps):
     separate = _deformation(rng, dtype, bases, count)
     fused = {name: a.copy() for name, a in separate.items()}
@@ -180,7 +180,7 @@ def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dty
         grads = deformation_reverse(d_offsets, saved)
         adam_update(states[0], separate, dict(zip(NAMES, grads[:3], strict=True)), rates, *BETAS)
         _, saved = deformation_forward(*fused.values(), t=0.3 * k, basis=basis)
-        ahead = None if k == 1 else 0.3 * k + 0.21
+        ahead = (0.0, None, 0.81)[k]
         offsets = deformation_adam_step(d_offsets, saved, states[1], rates, *BETAS, ahead)
         if ahead is None:
             assert offsets is None

@@ -10,7 +10,15 @@ from endotsr.equations.deformation import deformation_forward
 from endotsr.equations.fourier import atom_statistics, dictionary_forward, frequencies, normalised_atoms
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import motion_reverse
-from endotsr.fitting.model import raster_settings, render_at, scene_at, scene_reverse, spectral_from, without
+from endotsr.fitting.model import (
+    OffsetsAhead,
+    raster_settings,
+    render_at,
+    scene_at,
+    scene_reverse,
+    spectral_from,
+    without,
+)
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, render_forward
@@ -89,6 +97,22 @@ def test_a_component_without_arrays_adds_nothing_and_gets_no_gradient(gaussians,
     assert ("colour_coefficients" in back.by_field) == appearance
     assert ("motion_coefficients" in back.by_field) == motion
     assert (back.offsets is not None) == deformation
+
+
+def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(gaussians):
+    scene, saved = scene_at(gaussians, SPECTRAL, MODEL, T)
+    ahead = OffsetsAhead(gaussians.fdm_weight, T, np.full((10, N), 5.0))
+    used, used_saved = scene_at(gaussians, SPECTRAL, MODEL, T, ahead)
+    np.testing.assert_array_equal(used.log_scale, gaussians.log_scale + 5)
+    np.testing.assert_array_equal(used.quaternion, gaussians.quaternion + 5)
+    assert used_saved.deformation == saved.deformation  # the same arrays, time and basis
+    other = gaussians._replace(fdm_weight=gaussians.fdm_weight.copy())
+    for found, wanted in (
+        (scene_at(other, SPECTRAL, MODEL, T, ahead), scene),
+        (scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3, ahead), scene_at(gaussians, SPECTRAL, MODEL, T + 1e-3)[0]),
+    ):
+        for one, two in zip(found[0], wanted, strict=True):
+            np.testing.assert_array_equal(one, two)
 
 
 def gradients(appearance=True):

@@ -23,7 +23,7 @@ from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
 from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.fitting.model import render_at, scene_at
+from endotsr.fitting.model import render_at
 from endotsr.fitting.optimise import optimise
 from endotsr.fitting.schedules import densify_now
 from endotsr.fitting.trainer import (
@@ -285,25 +285,6 @@ def test_automatic_weight_is_deterministic_and_equals_the_same_number_given(sequ
 
 
 # --- offsets taken ahead ---
-
-
-def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(finished, sequence):
-    state, shop = copy.deepcopy(finished[2][30]), workshop(sequence, settings())
-    training_step(state, shop)
-    ahead, model = state.ahead, settings().model
-    marked = ahead._replace(offsets=ahead.offsets + 1)
-    here, _ = scene_at(state.gaussians, shop.spectral, model, ahead.t)
-    used, saved = scene_at(state.gaussians, shop.spectral, model, ahead.t, marked)
-    np.testing.assert_allclose(used.log_scale, here.log_scale + 1, rtol=1e-5)
-    assert saved.deformation == scene_at(state.gaussians, shop.spectral, model, ahead.t)[1].deformation
-    other = state.gaussians._replace(fdm_weight=state.gaussians.fdm_weight.copy())
-    for gaussians, t in ((other, ahead.t), (state.gaussians, ahead.t + 1e-3)):
-        for one, two in zip(
-            scene_at(gaussians, shop.spectral, model, t, marked)[0],
-            scene_at(gaussians, shop.spectral, model, t)[0],
-            strict=True,
-        ):
-            np.testing.assert_array_equal(one, two)
 
 
 @pytest.mark.parametrize("training", [{}, {"bridge_share": 0.5, "time_jitter": 0.3}])

@@ -63,7 +63,7 @@ def deformation_adam_step(
     count = saved.weight.shape[2]
     offsets = np.zeros((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
     tasks = CHANNELS * ((count + PIECE - 1) // PIECE)
-    share(_step_kernel, tasks, *inputs, *moments, *settings, float(ahead or 0.0), offsets)
+    share(_step_kernel, tasks, *inputs, *moments, *settings, saved.t if ahead is None else float(ahead), offsets)
     return offsets if ahead is not None else None
 
 
@@ -98,8 +98,7 @@ def _step(
             _adam_piece_kernel(weight, d_w, m_w, v_w, c, j, start, rate[0, c], root[0], beta1, beta2, epsilon)
             _adam_piece_kernel(centre, d_m, m_m, v_m, c, j, start, rate[1, c], root[1], beta1, beta2, epsilon)
             _adam_piece_kernel(width, d_s, m_s, v_s, c, j, start, rate[2, c], root[2], beta1, beta2, epsilon)
-            if offsets.shape[1] > 0:
-                add_row(w, m, s, time_ahead, quartic, offsets[c, start:stop])
+            add_row(w, m, s, time_ahead, quartic, offsets[c, start:stop])
 
 
 _step_kernel = jit(_step)
