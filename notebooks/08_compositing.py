@@ -58,8 +58,7 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
     log_o = log_opacity(scene["logit"])
     box, visible = screen_boxes(projected, log_o, settings, width, height)
     order = depth_order(scene["depth"], visible)
-    log_cutoff = np.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0
-    records = pack_records(order, projected, log_o, scene["colour"], log_cutoff)
+    records = pack_records(order, projected, log_o, scene["colour"])
     lists = tile_lists(box, order, TILE_WIDTH, TILE_HEIGHT, width, height)
     out, saved = composite_forward(records, lists, settings, background, width, height)
     return out, (order, projected, saved, settings)

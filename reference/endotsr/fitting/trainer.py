@@ -216,9 +216,9 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
         rates = learning_rates(iteration, config)
-        following = None if dense else _draw_view(copy.deepcopy(state.rng), shop)[1]  # of the same generator
+        later = _next_time(state.rng, shop) if iteration < config.training.iterations and not dense else None
         state.ahead = optimise(
-            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, following
+            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, later
         )
     timer.mark("optimiser")
     if dense:
@@ -237,6 +237,11 @@ def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
     t = float(shop.sequence.times[index])
     jitter = training.time_jitter
     return index, t + jitter * rng.uniform(-0.5, 0.5) / shop.sequence.count if jitter > 0 else t
+
+
+def _next_time(rng: np.random.Generator, shop: Workshop) -> float:
+    """Time of the next iteration, from a copy of the generator; density control would draw from it first."""
+    return _draw_view(copy.deepcopy(rng), shop)[1]
 
 
 def _draw_bridge(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
