@@ -184,9 +184,9 @@ def _project_reverse(
                 results[_U64(D_POSITION + k * GROUP + lane)] = d_p if seen else zero
                 results[_U64(D_JW + k * GROUP + lane)] = d_jw0[k]
                 results[_U64(D_JW + (3 + k) * GROUP + lane)] = d_jw1[k]
-            results[np.uintp(JACOBIAN + lane)], results[_U64(JACOBIAN + GROUP + lane)] = j00, j11
+            results[_U64(JACOBIAN + lane)], results[_U64(JACOBIAN + GROUP + lane)] = j00, j11
             results[_U64(JACOBIAN + 2 * GROUP + lane)], results[_U64(JACOBIAN + 3 * GROUP + lane)] = j02, j12
-            results[np.uintp(D_VIEW + lane)], results[_U64(D_VIEW + GROUP + lane)] = d_x, d_y
+            results[_U64(D_VIEW + lane)], results[_U64(D_VIEW + GROUP + lane)] = d_x, d_y
             results[_U64(D_VIEW + 2 * GROUP + lane)] = d_z
         write_group(results, start, count, d_out)
 
