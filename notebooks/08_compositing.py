@@ -318,14 +318,14 @@ np.testing.assert_allclose(damped["covariance2d"], exact["covariance2d"] * det**
 # %% [markdown]
 # ## The gradient check
 #
-# The difference is taken only between ends that make the same decisions (order, contributors, clamp). `composite_rows` is the fast
+# The difference is taken only between ends that make the same decisions (order, contributors, clamp). `composite_blocks` is the fast
 # path that training uses: it walks front to back and computes the same.
 
 # %%
 with one_thread():
     reports = [
         check_pair(all_pairs()[name], pair_stream(name, 0))
-        for name in ("composite_exact", "composite_paper", "composite_rows")
+        for name in ("composite_exact", "composite_paper", "composite_blocks")
     ]
 print(table(reports))
 assert all(report.passed for report in reports)

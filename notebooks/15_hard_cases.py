@@ -324,8 +324,8 @@ with one_thread():
 
 # %%
 with one_thread():
-    report = check_pair(all_pairs()["render_rows"], pair_stream("render_rows", 0))
-    precision = check_precision(all_pairs()["render_rows"], pair_stream("render_rows", 0))
+    report = check_pair(all_pairs()["render_blocks"], pair_stream("render_blocks", 0))
+    precision = check_precision(all_pairs()["render_blocks"], pair_stream("render_blocks", 0))
 print(table([report], [precision]))
 print(summary([report], [precision]))
 assert report.passed and precision.passed

@@ -8,7 +8,6 @@ from numba.core.errors import TypingError
 from endotsr.jit import jit, jit_inline
 from endotsr.vectors import (
     GROUP,
-    bits_at_least,
     fold,
     lanes,
     local_array,
@@ -104,22 +103,6 @@ def test_a_local_array_in_a_loop(dtype):
 def test_the_size_of_a_local_array_must_be_a_constant():
     with pytest.raises(TypingError, match="local_array"):
         jit(_asked_size)(np.zeros(3), 5)
-
-
-def _bits(values, start, bound):
-    """Bits of 24 numbers, and of 64."""
-    return bits_at_least(values, start, ROOM, bound), bits_at_least(values, 0, ALL, bound)
-
-
-@DTYPES
-def test_bits_tell_which_numbers_reach_the_bound(dtype):
-    rng = np.random.default_rng(3)
-    values = rng.choice([-1.0, 0.0, 0.25, 0.5, np.inf, -np.inf, np.nan], 80).astype(dtype)
-    for start, bound in ((0, 0.25), (7, 0.0), (40, 0.3), (5, np.inf), (56, -np.inf)):
-        some, many = jit(_bits)(values, start, dtype(bound))
-        assert [int(some) >> k & 1 for k in range(64)] == [*(values[start : start + ROOM] >= bound), *[False] * 40]
-        assert [int(many) >> k & 1 for k in range(64)] == list(values[:64] >= bound)
-        assert (some, many) == _bits(values, start, dtype(bound))
 
 
 def _numbers_of(bits, out):

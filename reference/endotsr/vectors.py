@@ -70,11 +70,6 @@ def fold(values: NDArray[np.floating]) -> np.floating:
     return values[0]
 
 
-def bits_at_least(values: NDArray[np.floating], start: int, count: int, bound: float) -> np.uint64:
-    """Bit k tells whether values[start + k] >= bound, k < count <= 64; in compiled code `count` is a named constant."""
-    return np.uint64(sum(1 << k for k in range(count) if values[start + k] >= bound))
-
-
 def lowest_bit(bits: np.uint64) -> np.uint64:
     """Number of the lowest bit that is 1; there must be one."""
     return np.uint64((int(bits) & -int(bits)).bit_length() - 1)
@@ -103,9 +98,13 @@ def _lanes_of(like: Any) -> int:
 
 
 def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:
-    """A place on the stack, as a one-dimensional array without an owner."""
+    """A place on the stack, as a one-dimensional array without an owner.
+
+    Not by `cgutils.alloca_once`, which fills it with zeros, number by number: seconds of compilation for a tile.
+    """
     number = context.get_data_type(kind.dtype)
-    place = cgutils.alloca_once(builder, ir.ArrayType(number, size))
+    with builder.goto_entry_block():
+        place = builder.alloca(ir.ArrayType(number, size))
     place.align = 64
     array = make_array(kind)(context, builder)
     shape, stride = context.get_constant(types.intp, size), context.get_constant(types.intp, kind.dtype.bitwidth // 8)
@@ -147,29 +146,6 @@ def _fold(typing: Any, values: Any) -> Any:
         return builder.extract_element(folded, ir.Constant(_INT32, 0))
 
     return values.dtype(values), generate
-
-
-@_instructions(prefer_literal=True)
-def _bits_at_least(typing: Any, values: Any, start: Any, count: Any, bound: Any) -> Any:
-    """One comparison of a vector."""
-    if not isinstance(count, types.IntegerLiteral):
-        return None
-    size = count.literal_value
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = make_array(values)(context, builder, arguments[0])
-        first = context.cast(builder, arguments[1], signature.args[1], types.intp)
-        vector_type = ir.VectorType(context.get_data_type(values.dtype), size)
-        place = builder.bitcast(builder.gep(array.data, [first]), vector_type.as_pointer())
-        numbers = builder.load(place, align=values.dtype.bitwidth // 8)
-        limit = context.cast(builder, arguments[3], signature.args[3], values.dtype)
-        limits = builder.insert_element(ir.Constant(vector_type, ir.Undefined), limit, ir.Constant(_INT32, 0))
-        same = ir.Constant(ir.VectorType(_INT32, size), [0] * size)
-        limits = builder.shuffle_vector(limits, ir.Constant(vector_type, ir.Undefined), same)
-        reached = builder.bitcast(builder.fcmp_ordered(">=", numbers, limits), ir.IntType(size))
-        return reached if size == 64 else builder.zext(reached, ir.IntType(64))
-
-    return types.uint64(values, start, count, bound), generate
 
 
 @_instructions
@@ -220,11 +196,6 @@ def _compile_local_array(size, like):
 @_compiled(fold)
 def _compile_fold(values):
     return lambda values: _fold(values)
-
-
-@_compiled(bits_at_least, prefer_literal=True)
-def _compile_bits_at_least(values, start, count, bound):
-    return lambda values, start, count, bound: _bits_at_least(values, start, count, bound)
 
 
 @_compiled(lowest_bit)

@@ -31,7 +31,7 @@ def test_the_folder_equals_a_fresh_computation():
     assert not lines, (summary, lines[:10])
 
 
-WHOLE = ("objective", "render_exact", "render_paper", "render_rows")  # what level 3 is about
+WHOLE = ("objective", "render_exact", "render_paper", "render_blocks")  # what level 3 is about
 
 
 @pytest.mark.parametrize("pair", list(all_pairs()))

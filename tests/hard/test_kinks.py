@@ -26,7 +26,7 @@ PIXEL = Camera(np.eye(3), np.zeros(3), 10.0, 10.0, 0.5, 0.5, 1, 1)
 RGB = np.array([[0.9, 0.1, 0.6], [0.2, 0.8, 0.3], [0.5, 0.4, 0.7]])  # one column a splat
 BACKGROUND = np.array([0.3, 0.6, 0.1])
 G = np.array([1.0, -0.7, 0.4])
-PATHS = pytest.mark.parametrize("path", ["definition", "rows"])
+PATHS = pytest.mark.parametrize("path", ["definition", "blocks"])
 
 
 def sides(value, kink, h=1e-4):

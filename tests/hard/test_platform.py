@@ -78,7 +78,7 @@ def float64_variables(kernel):
 def test_hard_N3_the_float32_rasteriser_holds_no_double():
     """A literal beside a float32 promotes it: typed once by Numba, read here from the compiled kernels."""
     scene = random_scene(0, 50, CAMERA, dtype=np.float32)
-    for path, settings in (("definition", EXACT), ("rows", PAPER), ("definition", LEGACY)):
+    for path, settings in (("definition", EXACT), ("blocks", PAPER), ("definition", LEGACY)):
         run(scene, CAMERA, settings, path)
     kernels = {
         f"{module}.{name}": value
@@ -112,7 +112,7 @@ def test_hard_N4_float32_gradients_of_a_scene_of_one_thousandth(preset):
     scene = as_dtype(
         scene._replace(position=scene.position * 1e-3, log_scale=scene.log_scale + np.log(1e-3)), np.float32
     )
-    path = "rows" if preset == "paper" else "definition"
+    path = "blocks" if preset == "paper" else "definition"
     images, _ = run(as_dtype(scene, np.float64), CAMERA, settings, path)
     rng = np.random.default_rng(4)
     given = [rng.normal(0, 1, images[name].shape).astype(np.float32) for name in ("colour", "depth", "opacity")]

@@ -58,7 +58,7 @@ def gradients_of_the_losses(images, dtype):
 def test_trained_scene_is_finite_from_losses_to_parameters(preset, dtype, name):
     scene, camera = trained_scene(name, 64 if preset == "exact" else 16, dtype)
     assert np.exp(np.ptp(scene.log_scale.astype(np.float64), axis=0)).max() > 1000
-    for path in ("definition", "rows") if preset == "paper" else ("definition",):
+    for path in ("definition", "blocks") if preset == "paper" else ("definition",):
         images, _ = run(scene, camera, PRESETS[preset], path)
         assert (images["opacity"] > 0.5).mean() > 0.02
         given = gradients_of_the_losses(images, dtype)

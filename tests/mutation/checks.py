@@ -141,7 +141,7 @@ def of_case(golden: Golden, case: Case) -> list[Check]:
 
         return Check("golden", f"{case.name} {precision} {path}", compare)
 
-    return [one("float64", "definition"), one("float64", "rows"), one("float32", "definition")]
+    return [one("float64", "definition"), one("float64", "blocks"), one("float32", "definition")]
 
 
 def of_item(item: pytest.Item) -> Check:

@@ -11,7 +11,7 @@ ROOMS = {
     ),
     "splatting": (
         "camera", "covariance", "projection", "harmonics", "exponential", "records", "binning", "compositing",
-        "compositing_rows", "compositing_tiles", "projection_kernels", "render",
+        "compositing_blocks", "compositing_tiles", "projection_kernels", "render",
     ),
     "losses": ("rows", "photometric", "similarity", "depth", "smoothness"),
     "scene": ("density_control",),

@@ -30,7 +30,7 @@ def _rotation_transposed() -> tuple[tuple[str, str], ...]:
 D_Z = "inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))"
 PROJECT, PROJECT_REVERSE = "splatting.projection_kernels._project", "splatting.projection_kernels._project_reverse"
 COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
-ROWS_REVERSE = "splatting.compositing_rows._blend_row_reverse"
+BLOCK_REVERSE = "splatting.compositing_blocks._blend_block_reverse"
 
 DEFECTS: tuple[Defect, ...] = (
     Defect(
@@ -76,7 +76,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "alpha clamp .99 forward, .999 in reverse (fast path)",
-        ROWS_REVERSE,
+        BLOCK_REVERSE,
         (("alpha = min(value, alpha_max)", "alpha = min(value, real(0.999))"),),
     ),
     Defect(
@@ -86,7 +86,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect("sign of dy", "splatting.compositing._alpha", (("dy = y - record[V]", "dy = record[V] - y"),)),
     Defect(
-        "sign of dy in the fast reverse pass", ROWS_REVERSE, (("se, sy = s * e, s * dy", "se, sy = s * e, -s * dy"),)
+        "sign of dy in the fast reverse pass", BLOCK_REVERSE, (("se, sy = s * e, s * dy", "se, sy = s * e, -s * dy"),)
     ),
     Defect("rotation transposed", "splatting.covariance._covariance_forward", _rotation_transposed()),
     Defect(

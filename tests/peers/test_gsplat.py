@@ -24,7 +24,7 @@ RULES = {
 }
 CASES = [("exact", 0, "definition"), ("exact", 3, "definition")]  # the fast path needs a cutoff
 CASES += [
-    (*case, path) for case in (("paper", 2), ("its own clamp", 3), ("no stop", 1)) for path in ("definition", "rows")
+    (*case, path) for case in (("paper", 2), ("its own clamp", 3), ("no stop", 1)) for path in ("definition", "blocks")
 ]
 BLOCKS = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics")
 BACKGROUND = np.array([0.2, 0.5, 0.9])

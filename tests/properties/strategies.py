@@ -9,7 +9,7 @@ from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 DTYPES = st.sampled_from([np.float32, np.float64])
 SEEDS = st.integers(0, 2**32 - 1)
-RASTER = st.sampled_from([("definition", EXACT), ("definition", PAPER), ("rows", PAPER), ("definition", LEGACY)])
+RASTER = st.sampled_from([("definition", EXACT), ("definition", PAPER), ("blocks", PAPER), ("definition", LEGACY)])
 CAMERA = Camera(np.eye(3), np.zeros(3), 9.0, 10.0, 4.8, 3.1, 9, 7)
 Y00 = 0.28209479177387814
 

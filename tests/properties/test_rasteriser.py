@@ -24,9 +24,9 @@ def single(z: float, dtype, logit: float = 1.0, log_scale: float = -1.0, x: floa
 
 
 @given(scenes(), RASTER)
-@example(single(float(np.nextafter(0.2, 1)), np.float32, 800.0), ("rows", PAPER))
+@example(single(float(np.nextafter(0.2, 1)), np.float32, 800.0), ("blocks", PAPER))
 @example(single(1.0, np.float32, log_scale=12.0), ("definition", LEGACY))  # det^2 of conic_epsilon was infinite
-@example(single(1.0, np.float32, x=1e15), ("rows", PAPER))  # a centre that no pixel index can hold
+@example(single(1.0, np.float32, x=1e15), ("blocks", PAPER))  # a centre that no pixel index can hold
 def test_finite_scenes_give_finite_images_and_gradients(scene, how):
     path, settings = how
     assert_finite(*run(scene, CAMERA, settings, path, background=BACKGROUND))

@@ -107,7 +107,7 @@ def test_hard_A5_many_equal_splats_against_the_closed_form(alpha, count):
     np.testing.assert_allclose(by_colour[0], alpha * GIVEN[0][0, 0, 0], rtol=1e-10)
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 def test_hard_A5_the_cutoff_and_the_stop_bound_the_number_of_contributors(path):
     """alpha just above 1/255 and T >= 1e-4: (254/255)^n >= 1e-4 holds for n <= 2348."""
     count = 4000
@@ -121,7 +121,7 @@ def test_hard_A5_the_cutoff_and_the_stop_bound_the_number_of_contributors(path):
 # --- the alpha clamp ---
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 @pytest.mark.parametrize("opacity", [0.992, 0.999999, 1.0])
 def test_hard_A1_clamped_alpha_is_the_maximum_with_zero_gradient(path, opacity):
     """Two splats: the first is clamped. Forward and reverse use the same constant: the second sees T = 0.01."""
@@ -165,7 +165,7 @@ def test_hard_A1_at_the_clamp_exactly_the_gradient_passes():
 # --- stop and cutoff ---
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_hard_A2_the_splat_that_crosses_the_stop_is_dropped(path, dtype):
     """T = 0.1, 0.01, then 0.00101; the next would leave 5e-4 and one more 1e-5: it and all behind are dropped."""
@@ -198,14 +198,14 @@ def test_hard_A2_a_tile_in_which_every_pixel_has_stopped_is_left(dtype):
     """80 opaque splats over the whole image: two are blended, the others have gradient 0 and change nothing."""
     camera = plain_camera(9, 5, 10.0)
     scene = as_dtype(screen_scene(camera, 4.5, 2.5, 2.0 + np.arange(80), 1e4, 0.98, ONE_COLOUR), dtype)
-    for path in ("definition", "rows"):
+    for path in ("definition", "blocks"):
         images, gradients = run(scene, camera, PAPER, path, background=BACKGROUND)
         wanted = (1 - 0.02**2) * ONE_COLOUR + 0.02**2 * BACKGROUND
         np.testing.assert_allclose(images["colour"], np.broadcast_to(wanted[:, None, None], (3, 5, 9)), rtol=1e-5)
         assert gradients["harmonics"][..., :2].all() and not gradients["harmonics"][..., 2:].any()
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 def test_hard_A3_the_jump_at_the_cutoff_is_alpha_times_the_difference(path):
     settings = PAPER
     images, gradients = [], []
@@ -222,7 +222,7 @@ def test_hard_A3_the_jump_at_the_cutoff_is_alpha_times_the_difference(path):
 def test_hard_A3_an_alpha_equal_to_the_cutoff_contributes():
     scene = on_the_pixel([0.5], ONE_COLOUR)
     scene.opacity_logit[0] = 0.0
-    for path in ("definition", "rows"):
+    for path in ("definition", "blocks"):
         images, _ = run(scene, PIXEL, PAPER._replace(alpha_cutoff=0.5), path)
         assert images["opacity"][0, 0] == 0.5, path
 
@@ -239,7 +239,7 @@ def test_hard_A7_logits_of_any_size(dtype):
         wanted = -np.log1p(np.exp(-logit.astype(np.longdouble)))
     wanted[logit < -600] = logit[logit < -600]
     np.testing.assert_allclose(found, wanted.astype(float), rtol=8 * np.finfo(dtype).eps, atol=np.finfo(dtype).eps)
-    for settings, path in ((EXACT, "definition"), (PAPER, "rows"), (LEGACY, "definition")):
+    for settings, path in ((EXACT, "definition"), (PAPER, "blocks"), (LEGACY, "definition")):
         scene = on_the_pixel(np.full(logit.size, 0.5), ONE_COLOUR, dtype)
         scene.opacity_logit[:] = logit
         assert_finite(*run(scene, PIXEL, settings, path, background=BACKGROUND))

@@ -36,7 +36,7 @@ def test_hard_S1_stable_sort_by_depth_then_index(dtype, count):
         np.testing.assert_array_equal(depth_order(depth, visible), wanted)
 
 
-@pytest.mark.parametrize("path, settings", [("definition", EXACT), ("rows", PAPER)])
+@pytest.mark.parametrize("path, settings", [("definition", EXACT), ("blocks", PAPER)])
 def test_hard_S1_permuting_the_input_changes_no_bit_for_distinct_depths(path, settings):
     scene = random_scene(0, 80, CAMERA)
     scene.position[2] = np.abs(scene.position[2])
@@ -49,7 +49,7 @@ def test_hard_S1_permuting_the_input_changes_no_bit_for_distinct_depths(path, se
             np.testing.assert_array_equal(back[name], gradients[name][..., order], err_msg=name)
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 def test_hard_S1_equal_depths_are_blended_in_index_order(path):
     rgb = np.array([[0.9, 0.1, 0.4], [0.2, 0.8, 0.3], [0.5, 0.4, 0.7]])
     scene = screen_scene(CAMERA, 16.5, 14.5, 3.0, 5.0, [0.3, 0.6, 0.8], rgb)
@@ -88,7 +88,7 @@ def test_hard_S2_view_depth_keeps_every_value_that_ndc_depth_loses(dtype):
     np.testing.assert_array_equal(shuffle[found], np.arange(z.size))
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 def test_hard_S3_the_image_jumps_where_two_depths_cross(path):
     """By alpha1 alpha2 T (c1 - c2), T in front of both."""
     c = np.array([[0.1, 0.9, 0.1], [0.1, 0.2, 0.8], [0.1, 0.5, 0.4]])
@@ -225,5 +225,5 @@ def test_order_of_the_tiles_does_not_matter_for_gradients():
     """A splat over many tiles collects the same sum as in one image row at a time (to rounding)."""
     camera = plain_camera(129, 5, 25.0)
     scene = screen_scene(camera, 64.0, 2.5, 3.0, 60.0, 0.7, [0.9, 0.2, 0.5])
-    one, two = run(scene, camera, PAPER, "rows")[1], run(scene, camera, PAPER, "definition")[1]
+    one, two = run(scene, camera, PAPER, "blocks")[1], run(scene, camera, PAPER, "definition")[1]
     assert_close(one, two, 64 * U64)

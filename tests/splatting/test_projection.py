@@ -281,7 +281,7 @@ def test_hard_P4_no_epsilon_is_added_to_the_depth():
     np.testing.assert_allclose(out.mean2d[1], CAMERA.fy * -0.2 + CAMERA.cy, rtol=8 * U64)
 
 
-@pytest.mark.parametrize("path, settings", [("definition", EXACT), ("definition", PAPER), ("rows", PAPER)])
+@pytest.mark.parametrize("path, settings", [("definition", EXACT), ("definition", PAPER), ("blocks", PAPER)])
 @pytest.mark.parametrize("dtype, bound", [(np.float64, 1e-9), (np.float32, 1e-6)])
 def test_hard_P5_splat_far_larger_than_the_image(path, settings, dtype, bound):
     """Covariance 1e12 px^2: o c + (1 - o) background everywhere, next to no gradient by the mean."""

@@ -36,7 +36,7 @@ CAMERA = turned_camera()
 
 
 def paths(settings):
-    return ["definition", "rows"] if settings is PAPER else ["definition"]
+    return ["definition", "blocks"] if settings is PAPER else ["definition"]
 
 
 CASES = [(name, path) for name, settings in PRESETS.items() for path in paths(settings)]
@@ -361,7 +361,7 @@ def test_trained_real_scenes_in_float32(name):
         middle = (low + high) / 2 - np.array([0, 0, distance * np.max(high - low)])
         camera = Camera(np.eye(3), -middle, 130.0, 130.0, 80.0, 60.0, 160, 120)
         results = []
-        for path in ("definition", "rows"):
+        for path in ("definition", "blocks"):
             images, gradients = run(scene, camera, PAPER, path, background=BACKGROUND)
             assert_finite(images, gradients)
             results.append((images, gradients))

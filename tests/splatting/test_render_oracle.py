@@ -46,7 +46,7 @@ def test_images_equal_the_oracle(preset, degree):
     assert_close(images, dict(zip(IMAGES, wanted)), 1e-12)
 
 
-@pytest.mark.parametrize("preset, path", [*((preset, "definition") for preset in PRESETS), ("paper", "rows")])
+@pytest.mark.parametrize("preset, path", [*((preset, "definition") for preset in PRESETS), ("paper", "blocks")])
 def test_every_gradient_equals_the_complex_step(preset, path):
     """Decisions are those of the point itself: valid on both sides of every kink, clamped Jacobians included."""
     settings = PRESETS[preset]._replace(deviations=LegacyDeviations())

@@ -75,7 +75,7 @@ def test_tiles_change_gradients_by_rounding_only(scene):
     assert errors(one, other).gradient < 1e-13
 
 
-@pytest.mark.parametrize("path", ["rows", "definition"])
+@pytest.mark.parametrize("path", ["blocks", "definition"])
 def test_threads_change_no_bit(scene, path):
     base = with_raster(alpha_cutoff=1 / 255)._replace(path=path)
     one, two = (frame(prepare(scene, base._replace(threads=threads)))[0] for threads in (1, 2))

@@ -8,7 +8,7 @@ from made_up import moving_scene
 
 from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import scene_at
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_blocks
 from endotsr.splatting.projection import footprint
 from endotsr.splatting.render import render_forward
 from endotsr.splatting.settings import PRESETS
@@ -171,12 +171,12 @@ def test_gradients_at_half_size_are_those_of_the_same_functional():
 
 
 def test_kernels_are_back_in_place_after_use():
-    rows, definition = compositing_rows._blend_kernel, compositing._composite_kernel
+    blocks, definition = compositing_blocks._blend_kernel, compositing._composite_kernel
     with pytest.raises(RuntimeError), kernels_of(ACCURATE._replace(exponential=3, tile=TILES[0])):
-        assert compositing_rows._blend_kernel is not rows
+        assert compositing_blocks._blend_kernel is not blocks
         assert compositing._composite_kernel is not definition
         raise RuntimeError
-    assert compositing_rows._blend_kernel is rows and compositing._composite_kernel is definition
+    assert compositing_blocks._blend_kernel is blocks and compositing._composite_kernel is definition
     assert compositing.TILE_WIDTH == 16
 
 

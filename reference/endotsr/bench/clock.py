@@ -23,8 +23,8 @@ STAGES: dict[str, tuple[str, ...]] = {
     "Fourier": ("equations.fourier", "equations.appearance", "equations.motion", "equations.matern"),
     "projection": ("splatting.covariance", "splatting.projection", "splatting.harmonics"),
     "binning": ("splatting.binning", "splatting.records"),  # sort, lists, records, gather of pair gradients
-    "blend forward": ("splatting.compositing", "splatting.compositing_rows"),
-    "blend reverse": ("splatting.compositing", "splatting.compositing_rows"),
+    "blend forward": ("splatting.compositing", "splatting.compositing_blocks"),
+    "blend reverse": ("splatting.compositing", "splatting.compositing_blocks"),
     "L1 and SSIM": ("losses.photometric", "losses.similarity"),
     "pyramid": ("equations.laplacian", "equations.pyramid"),
     "depth and smoothness": ("losses.depth", "losses.smoothness", "opencv"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.jit import jit
 from endotsr.sharing import share
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_blocks
 from endotsr.splatting.compositing import _alpha_kernel
 from endotsr.splatting.render import RenderSaved
 
@@ -57,7 +57,7 @@ _count_kernel = jit(_count)
 def count_pairs(saved: RenderSaved) -> PairCount:
     """Pairs of the frame that `render_forward` has just rendered. Slow: it stands beside a time, not inside it."""
     composite, camera = saved.composite, saved.camera
-    module = compositing_rows if isinstance(composite, compositing_rows.RowsSaved) else compositing
+    module = compositing_blocks if isinstance(composite, compositing_blocks.BlocksSaved) else compositing
     ellipse = saved.settings.support == "ellipse" and saved.settings.alpha_cutoff > 0
     counts: NDArray[np.int64] = np.zeros((composite.lists.starts.size - 1, 2), np.int64)
     share(

@@ -58,7 +58,7 @@ def _spectral() -> Spectral:
 def _run(inputs: Arrays):
     gaussians = Gaussians(*(inputs[name] for name in Gaussians._fields))
     scene, scene_saved = scene_at(gaussians, _spectral(), CONFIG.model, TIME)
-    rendered, saved = render_forward(scene, _camera(), WIDE, path="rows")
+    rendered, saved = render_forward(scene, _camera(), WIDE, path="blocks")
     targets = frame_targets(_frame(scene.position.dtype), CONFIG)
     loss = image_loss(rendered, targets, WEIGHTS, CONFIG.loss)
     assert gaussians.motion_coefficients is not None

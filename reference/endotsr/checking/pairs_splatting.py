@@ -7,9 +7,9 @@ from endotsr.checking.registry import Arrays, Pair
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.compositing import TILE_HEIGHT, TILE_WIDTH, composite_forward, composite_reverse
-from endotsr.splatting.compositing_rows import TILE_HEIGHT as ROWS_HEIGHT
-from endotsr.splatting.compositing_rows import TILE_WIDTH as ROWS_WIDTH
-from endotsr.splatting.compositing_rows import RowsSaved, composite_rows_forward, composite_rows_reverse
+from endotsr.splatting.compositing_blocks import TILE_HEIGHT as FAST_TILE_HEIGHT
+from endotsr.splatting.compositing_blocks import TILE_WIDTH as FAST_TILE_WIDTH
+from endotsr.splatting.compositing_blocks import BlocksSaved, composite_blocks_forward, composite_blocks_reverse
 from endotsr.splatting.covariance import Shape, covariance_forward, covariance_reverse
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 from endotsr.splatting.projection import Projected, projection_forward, projection_reverse
@@ -225,8 +225,8 @@ def _composite_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
     }
 
 
-def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
-    tile = (ROWS_WIDTH, ROWS_HEIGHT) if rows else (TILE_WIDTH, TILE_HEIGHT)
+def _composite_pair(name: str, settings: RasterSettings, fast: bool) -> Pair:
+    tile = (FAST_TILE_WIDTH, FAST_TILE_HEIGHT) if fast else (TILE_WIDTH, TILE_HEIGHT)
 
     def run(inputs: Arrays):
         a, b, c = inputs["covariance2d"]
@@ -239,7 +239,7 @@ def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
         order = depth_order(inputs["depth"], visible)
         records = pack_records(order, projected, log_alpha, inputs["colour"])
         lists = tile_lists(box, order, *tile, WIDTH, HEIGHT)
-        composite = composite_rows_forward if rows else composite_forward
+        composite = composite_blocks_forward if fast else composite_forward
         out, saved = composite(records, lists, settings, inputs["background"], WIDTH, HEIGHT)
         return out, saved, projected, order
 
@@ -250,7 +250,7 @@ def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
         out, saved, projected, order = run(inputs)
         images = (cotangents["colour_image"], cotangents["depth_image"], cotangents["opacity_image"])
-        pairs = (composite_rows_reverse if isinstance(saved, RowsSaved) else composite_reverse)(*images, saved)  # pyright: ignore[reportArgumentType]
+        pairs = (composite_blocks_reverse if isinstance(saved, BlocksSaved) else composite_reverse)(*images, saved)  # pyright: ignore[reportArgumentType]
         grads = gather_gradients(
             order, saved.records, saved.lists, pairs, projected.determinant, inputs["opacity_logit"],
             conic_epsilon=0.0, keep_depth=True,
@@ -263,7 +263,7 @@ def _composite_pair(name: str, settings: RasterSettings, rows: bool) -> Pair:
         saved, order = run(inputs)[1], run(inputs)[3]
         return {"order": order, **_decisions(saved.records, settings)}
 
-    module = "compositing_rows.composite_rows_forward" if rows else "compositing.composite_forward"
+    module = "compositing_blocks.composite_blocks_forward" if fast else "compositing.composite_forward"
     return Pair(name, "B5", f"endotsr.splatting.{module}", _composite_inputs, forward, reverse, None, trace)
 
 
@@ -346,10 +346,10 @@ PAIRS: list[Pair] = [
     _projection_pair("projection_exact", EXACT),
     _projection_pair("projection_paper", PAPER),
     *(_harmonics_pair(degree) for degree in range(4)),
-    _composite_pair("composite_exact", EXACT, rows=False),
-    _composite_pair("composite_paper", WIDE, rows=False),
-    _composite_pair("composite_rows", WIDE, rows=True),
+    _composite_pair("composite_exact", EXACT, fast=False),
+    _composite_pair("composite_paper", WIDE, fast=False),
+    _composite_pair("composite_blocks", WIDE, fast=True),
     _render_pair("render_exact", EXACT, "definition"),
     _render_pair("render_paper", WIDE, "definition"),
-    _render_pair("render_rows", WIDE, "rows"),
+    _render_pair("render_blocks", WIDE, "blocks"),
 ]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.conformance.operation import Asked, Inputs, Operation, Settings, real_of
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_blocks
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward, covariance_reverse
@@ -42,8 +42,8 @@ def camera_of(inputs: Inputs, settings: Settings) -> Camera:
 
 def path_of(settings: Settings) -> Path:
     """Which compositing path answers; both give the same up to rounding."""
-    rows = settings.get("_path") == "rows" and compositing_rows.supports(raster_of(settings))
-    return "rows" if rows else "definition"
+    blocks = settings.get("_path") == "blocks" and compositing_blocks.supports(raster_of(settings))
+    return "blocks" if blocks else "definition"
 
 
 def _covariance(inputs: Inputs, settings: Settings) -> Found:
@@ -101,10 +101,10 @@ def composite_of(inputs: Inputs, settings: Settings):
     box, visible = screen_boxes(projected, log_alpha, raster, width, height)
     order = depth_order(inputs["depth"], visible)
     records = pack_records(order, projected, log_alpha, inputs["colour"])
-    rows = path_of(settings) == "rows"
-    module = compositing_rows if rows else compositing
+    blocks = path_of(settings) == "blocks"
+    module = compositing_blocks if blocks else compositing
     lists = tile_lists(box, order, module.TILE_WIDTH, module.TILE_HEIGHT, width, height)
-    forward = compositing_rows.composite_rows_forward if rows else compositing.composite_forward
+    forward = compositing_blocks.composite_blocks_forward if blocks else compositing.composite_forward
     out, saved = forward(records, lists, raster, inputs["background"], width, height)
     return out, saved, projected, order
 
@@ -112,8 +112,8 @@ def composite_of(inputs: Inputs, settings: Settings):
 def _composite(inputs: Inputs, settings: Settings) -> Found:
     out, saved, projected, order = composite_of(inputs, settings)
     images = (inputs["d_colour_image"], inputs["d_depth_image"], inputs["d_opacity_image"])
-    if isinstance(saved, compositing_rows.RowsSaved):
-        pairs = compositing_rows.composite_rows_reverse(*images, saved)
+    if isinstance(saved, compositing_blocks.BlocksSaved):
+        pairs = compositing_blocks.composite_blocks_reverse(*images, saved)
     else:
         pairs = compositing.composite_reverse(*images, saved)
     deviations = raster_of(settings).deviations
@@ -177,8 +177,8 @@ def _preset(settings: Settings) -> str:
 
 def _compositing_pairs(stage: str, settings: Settings) -> tuple[str, ...]:
     """The definition, and the fast path where it answers too."""
-    rows = (f"{stage}_rows",) if compositing_rows.supports(raster_of(settings)) else ()
-    return (f"{stage}_{_preset(settings)}", *rows)
+    blocks = (f"{stage}_blocks",) if compositing_blocks.supports(raster_of(settings)) else ()
+    return (f"{stage}_{_preset(settings)}", *blocks)
 
 
 OPERATIONS = [

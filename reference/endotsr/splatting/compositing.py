@@ -5,7 +5,7 @@ nothing; before T falls below the stop, the pixel is finished. colour = sum c_i 
 depth = sum z_i alpha_i T_i, opacity = sum alpha_i T_i.
 
 The reverse pass keeps T_i and walks back to front with R_i = alpha_i c_i + (1 - alpha_i) R_{i+1}: no
-division by T or 1 - alpha, so it is right for alpha = 1 and behind opaque stacks. `compositing_rows`
+division by T or 1 - alpha, so it is right for alpha = 1 and behind opaque stacks. `compositing_blocks`
 computes the same for the `paper` preset, many pixels at a time.
 """
 

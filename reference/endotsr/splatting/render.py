@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_blocks
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
 from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.floating]
 
 CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
 
-Path = Literal["auto", "definition", "rows"]
+Path = Literal["auto", "definition", "blocks"]
 
 
 class Scene(NamedTuple):
@@ -57,7 +57,7 @@ class RenderSaved(NamedTuple):
     projected: Projected
     order: NDArray[np.int32]
     visible: NDArray[np.bool_]
-    composite: compositing.CompositeSaved | compositing_rows.RowsSaved
+    composite: compositing.CompositeSaved | compositing_blocks.BlocksSaved
 
 
 class RenderGrads(NamedTuple):
@@ -92,9 +92,9 @@ def check_scene(scene: Scene) -> None:
 def choose_path(settings: RasterSettings, path: Path) -> Path:
     """`auto` takes the fast path wherever it computes the settings."""
     if path == "auto":
-        return "rows" if compositing_rows.supports(settings) else "definition"
-    if path == "rows" and not compositing_rows.supports(settings):
-        raise ValueError("path 'rows' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'")
+        return "blocks" if compositing_blocks.supports(settings) else "definition"
+    if path == "blocks" and not compositing_blocks.supports(settings):
+        raise ValueError("path 'blocks' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'")
     return path
 
 
@@ -130,9 +130,9 @@ def render_forward(
     box, visible = screen_boxes(projected, log_alpha, settings, width, height)
     order = depth_order(projected.depth, visible)
     records = pack_records(order, projected, log_alpha, colour)
-    if choose_path(settings, path) == "rows":
-        lists = tile_lists(box, order, compositing_rows.TILE_WIDTH, compositing_rows.TILE_HEIGHT, width, height)
-        out, saved = compositing_rows.composite_rows_forward(records, lists, settings, back, width, height)
+    if choose_path(settings, path) == "blocks":
+        lists = tile_lists(box, order, compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT, width, height)
+        out, saved = compositing_blocks.composite_blocks_forward(records, lists, settings, back, width, height)
     else:
         lists = tile_lists(box, order, compositing.TILE_WIDTH, compositing.TILE_HEIGHT, width, height)
         out, saved = compositing.composite_forward(records, lists, settings, back, width, height)
@@ -154,8 +154,8 @@ def render_reverse(
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
     """
     composite = saved.composite
-    if isinstance(composite, compositing_rows.RowsSaved):
-        pairs = compositing_rows.composite_rows_reverse(d_colour, d_depth, d_opacity, composite)
+    if isinstance(composite, compositing_blocks.BlocksSaved):
+        pairs = compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, composite)
     else:
         d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
         pairs = compositing.composite_reverse(d_colour, d_depth, d_opacity, composite)

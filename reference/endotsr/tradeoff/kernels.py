@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
 from endotsr.jit import jit, jit_inline
-from endotsr.splatting import compositing, compositing_rows
+from endotsr.splatting import compositing, compositing_blocks
 from endotsr.tradeoff.settings import Setting
 
 COEFFICIENTS = (1.0,)  # stands for the coefficients of a variant, highest power first
@@ -46,14 +46,14 @@ def rebound(function: Callable[..., Any], variant: str, **names: Any) -> Callabl
 
 
 @functools.cache
-def _rows_with_exponential(degree: int) -> dict[str, Any]:
+def _blocks_with_exponential(degree: int) -> dict[str, Any]:
     """The kernels of the fast path with a polynomial of this degree, by the name they have there."""
-    name, rows = f"degree{degree}", compositing_rows
+    name, fast = f"degree{degree}", compositing_blocks
     exp2 = jit_inline(rebound(_exp2_polynomial, name, COEFFICIENTS=exponential_coefficients(degree)))
     found = {}
     for ending in ("", "_reverse"):
-        row = jit_inline(rebound(getattr(rows, f"_blend_row{ending}"), name, exp2_nonpositive=exp2))
-        body = rebound(getattr(rows, f"_blend{ending}"), name, **{f"_blend_row{ending}_kernel": row})
+        block = jit_inline(rebound(getattr(fast, f"_blend_block{ending}"), name, exp2_nonpositive=exp2))
+        body = rebound(getattr(fast, f"_blend{ending}"), name, **{f"_blend_block{ending}_kernel": block})
         found[f"_blend{ending}_kernel"] = jit(body, contract=True)
     return found
 
@@ -74,7 +74,7 @@ def kernels_of(setting: Setting) -> Iterator[None]:
     """Within the block, rendering uses the kernels that the setting asks for."""
     changes: list[tuple[types.ModuleType, dict[str, Any]]] = []
     if setting.exponential is not None:
-        changes.append((compositing_rows, _rows_with_exponential(setting.exponential)))
+        changes.append((compositing_blocks, _blocks_with_exponential(setting.exponential)))
     if setting.tile not in (None, compositing.TILE_WIDTH):
         changes.append((compositing, _definition_with_tiles(setting.tile)))
     kept = [(module, {name: getattr(module, name) for name in names}) for module, names in changes]

@@ -1,14 +1,16 @@
-"""The fast path of compositing: the same sums as `compositing`, a vector of pixels of a row at a time.
+"""The fast path of compositing: the same sums as `compositing`, a block of pixels at a time.
 
 Used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Reasons, in order of gain:
 
-* A Gaussian visits only the rows of its ellipse alpha >= cutoff, and in a row only its span, in chunks of one
-  vector (16 or 8 pixels). The span is widened beyond rounding and every lane tests
-  alpha >= cutoff itself, so no pixel is missed and none too many is drawn.
-* The chunks of a tile that a Gaussian visits are the bits of a word: one loop over all of them. A loop over rows with
-  one over the chunks of each would end at an unforeseen place once a row.
-* The lane loop is vector code: a tile lies in flat planes (`compositing_tiles`), and what a loop adds up lies in
-  registers of the kernel's own (`vectors`), so that nothing has to be guarded or reloaded.
+* A Gaussian visits only the blocks that its ellipse alpha >= cutoff touches. A block is 4x4 pixels (4x2 where a vector
+  has eight lanes): small Gaussians fill it better than sixteen pixels of one row. The span of each row is widened
+  beyond rounding and every lane tests alpha >= cutoff itself, so no pixel is missed and none too many is drawn.
+* The blocks of a tile that a Gaussian visits are the bits of a word: one loop over all of them. Loops over rows of
+  blocks would end at an unforeseen place once a row.
+* The lane loop is vector code: the pixels of a block stand side by side in flat planes (`compositing_tiles`), never
+  across two cache lines, and what a loop adds up lies in registers of the kernel's own (`vectors`), so that nothing
+  has to be guarded or reloaded.
+* What depends only on the place of a lane and on the row of blocks is formed once a Gaussian (`_lane_tables`).
 * Records are asked for some pairs ahead: depth order is random order in memory, and each would be waited for.
 * log2(opacity) and log2(e) are folded into the exponent: alpha is a bare 2^x.
 * The sign of T, or T = 0, marks a finished pixel; selects, no branches, in the lane loop.
@@ -28,12 +30,14 @@ from endotsr.sharing import share
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.compositing import Composite, composite_limits, empty_composite
 from endotsr.splatting.compositing_tiles import (
-    FORWARD_PLANES,
-    PITCH,
+    BLOCK_WIDTH,
+    BLOCKS_ACROSS,
+    FORWARD_NUMBERS,
     PLANE,
-    REVERSE_PLANES,
+    REVERSE_NUMBERS,
     TILE_HEIGHT,
     TILE_WIDTH,
+    block_height,
     clear,
     finished,
     read_tile,
@@ -64,19 +68,21 @@ from endotsr.splatting.records import (
     V,
 )
 from endotsr.splatting.settings import RasterSettings
-from endotsr.vectors import bits_at_least, fold, lanes, local_array, lowest_bit, prefetch, vector
+from endotsr.vectors import fold, lanes, local_array, lowest_bit, prefetch, vector
 
 FloatArray = NDArray[np.floating]
 
-LINES = 5 * TILE_HEIGHT  # numbers that `_spans` writes
-CHUNKS = 64 // TILE_HEIGHT  # of each row, in one word of visits
+WORD_ROWS = 64 // BLOCKS_ACROSS  # rows of blocks whose visits are the bits of one word
+E, CENTRE_LINE, DY = 0, 64, 128  # parts of what `_lane_tables` fills, of WORD_ROWS rows of blocks at most
+TABLES = 192
+ROUND_UP = 0.999  # to the next column; a little less, so that none is lost to rounding
 BATCH = 32  # pairs between two tests whether the whole tile is finished
 AHEAD = 8  # pairs between asking for a record and using it
 
 _U64 = np.uint64
 
 
-class RowsSaved(NamedTuple):
+class BlocksSaved(NamedTuple):
     """What the reverse pass needs."""
 
     records: FloatArray
@@ -95,14 +101,12 @@ def supports(settings: RasterSettings) -> bool:
     )
 
 
-def _spans(record, top, left, log2_cutoff, lines):
-    """Of all rows of a tile at once (vector code): dy, exponent and e of the first pixel, and the columns to visit.
+def _visits(record, top, left, log2_cutoff):
+    """The blocks of a tile to visit, as bits of two words: BLOCKS_ACROSS r + c for block c of row r of the word.
 
-    lines  (LINES,) filled with dy, log2 alpha on the centre line, e = dx - m dy at the first column, that column, and
-           how many follow it; -1 where the row is not reached
-
+    With blocks of four rows the second word stays empty. All rows of the tile at once (vector code).
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
-    beyond rounding, so that no pixel with alpha >= cutoff is missed; a column too many does no harm. Where a huge
+    beyond rounding, so that no pixel with alpha >= cutoff is missed; a block too many does no harm. Where a huge
     footprint just reaches a row, the reach is a difference of nearly equal numbers: `faintest` allows for its rounding.
     A row below the cutoff on its centre line has no pixel above it, rounding included: the rest of the exponent is
     taken away from that very number.
@@ -113,42 +117,54 @@ def _spans(record, top, left, log2_cutoff, lines):
     r2 = half * real(LOG2_E) * record[INVERSE_C]
     spread, margin = one / (half * real(LOG2_E) * record[PRECISION]), abs(u) * real(1e-5) + real(1e-3)
     faintest = log2_cutoff - (one - log2_cutoff) * real(1e-6)
-    first_row, right = real(top) + half - v, real(TILE_WIDTH - 1)
+    first_row, across = real(top) + half - v, real(TILE_WIDTH)
     offset = u - half - real(left)
+    first_word, second_word = _U64(0), _U64(0)
     for y in range(TILE_HEIGHT):
-        k = _U64(y)
         dy = first_row + real(y)
-        exponent = log2_opacity - r2 * dy * dy
-        shift = slope * dy
-        width = math.sqrt(max(spread * (exponent - faintest), zero)) + margin
-        low, high = offset + shift - width, min(offset + shift + width, right)
-        column = real(np.int32(min(max(low, zero), real(TILE_WIDTH))))
-        lines[k] = dy
-        lines[k + _U64(TILE_HEIGHT)] = exponent
-        lines[k + _U64(2 * TILE_HEIGHT)] = real(left) + column + half - u - shift
-        lines[k + _U64(3 * TILE_HEIGHT)] = column
-        lines[k + _U64(4 * TILE_HEIGHT)] = high - column if exponent >= log2_cutoff else -one
+        centre_line = log2_opacity - r2 * dy * dy
+        middle = offset + slope * dy
+        width = math.sqrt(max(spread * (centre_line - faintest), zero)) + margin
+        low, high = min(max(middle - width, zero), across), min(max(middle + width + one, zero), across)
+        first, stop = np.int32(low + real(ROUND_UP)), np.int32(high)
+        last = np.int32(max(stop, 1) - 1)
+        columns = (_U64(2) << _U64(last // BLOCK_WIDTH)) - (_U64(1) << _U64(first // BLOCK_WIDTH))
+        columns = columns if (centre_line >= log2_cutoff) & (first < stop) else _U64(0)
+        row = y // block_height(record)
+        bits = columns << _U64(BLOCKS_ACROSS * (row % WORD_ROWS))
+        first_word |= bits if row < WORD_ROWS else _U64(0)
+        second_word |= bits if row >= WORD_ROWS else _U64(0)
+    return first_word, second_word
 
 
-def _visits(lines, word):
-    """Bit TILE_HEIGHT c + y tells whether row y has a chunk CHUNKS word + c."""
-    bits = _U64(0)
-    for c in range(CHUNKS):
-        nearest = lines.dtype.type((CHUNKS * word + c) * lanes(lines))
-        bits |= bits_at_least(lines, 4 * TILE_HEIGHT, TILE_HEIGHT, nearest) << _U64(TILE_HEIGHT * c)
-    return bits
+def _lane_tables(record, top, left, word, tables):
+    """Of each lane of the first block of each row of blocks of a word: e = dx - m dy, log2 alpha at e = 0, dy.
+
+    dy is formed as in `_visits`: where m is large, a rounding of dy is many pixels.
+    """
+    real = record.dtype.type
+    half = real(0.5)
+    slope, log2_opacity = record[SLOPE], record[LOG2_OPACITY]
+    r2 = half * real(LOG2_E) * record[INVERSE_C]
+    first_row, first_column = real(top) + half - record[V], real(left) + half - record[U]
+    above = WORD_ROWS * block_height(record) * word
+    for place in range(WORD_ROWS * lanes(record)):
+        k = _U64(place)
+        dy = first_row + real(above + place // BLOCK_WIDTH)
+        tables[k + _U64(E)] = first_column + real(place % BLOCK_WIDTH) - slope * dy
+        tables[k + _U64(CENTRE_LINE)] = log2_opacity - r2 * dy * dy
+        tables[k + _U64(DY)] = dy
 
 
-def _visit(lines, word, bit):
-    """Of a visit: place of its first pixel in a plane, e there, dy, log2 alpha on the centre line."""
-    y, c = bit % _U64(TILE_HEIGHT), bit // _U64(TILE_HEIGHT) + _U64(CHUNKS * word)
-    columns, first_column = c * _U64(lanes(lines)), _U64(np.int32(lines[y + _U64(3 * TILE_HEIGHT)]))
-    e = lines[y + _U64(2 * TILE_HEIGHT)] + lines.dtype.type(np.int32(columns))
-    return y * _U64(PITCH) + first_column + columns, e, lines[y], lines[y + _U64(TILE_HEIGHT)]
+def _visit(like, word, bit):
+    """Of a visited block: place of its first pixel in a plane, that of its row in the tables, first column."""
+    row, column = bit // _U64(BLOCKS_ACROSS), bit % _U64(BLOCKS_ACROSS)
+    many = _U64(lanes(like))
+    return (_U64(64 * word) + bit) * many, row * many, like.dtype.type(np.int32(column * _U64(BLOCK_WIDTH)))
 
 
-_spans_kernel = jit_inline(_spans)
 _visits_kernel = jit_inline(_visits)
+_lane_tables_kernel = jit_inline(_lane_tables)
 _visit_kernel = jit_inline(_visit)
 
 
@@ -162,15 +178,15 @@ def _record(records, ranks, p, end):
 _record_kernel = jit_inline(_record)
 
 
-def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max):
-    """Blend one Gaussian into as many pixels of one row as a vector has lanes."""
+def _blend_block(buffer, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max):
+    """Blend one Gaussian into the pixels of one block."""
     real = buffer.dtype.type
     zero = real(0)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
     for lane in range(lanes(buffer)):
         j = base + _U64(lane)
-        e = e0 + real(lane)
-        exponent = row2 - a2 * e * e
+        e = tables[row + _U64(E + lane)] + across
+        exponent = tables[row + _U64(CENTRE_LINE + lane)] - a2 * e * e
         alpha = min(exp2_nonpositive(exponent), alpha_max)
         t = buffer[j]
         live = max(t, zero)
@@ -185,7 +201,7 @@ def _blend_row(buffer, base, e0, a2, row2, record, log2_cutoff, stop, alpha_max)
         buffer[j + _U64(4 * PLANE)] += weight * depth
 
 
-_blend_row_kernel = jit_inline(_blend_row)
+_blend_block_kernel = jit_inline(_blend_block)
 
 
 def _blend(first_tile, last_tile, records, starts, ranks, limits, background, colour, depth, opacity, transmittance):
@@ -194,8 +210,8 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
     height, width = depth.shape
-    tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    buffer, lines = np.empty(FORWARD_PLANES * PLANE, records.dtype), local_array(LINES, records)
+    tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
+    buffer, tables = local_array(FORWARD_NUMBERS, records), local_array(TABLES, records)
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
         start, end = starts[tile], starts[tile + 1]
@@ -204,26 +220,30 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
             if (p - start) % BATCH == 0 and finished(buffer):
                 break
             record = _record_kernel(records, ranks, p, end)
-            _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for word in range(TILE_WIDTH // (CHUNKS * lanes(records))):
-                visits = _visits_kernel(lines, word)
+            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff)
+            for word in range(words):
+                visits = first_word if word == 0 else second_word
+                if visits != _U64(0):
+                    _lane_tables_kernel(record, top, left, word, tables)
                 while visits != _U64(0):
-                    place, e, _, row2 = _visit_kernel(lines, word, lowest_bit(visits))
+                    base, row, across = _visit_kernel(records, word, lowest_bit(visits))
                     visits &= visits - _U64(1)
-                    _blend_row_kernel(buffer, place, e, a2, row2, record, log2_cutoff, stop, alpha_max)
+                    _blend_block_kernel(
+                        buffer, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max
+                    )  # fmt: skip
         write_tile(buffer, top, left, background, colour, depth, opacity, transmittance)
 
 
-def _blend_row_reverse(buffer, sums, base, e0, dy, a2, row2, record, log2_cutoff, stop, alpha_max):
-    """Replay one Gaussian over a vector of pixels; T becomes 0 where a pixel is finished."""
+def _blend_block_reverse(buffer, sums, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max):
+    """Replay one Gaussian over the pixels of one block; T becomes 0 where a pixel is finished."""
     real = buffer.dtype.type
     zero, one = real(0), real(1)
     red, green, blue, depth = record[RED], record[GREEN], record[BLUE], record[DEPTH]
     for lane in range(lanes(buffer)):
         j, k = base + _U64(lane), _U64(lane)
-        e = e0 + real(lane)
-        exponent = row2 - a2 * e * e
+        e, dy = tables[row + _U64(E + lane)] + across, tables[row + _U64(DY + lane)]
+        exponent = tables[row + _U64(CENTRE_LINE + lane)] - a2 * e * e
         value = exp2_nonpositive(exponent)
         alpha = min(value, alpha_max)
         t = buffer[j]
@@ -252,7 +272,7 @@ def _blend_row_reverse(buffer, sums, base, e0, dy, a2, row2, record, log2_cutoff
         sums[SUM_DEPTH][k] += weight * gz
 
 
-_blend_row_reverse_kernel = jit_inline(_blend_row_reverse)
+_blend_block_reverse_kernel = jit_inline(_blend_block_reverse)
 
 
 def _new_sums(like):
@@ -274,8 +294,8 @@ def _blend_reverse(
     stop, alpha_max = limits[1], limits[2]
     log2_cutoff = real(math.log2(limits[0]))
     height, width = depth.shape
-    tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
-    buffer, lines = np.empty(REVERSE_PLANES * PLANE, records.dtype), local_array(LINES, records)
+    tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
+    buffer, tables = local_array(REVERSE_NUMBERS, records), local_array(TABLES, records)
     sums = _new_sums_kernel(records)
     for tile in range(first_tile, last_tile):
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
@@ -293,15 +313,17 @@ def _blend_reverse(
                 for lane in range(lanes(records)):
                     column[_U64(lane)] = zero
             record = _record_kernel(records, ranks, p, end)
-            _spans_kernel(record, top, left, log2_cutoff, lines)
             a2 = half * real(LOG2_E) * record[PRECISION]
-            for word in range(TILE_WIDTH // (CHUNKS * lanes(records))):
-                visits = _visits_kernel(lines, word)
+            first_word, second_word = _visits_kernel(record, top, left, log2_cutoff)
+            for word in range(words):
+                visits = first_word if word == 0 else second_word
+                if visits != _U64(0):
+                    _lane_tables_kernel(record, top, left, word, tables)
                 while visits != _U64(0):
-                    place, e, dy, row2 = _visit_kernel(lines, word, lowest_bit(visits))
+                    base, row, across = _visit_kernel(records, word, lowest_bit(visits))
                     visits &= visits - _U64(1)
-                    _blend_row_reverse_kernel(
-                        buffer, sums, place, e, dy, a2, row2, record, log2_cutoff, stop, alpha_max
+                    _blend_block_reverse_kernel(
+                        buffer, sums, tables, base, row, across, a2, record, log2_cutoff, stop, alpha_max
                     )  # fmt: skip
             for j in range(GRADIENT):
                 pair_gradients[_U64(p), _U64(j)] = fold(sums[j])
@@ -312,9 +334,9 @@ _blend_kernel = jit(_blend, contract=True)
 _blend_reverse_kernel = jit(_blend_reverse, contract=True)
 
 
-def composite_rows_forward(
+def composite_blocks_forward(
     records: FloatArray, lists: TileLists, settings: RasterSettings, background: FloatArray, width: int, height: int
-) -> tuple[Composite, RowsSaved]:
+) -> tuple[Composite, BlocksSaved]:
     """As `composite_forward`, on tiles of 64x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
 
     Edges: within one rounding of the cutoff or the stop the two paths may decide differently; the jump is then
@@ -324,11 +346,11 @@ def composite_rows_forward(
     out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
     share(_blend_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
-    return out, RowsSaved(records, lists, limits, out)
+    return out, BlocksSaved(records, lists, limits, out)
 
 
-def composite_rows_reverse(
-    d_colour: FloatArray, d_depth: FloatArray, d_opacity: FloatArray | None, saved: RowsSaved
+def composite_blocks_reverse(
+    d_colour: FloatArray, d_depth: FloatArray, d_opacity: FloatArray | None, saved: BlocksSaved
 ) -> FloatArray:
     """Pair gradients (pairs, 10), as `composite_reverse`; d_opacity None = zero, at no cost."""
     dtype = saved.records.dtype

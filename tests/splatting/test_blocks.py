@@ -21,10 +21,10 @@ from made_up_scenes import (
     turned_camera,
 )
 
-from endotsr.splatting import compositing, compositing_rows, compositing_tiles
+from endotsr.splatting import compositing, compositing_blocks, compositing_tiles
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, camera_centre
-from endotsr.splatting.compositing_tiles import TILE_HEIGHT, TILE_WIDTH
+from endotsr.splatting.compositing_tiles import TILE_HEIGHT, TILE_WIDTH, place
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.harmonics import harmonics_forward
@@ -52,7 +52,11 @@ from endotsr.vectors import lanes
 BACKGROUND = np.array([0.9, 0.1, 0.4])
 PATHS = {
     "definition": (compositing, compositing.composite_forward, compositing.composite_reverse),
-    "rows": (compositing_rows, compositing_rows.composite_rows_forward, compositing_rows.composite_rows_reverse),
+    "blocks": (
+        compositing_blocks,
+        compositing_blocks.composite_blocks_forward,
+        compositing_blocks.composite_blocks_reverse,
+    ),
 }
 CAMERA = plain_camera()
 
@@ -169,7 +173,7 @@ def both(scene: Scene, camera: Camera, settings=PAPER):
     """Images and gradients in one dictionary, of the definition and of the fast path."""
     background = BACKGROUND.astype(scene.position.dtype)
     results = []
-    for path in ("definition", "rows"):
+    for path in ("definition", "blocks"):
         images, gradients = run(scene, camera, settings, path, background=background)
         assert_finite(images, gradients)
         results.append({f"image {k}": a for k, a in images.items()} | gradients)
@@ -178,19 +182,19 @@ def both(scene: Scene, camera: Camera, settings=PAPER):
 
 @pytest.mark.parametrize("name", list(SCENES))
 def test_fast_path_equals_definition_float64(name):
-    definition, rows = both(*SCENES[name]())
-    assert_close(rows, definition, BOUNDS.get(name, 1e-12))
+    definition, fast = both(*SCENES[name]())
+    assert_close(fast, definition, BOUNDS.get(name, 1e-12))
 
 
 @pytest.mark.parametrize("name", list(SCENES))
 def test_fast_path_equals_definition_float32(name):
     scene, camera = SCENES[name]()
-    definition, rows = both(as_dtype(scene, np.float32), camera)
-    assert all(a.dtype == np.float32 for a in rows.values())
-    assert_close_l2(rows, definition, 1e-4)
+    definition, fast = both(as_dtype(scene, np.float32), camera)
+    assert all(a.dtype == np.float32 for a in fast.values())
+    assert_close_l2(fast, definition, 1e-4)
 
 
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 def test_needles_keep_their_digits_in_float32(path):
     """Gradients of 3000 px needles, float32 against float64 at the same inputs: relative L2 <= 1e-4.
 
@@ -220,25 +224,25 @@ def test_needles_keep_their_digits_in_float32(path):
     ids=["fine cutoff", "coarse cutoff and stop", "no stop", "sharp"],
 )
 def test_fast_path_equals_definition_for_other_dials(settings):
-    definition, rows = both(*random_65x47(), settings)
-    assert_close(rows, definition, 1e-10 if settings.alpha_max > 0.99 else 1e-11)
+    definition, fast = both(*random_65x47(), settings)
+    assert_close(fast, definition, 1e-10 if settings.alpha_max > 0.99 else 1e-11)
 
 
 def test_stacks_cost_at_most_a_hundred_roundings():
     """|fast - definition| <= 100 u n of the largest gradient when n opaque ones stand one behind the other."""
     n = 6
     scene = screen_scene(CAMERA, 30.2, 20.7, 3.0 + np.arange(n), 6.0, 0.985, rgb_for(20, n))
-    definition, rows = both(scene, CAMERA, PAPER._replace(transmittance_stop=0.0))
-    assert_close(rows, definition, 100 * n * U64)
+    definition, fast = both(scene, CAMERA, PAPER._replace(transmittance_stop=0.0))
+    assert_close(fast, definition, 100 * n * U64)
 
 
 def test_auto_takes_the_fast_path_exactly_where_it_computes_the_settings():
-    assert choose_path(PAPER, "auto") == "rows"
+    assert choose_path(PAPER, "auto") == "blocks"
     others = (EXACT, LEGACY, PAPER._replace(alpha_cutoff=0.0), PAPER._replace(alpha_max=1.0))
     for settings in (*others, PAPER._replace(support="everywhere")):
         assert choose_path(settings, "auto") == "definition"
         with pytest.raises(ValueError, match="definition"):
-            choose_path(settings, "rows")
+            choose_path(settings, "blocks")
     assert choose_path(PAPER, "definition") == "definition"
 
 
@@ -262,7 +266,7 @@ def test_hard_C8_lossless_box_fast_path(name, dtype):
         order = depth_order(projected.depth, visible)
         records = pack_records(order, projected, log_alpha, rgb)
         lists = tile_lists(box, order, TILE_WIDTH, TILE_HEIGHT, camera.width, camera.height)
-        out, _ = compositing_rows.composite_rows_forward(
+        out, _ = compositing_blocks.composite_blocks_forward(
             records, lists, PAPER, BACKGROUND.astype(dtype), camera.width, camera.height
         )
         results.append(out._asdict())
@@ -286,48 +290,81 @@ def test_a_picture_of_whole_tiles_has_no_tile_beside_it(width, height):
     camera = plain_camera(width, height, 40.0)
     u, v = np.linspace(3, width - 3, 5), np.linspace(2, height - 2, 5)
     scene = screen_scene(camera, u, v, np.arange(2.0, 7.0), 2.5, 0.7, rgb_for(5, 5))
-    fast, slow = run(scene, camera, PAPER, "rows"), run(scene, camera, PAPER, "definition")
+    fast, slow = run(scene, camera, PAPER, "blocks"), run(scene, camera, PAPER, "definition")
     assert_close(fast[0], slow[0], 1e-12)
     assert_close(fast[1], slow[1], 1e-12)
 
 
-def row_of(lines, y):
-    """Of row y of what `_spans` filled: dy, exponent, e, first and last column (-1 where it is not reached)."""
-    dy, exponent, e, low, reach = lines.reshape(5, TILE_HEIGHT)[:, y]
-    return dy, exponent, e, int(low), int(low + reach) if reach >= 0 else -1
+def places(like):
+    """Where each pixel of a tile stands in a plane, (TILE_HEIGHT, TILE_WIDTH)."""
+    return np.array([[int(place(like, y, x)) for x in range(TILE_WIDTH)] for y in range(TILE_HEIGHT)])
+
+
+def visited_and_lanes(record, top, left, log2_cutoff):
+    """Of every pixel of a tile: whether it is visited, and e, log2 alpha on the centre line and dy of its lane."""
+    count = lanes(record)
+    visited = np.zeros(TILE_WIDTH * TILE_HEIGHT, bool)
+    values = np.zeros((3, visited.size), record.dtype)
+    tables = np.empty(compositing_blocks.TABLES, record.dtype)
+    words = compositing_blocks._visits_kernel(record, top, left, log2_cutoff)
+    for word in range(visited.size // (64 * count)):
+        compositing_blocks._lane_tables_kernel(record, top, left, word, tables)
+        for bit in range(64):
+            base, row, across = compositing_blocks._visit_kernel(record, word, np.uint64(bit))
+            pixels = slice(int(base), int(base) + count)
+            visited[pixels] = int(words[word]) >> bit & 1
+            for k, part in enumerate((compositing_blocks.E, compositing_blocks.CENTRE_LINE, compositing_blocks.DY)):
+                values[k, pixels] = tables[int(row) + part : int(row) + part + count]
+            values[0, pixels] += across
+    index = places(record)
+    return visited[index], *values[:, index]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_every_chunk_of_every_row_is_visited_once(dtype):
-    """The words of visits against a loop over rows and over the chunks of each."""
-    rng, count = np.random.default_rng(4), lanes(np.empty(0, dtype))
-    lines = np.empty(5 * TILE_HEIGHT, dtype)
-    for _ in range(50):
-        column = rng.integers(0, TILE_WIDTH + 1, TILE_HEIGHT)
-        rows = lines.reshape(5, TILE_HEIGHT)
-        rows[:3] = rng.normal(size=(3, TILE_HEIGHT))
-        rows[3] = column
-        rows[4] = rng.choice([-1.0, 0.0, count - 0.5, float(count), 1e9], TILE_HEIGHT)
-        rows[4] = np.minimum(rows[4], TILE_WIDTH - 1 - column)
-        found, wanted = [], []
-        for word in range(TILE_WIDTH // (compositing_rows.CHUNKS * count)):
-            visits = int(compositing_rows._visits_kernel(lines, word))
-            bits = [bit for bit in range(64) if visits >> bit & 1]
-            found += [compositing_rows._visit_kernel(lines, word, np.uint64(bit)) for bit in bits]
-        for y in range(TILE_HEIGHT):
-            dy, row2, e, low, high = row_of(lines, y)
-            for x in range(low, high + 1, count):
-                wanted.append((y * compositing_tiles.PITCH + x, e + dtype(x - low), dy, row2))
-        assert sorted(found) == sorted(wanted)
+def test_every_pixel_of_a_tile_has_a_lane_of_its_own(dtype):
+    """A footprint over the whole tile visits every block once, and each lane has e and dy of its own pixel."""
+    record, (left, top) = np.zeros(RECORD, dtype), (128, 48)
+    record[[U, V, SLOPE, LOG2_OPACITY]] = 150.25, 51.75, 0.75, -0.5
+    record[[PRECISION, INVERSE_C]] = 1e-5, 2e-5
+    assert np.array_equal(np.sort(places(record).ravel()), np.arange(TILE_WIDTH * TILE_HEIGHT))
+    visited, e, centre_line, dy = visited_and_lanes(record, top, left, dtype(np.log2(1 / 255)))
+    assert visited.all()
+    x, y = left + np.arange(TILE_WIDTH) + 0.5, top + np.arange(TILE_HEIGHT)[:, None] + 0.5
+    wanted = np.broadcast_to(y - 51.75, dy.shape)
+    np.testing.assert_array_equal(dy, wanted)
+    np.testing.assert_array_equal(e, x - 150.25 - 0.75 * wanted)
+    tolerance = 4 * np.finfo(dtype).eps
+    np.testing.assert_allclose(centre_line, -0.5 - 0.5 * LOG2_E * 2e-5 * wanted**2, rtol=tolerance)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("v", [-9.0, 2.3, 7.9, 31.0])
+def test_only_blocks_that_the_ellipse_touches_are_visited(v, dtype):
+    """Each visited block has a row that the ellipse reaches and, in it, one of the columns; no other block has one."""
+    record, log2_cutoff = np.zeros(RECORD, dtype), dtype(np.log2(1 / 255))
+    record[[U, V, SLOPE, LOG2_OPACITY]] = 30.7, v, -1.5, -0.25
+    record[[PRECISION, INVERSE_C]] = 0.3, 0.05
+    visited = visited_and_lanes(record, 0, 0, log2_cutoff)[0]
+    x, dy = np.arange(TILE_WIDTH) + 0.5, (np.arange(TILE_HEIGHT) + 0.5 - v)[:, None]
+    reach = (-0.25 - log2_cutoff) / (0.5 * LOG2_E) - 0.05 * dy * dy
+    half_width = np.sqrt(np.maximum(reach, 0) / 0.3)
+    touched = (reach >= 0) & (np.abs(x - 30.7 + 1.5 * dy) <= half_width + np.array([-0.01, 0.01])[:, None, None])
+    rows = lanes(record) // 4
+    blocks = touched.reshape(2, TILE_HEIGHT // rows, rows, TILE_WIDTH // 4, 4).any(axis=(2, 4))
+    found = visited.reshape(TILE_HEIGHT // rows, rows, TILE_WIDTH // 4, 4)
+    assert np.array_equal(found.any(axis=(1, 3)), found.all(axis=(1, 3)))
+    seen = found.any(axis=(1, 3))
+    assert not (blocks[0] & ~seen).any() and not (seen & ~blocks[1]).any()
+    assert seen.any() == (v != 31.0)
 
 
 @pytest.mark.parametrize("distance", [0.0, 1e2, 1e3, 1e4, 3e4, 1e5, 1e6])
-def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
+def test_blocks_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
     """Where the centre is far off, rounding of the edge is many times a pixel's margin, unless that grows with it."""
     rng, f32 = np.random.default_rng(int(distance)), np.float32
     log2_cutoff, (left, top) = f32(np.log2(1 / 255)), (320, 160)
-    lines, passing = np.empty(5 * TILE_HEIGHT, f32), 0
-    for _ in range(400):
+    passing = 0
+    for _ in range(100):
         angle = rng.choice([0, np.pi / 2, np.pi, -np.pi / 2]) + rng.normal(0, 1e-6)  # edges along rows and columns
         aim = np.array([left + 16, top + 8]) + rng.uniform(-8, 8, 2)
         centre = aim - distance * np.array([np.cos(angle), np.sin(angle)])
@@ -339,27 +376,15 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
         record[U], record[V] = centre[0] - slope * (aim[1] - centre[1]), centre[1]
         record[PRECISION] = record[INVERSE_C] = sigma**-2
         record[LOG2_OPACITY] = log2_opacity
-        compositing_rows._spans_kernel(record, top, left, log2_cutoff, lines)
-        half_height = sigma * np.sqrt(2 * np.log(2) * (log2_opacity - log2_cutoff))
+        visited, e, centre_line, dy = visited_and_lanes(record, top, left, log2_cutoff)
         a2 = f32(0.5) * f32(LOG2_E) * record[PRECISION]
-        for y in range(TILE_HEIGHT):
-            dy, row2, e, low, high = row_of(lines, y)
-            shift, count = record[SLOPE] * dy, lanes(lines)
-            chunk, lane = np.divmod(np.arange(TILE_WIDTH) - low, count)
-            e = (f32(e) + (count * chunk).astype(f32)) + lane.astype(f32)
-            reached = np.flatnonzero(f32(row2) - a2 * e * e >= log2_cutoff)
-            passing += reached.size
-            if distance <= 100:
-                np.testing.assert_allclose(e, left + np.arange(TILE_WIDTH) + 0.5 - record[U] - shift, atol=1e-4)
-            if distance <= 100 and high >= low:  # no more rows than the ellipse has, but for a rounding
-                assert abs(top + y + 0.5 - record[V]) <= half_height * (1 + 1e-5) + 1e-3
-            if distance <= 100 and row2 > log2_cutoff:
-                middle, half = record[U] + shift - 0.5 - left, np.sqrt((row2 - log2_cutoff) / a2)
-                assert low >= min(max(np.floor(middle - half) - 1, 0), TILE_WIDTH)
-                assert high <= max(min(np.floor(middle + half) + 1, TILE_WIDTH - 1), -1)
-            if reached.size:
-                assert low <= reached[0] and reached[-1] <= high
-    assert passing > 1000
+        reached = centre_line - a2 * e * e >= log2_cutoff
+        passing += int(reached.sum())
+        assert not (reached & ~visited).any()
+        if distance <= 100:
+            wanted = left + np.arange(TILE_WIDTH) + 0.5 - record[U] - record[SLOPE] * dy
+            np.testing.assert_allclose(e, wanted, atol=1e-4)
+    assert passing > 250
 
 
 @pytest.mark.parametrize("cutoff", [1 / 255, 3e-4])  # of the second, the natural and the binary logarithm draw apart
@@ -367,8 +392,7 @@ def test_rows_and_spans_miss_no_pixel_of_a_far_away_edge_in_float32(distance):
 def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side, cutoff):
     """Round footprints whose edge goes through the centre of a pixel of their own row, and of their own column."""
     rng, f32 = np.random.default_rng(7), np.float32
-    log2_cutoff, lines = f32(np.log2(cutoff)), np.empty(5 * TILE_HEIGHT, f32)
-    reached = 0
+    log2_cutoff, reached = f32(np.log2(cutoff)), 0
     for _ in range(300):
         distance, log_alpha = 10 ** rng.uniform(-0.3, 6), f32(np.log(cutoff) + rng.uniform(0.01, 4))
         column, row = int(rng.integers(10, 22)), int(rng.integers(3, 13))
@@ -380,11 +404,10 @@ def test_a_pixel_on_the_very_edge_of_a_footprint_is_visited(side, cutoff):
             record[U], record[V] = (u, f32(row + 0.5)) if e else (f32(column + 0.5), v)
             record[PRECISION] = record[INVERSE_C] = f32(1) / variance
             record[LOG2_OPACITY] = log_alpha * f32(LOG2_E)
-            compositing_rows._spans_kernel(record, 0, 0, log2_cutoff, lines)
-            _, row2, _, low, high = row_of(lines, row)
-            if f32(row2) - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
+            visited, _, centre_line, _ = visited_and_lanes(record, 0, 0, log2_cutoff)
+            if centre_line[row, column] - f32(0.5) * f32(LOG2_E) * record[PRECISION] * e * e >= log2_cutoff:
                 reached += 1
-                assert low <= column <= high
+                assert visited[row, column]
     assert reached > 200
 
 
@@ -396,7 +419,7 @@ AT_THE_EDGE = {
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("path", ["definition", "rows"])
+@pytest.mark.parametrize("path", ["definition", "blocks"])
 @pytest.mark.parametrize("edge", list(AT_THE_EDGE))
 def test_a_pair_exactly_at_the_cutoff_the_stop_or_the_clamp_counts_in_both_passes(edge, path, dtype):
     changes, alpha = AT_THE_EDGE[edge]
@@ -418,7 +441,7 @@ def test_a_pair_exactly_at_the_cutoff_the_stop_or_the_clamp_counts_in_both_passe
 @pytest.mark.parametrize("height", [16, 1])
 def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(height, dtype):
     """Every batch is blended, and every record is asked for in its turn; small splats, so that the loops are short."""
-    count = 2 * compositing_rows.BATCH + 5
+    count = 2 * compositing_blocks.BATCH + 5
     places = np.random.default_rng(20).uniform(0, [[16], [height]], (2, count))
     camera = plain_camera(16, height)
     scene = screen_scene(camera, *places, 3 + 0.01 * np.arange(count), 0.5, 0.4, rgb_for(21, count))
@@ -429,7 +452,7 @@ def test_a_tile_with_more_pairs_than_a_batch_equals_the_definition(height, dtype
 
 def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
     rng, height, width = np.random.default_rng(0), TILE_HEIGHT, TILE_WIDTH
-    pitch, plane = compositing_tiles.PITCH, compositing_tiles.PLANE
+    plane = compositing_tiles.PLANE
     colour, d_colour = rng.normal(size=(2, 3, 3 * height, 3 * width))
     depth, d_depth, transmittance, d_opacity = rng.normal(size=(4, 3 * height, 3 * width))
     buffer = np.full(6 * plane, 7.0)
@@ -438,8 +461,6 @@ def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
     compositing_tiles.read_tile(buffer, height, width, *images)
     total = (d_colour * colour).sum(axis=0) + d_depth * depth - d_opacity * transmittance
     for k, image in enumerate((np.ones_like(depth), total, *d_colour, d_depth)):
-        cells = np.zeros((height, pitch))
-        cells[:, :width] = image[height : 2 * height, width : 2 * width]
         found = buffer[k * plane : (k + 1) * plane]
-        np.testing.assert_allclose(found[: cells.size], cells.ravel(), atol=1e-14)
-        assert not found[cells.size :].any()
+        np.testing.assert_allclose(found[places(buffer)], image[height : 2 * height, width : 2 * width], atol=1e-14)
+        assert not found[height * width :].any()
