@@ -211,7 +211,7 @@ class TrainingConfig(_Section, frozen=True, kw_only=True):
     """threads; 0 = all cores (results are bitwise equal for any number)"""
     precision: Literal["float32", "float64"] = "float32"
     """arithmetic of the run"""
-    checkpoint_every: PositiveCount = 500
+    checkpoint_every: PositiveCount = 1000
     """iterations between checkpoints"""
 
 

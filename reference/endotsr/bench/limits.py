@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from endotsr.config import PAPER, Config
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS
+from endotsr.splatting.records import GRADIENT, RECORD  # numbers of a Gaussian, and of a pair's gradients
 
-RECORD, GRADIENT = 11, 10  # numbers of a Gaussian that blending reads, and of a pair that it writes
 RADIX_BITS = 11  # of a digit of the depth sort
 
 # Floating-point operations, counted in the formulas.

@@ -61,7 +61,7 @@ def deformation_adam_step(
     inputs = (*parameters, saved.t, saved.basis == "quartic", d_offsets)
     settings = (rate, root, float(beta1), float(beta2), float(epsilon))
     count = saved.weight.shape[2]
-    offsets = np.zeros((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
+    offsets = np.empty((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
     tasks = CHANNELS * ((count + PIECE - 1) // PIECE)
     share(_step_kernel, tasks, *inputs, *moments, *settings, saved.t if ahead is None else float(ahead), offsets)
     return offsets if ahead is not None else None
@@ -92,13 +92,16 @@ def _step(
     for task in range(first, last):
         c, start = task // pieces, (task % pieces) * PIECE
         stop = min(count, start + PIECE)
+        later = offsets[c, start:stop]
+        for i in range(later.size):
+            later[i] = weight.dtype.type(0)
         for j in range(bases):
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
             reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)
             _adam_piece_kernel(weight, d_w, m_w, v_w, c, j, start, rate[0, c], root[0], beta1, beta2, epsilon)
             _adam_piece_kernel(centre, d_m, m_m, v_m, c, j, start, rate[1, c], root[1], beta1, beta2, epsilon)
             _adam_piece_kernel(width, d_s, m_s, v_s, c, j, start, rate[2, c], root[2], beta1, beta2, epsilon)
-            add_row(w, m, s, time_ahead, quartic, offsets[c, start:stop])
+            add_row(w, m, s, time_ahead, quartic, later)
 
 
 _step_kernel = jit(_step)

@@ -20,8 +20,9 @@ U, V, A, B, C, DET, Z, DRAWN = 0, GROUP, 2 * GROUP, 3 * GROUP, 4 * GROUP, 5 * GR
 PROJECTED = 8 * GROUP
 # Reverse: by position, scale, rotation; and for the pose: by J W, the entries J00, J11, J02, J12, by the view position.
 D_POSITION, D_SCALE, D_ROTATION = 0, 3 * GROUP, 6 * GROUP
-D_JW, JACOBIAN, D_VIEW = 15 * GROUP, 21 * GROUP, 25 * GROUP
-WITHOUT_POSE, WITH_POSE = 15, 28  # columns
+JW, JACOBIAN, VIEW = 15, 21, 25  # columns
+D_JW, D_JACOBIAN, D_VIEW = JW * GROUP, JACOBIAN * GROUP, VIEW * GROUP
+WITHOUT_POSE, WITH_POSE = JW, VIEW + AXES  # columns
 GRADIENTS = WITH_POSE * GROUP
 
 _U64 = np.uint64  # no index may count from the end
@@ -184,8 +185,8 @@ def _project_reverse(
                 results[_U64(D_POSITION + k * GROUP + lane)] = d_p if seen else zero
                 results[_U64(D_JW + k * GROUP + lane)] = d_jw0[k]
                 results[_U64(D_JW + (3 + k) * GROUP + lane)] = d_jw1[k]
-            results[_U64(JACOBIAN + lane)], results[_U64(JACOBIAN + GROUP + lane)] = j00, j11
-            results[_U64(JACOBIAN + 2 * GROUP + lane)], results[_U64(JACOBIAN + 3 * GROUP + lane)] = j02, j12
+            results[_U64(D_JACOBIAN + lane)], results[_U64(D_JACOBIAN + GROUP + lane)] = j00, j11
+            results[_U64(D_JACOBIAN + 2 * GROUP + lane)], results[_U64(D_JACOBIAN + 3 * GROUP + lane)] = j02, j12
             results[_U64(D_VIEW + lane)], results[_U64(D_VIEW + GROUP + lane)] = d_x, d_y
             results[_U64(D_VIEW + 2 * GROUP + lane)] = d_z
         write_group(results, start, count, d_out)
@@ -198,13 +199,13 @@ def _pose_reverse(first, last, position, visible, d_out, d_poses):
         for i in range(block * BLOCK, min(position.shape[1], (block + 1) * BLOCK)):
             if not visible[i]:
                 continue
-            d_jw0, d_jw1, d_view = d_out[15:18, i], d_out[18:21, i], d_out[25:28, i]
-            j00, j11, j02, j12 = d_out[21, i], d_out[22, i], d_out[23, i], d_out[24, i]
+            d_jw0, d_jw1 = d_out[JW:, i], d_out[JW + AXES :, i]
+            jacobian, d_view = d_out[JACOBIAN:, i], d_out[VIEW:, i]
             for k in range(AXES):
                 p = position[k, i]
-                d_pose[0, k] += j00 * d_jw0[k] + d_view[0] * p
-                d_pose[1, k] += j11 * d_jw1[k] + d_view[1] * p
-                d_pose[2, k] += j02 * d_jw0[k] + j12 * d_jw1[k] + d_view[2] * p
+                d_pose[0, k] += jacobian[0] * d_jw0[k] + d_view[0] * p
+                d_pose[1, k] += jacobian[1] * d_jw1[k] + d_view[1] * p
+                d_pose[2, k] += jacobian[2] * d_jw0[k] + jacobian[3] * d_jw1[k] + d_view[2] * p
                 d_pose[k, 3] += d_view[k]
 
 
