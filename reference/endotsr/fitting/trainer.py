@@ -5,6 +5,7 @@ everything else (targets, atoms, rates) is a function of the state, the sequence
 resumed run equals an uninterrupted one bit by bit, and no result depends on the number of threads.
 """
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -239,11 +240,8 @@ def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
 
 
 def _next_time(rng: np.random.Generator, shop: Workshop) -> float:
-    """Time of the next iteration; the generator is put back, as density control would draw from it first."""
-    state = rng.bit_generator.state
-    t = _draw_view(rng, shop)[1]
-    rng.bit_generator.state = state
-    return t
+    """Time of the next iteration, from a copy of the generator; density control would draw from it first."""
+    return _draw_view(copy.deepcopy(rng), shop)[1]
 
 
 def _draw_bridge(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
