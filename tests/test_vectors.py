@@ -19,7 +19,6 @@ from endotsr.vectors import (
 
 ROOM = 24
 THREE = 3 * GROUP
-ALL = 64
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
