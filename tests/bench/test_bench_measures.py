@@ -1,12 +1,14 @@
 """What the benchmarks count and fit; no test looks at a time."""
 
 import threading
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from endotsr.bench import clock, pairs, peaks, scaling, timing, workload
 from endotsr.bench.case import Case, measure, representative
+from endotsr.bench.clock import STAGES
 from endotsr.bench.limits import limits, work
 from endotsr.bench.stages import ns_per_pair
 from endotsr.bench.stages import table as stage_table
@@ -124,6 +126,30 @@ def test_memory_is_a_slope():
     assert scaling.memory({"gaussians": axis})["bytes_per_gaussian"] == pytest.approx(8)
     axis["peak_memory_bytes"][0] = None
     assert scaling.memory({"gaussians": axis})["bytes_per_gaussian"] is None
+
+
+def test_faster_pass_counts_at_every_size(monkeypatch):
+    """Sizes 1, 2, 3 up and down again; a neighbour is busy on the way up at 2 and on the way down at 1."""
+    said, order = [], []
+    times = iter([1.0, 9.0, 3.0, 3.5, 2.0, 8.0])
+
+    def measured(_, case):
+        order.append(case.gaussians)
+        stages = {name: {"median_ms": next(times) if name == scaling.REST else 0.0} for name in (*STAGES, scaling.REST)}
+        return {"case": asdict(case), "stages": stages, "parameters": 1, "peak_memory_bytes": None}
+
+    axis = scaling.Axis(
+        "Gaussians",
+        tuple(replace(scaling.BASE, gaussians=n) for n in (1, 2, 3)),
+        ("iteration",),
+        lambda result: float(result["case"]["gaussians"]),
+    )
+    monkeypatch.setattr(scaling, "axes", lambda largest: {"gaussians": axis})
+    monkeypatch.setattr(scaling, "apart", measured)
+    monkeypatch.setattr(scaling, "line", lambda result: "")
+    found = scaling.measure_scaling(3, ("gaussians",), said.append)["axes"]["gaussians"]
+    assert order == [1, 2, 3, 3, 2, 1] and len(said) == 6
+    assert found["size"] == [1, 2, 3] and found["median_ms"]["iteration"] == [1, 2, 3]
 
 
 def test_every_axis_varies_its_size_alone():

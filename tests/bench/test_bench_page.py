@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from endotsr.bench import charts, page, peers, scaling, start, suite, trained
+from endotsr.bench import charts, page, peers, scaling, stages, start, suite, trained
 from endotsr.bench.case import Case, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.page_parts import MAIN
@@ -127,6 +127,22 @@ def test_grid_is_every_combination():
 def test_refusals(words, said, capsys):
     assert main(["bench", *words]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["stages"], ["all", "--out", "{}/out"]])
+def test_wrong_scene_is_refused_before_anything_is_measured(words, tmp_path, monkeypatch, capsys):
+    measured = lambda *arguments: pytest.fail("measured before the scenes were looked at")
+    monkeypatch.setattr(stages, "apart", measured)
+    monkeypatch.setattr(start, "measure_start", measured)
+    words = [word.format(tmp_path) for word in words]
+    assert main(["bench", *words, "--scenes", str(tmp_path / "none.npz")]) == 2
+    assert "none.npz: not a trained scene" in capsys.readouterr().err
+
+
+def test_missing_page_is_refused_before_anything_is_measured(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(suite, "run_all", lambda *arguments: pytest.fail("measured before the page was looked for"))
+    assert main(["bench", "all", "--out", str(tmp_path), "--page", str(tmp_path / "none.md")]) == 2
+    assert "none.md: no such page" in capsys.readouterr().err
 
 
 def test_peers_without_torch_say_what_to_install(monkeypatch, capsys):

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from endotsr.bench.case import Case, Precision, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
+from endotsr.bench.trained import read_arrays
 
 Say = Callable[[str], None]
 
@@ -38,8 +39,13 @@ def grid(chosen: Grid) -> list[Case]:
 
 
 def measure_stages(cases: Iterable[Case], say: Say) -> dict[str, Any]:
-    """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}."""
+    """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
+
+    Raises: InputError before anything is measured, if the file of a case is not a trained scene.
+    """
     cases = list(cases)
+    for scene in {case.scene for case in cases if case.scene}:
+        read_arrays(Path(scene))
     numbers = sorted({case.threads for case in cases})
     before = [apart(measure_peaks, threads) for threads in numbers]
     results = []

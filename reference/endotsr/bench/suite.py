@@ -7,6 +7,7 @@ from typing import Any
 from endotsr.bench import charts, peers, scaling, stages, start
 from endotsr.bench.case import Case, Precision
 from endotsr.bench.stages import Say
+from endotsr.bench.trained import read_arrays
 from endotsr.errors import InputError
 from endotsr.runs import machine, now, versions, write_json
 
@@ -25,7 +26,12 @@ def dated(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def run_all(out: Path, scenes: tuple[Path, ...], say: Say) -> None:
-    """Measure and write everything into `out`. Without torch and gsplat the peers keep their last figures."""
+    """Measure and write everything into `out`. Without torch and gsplat the peers keep their last figures.
+
+    Raises: InputError before anything is measured, if a file of `scenes` is not a trained scene.
+    """
+    for path in scenes:
+        read_arrays(path)
     out.mkdir(parents=True, exist_ok=True)
     _keep(out / START_FILE, lambda: start.measure_start(3), start.table, say)
     cases = [

@@ -24,7 +24,7 @@ def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
 
     Raises: InputError naming the file and what is missing.
     """
-    found = _read(path)
+    found = read_arrays(path)
     position, log_scale = found["xyz"].T.astype(np.float64), found["log_scale"].T.astype(np.float64)
     low, high = np.percentile(position, PERCENTILES, axis=1)
     across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units a pixel
@@ -46,7 +46,11 @@ def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
     return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
 
 
-def _read(path: Path) -> dict[str, np.ndarray]:
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a trained scene.
+
+    Raises: InputError naming the file and what is missing or has another shape.
+    """
     try:
         with np.load(path) as file:
             found = {name: file[name] for name in ARRAYS}

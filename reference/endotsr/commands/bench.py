@@ -35,14 +35,7 @@ def run(words: list[str]) -> int:
 
 
 def _refuse_nothing(options: Any) -> None:
-    for name, least in (
-        ("gaussians", 4),
-        ("largest", 1000),
-        ("repeats", 1),
-        ("width", 16),
-        ("height", 16),
-        ("threads", 0),
-    ):
+    for name, least in LEAST.items():
         values = getattr(options, name, least)
         for value in values if isinstance(values, tuple) else (values,):
             if value < least:
@@ -128,6 +121,8 @@ def _start(options: StartOptions) -> None:
 def _all(options: AllOptions) -> None:
     from endotsr.bench import page, suite
 
+    if options.page and not options.page.is_file():
+        raise InputError(f"{options.page}: no such page; allowed: a file with marks, as docs/performance.md")
     suite.run_all(options.out, options.scenes, print)
     if options.page:
         page.write_page(options.out, options.page)
