@@ -125,20 +125,23 @@ def gain(found: Result) -> str:
 
 
 def cases(found: Result) -> str:
-    """One line for every case."""
+    """One line for every case; those of float64 beside float32 where that was measured."""
+    same = lambda case: tuple(value for name, value in case["case"].items() if name != "precision")
+    single = {same(c): c["iteration"]["median_ms"] for c in found["cases"] if c["case"]["precision"] == "float32"}
     rows = []
     for case in found["cases"]:
-        size, ns = case["case"], case["ns_per_pair"]
+        size, ns, ms = case["case"], case["ns_per_pair"], case["iteration"]["median_ms"]
+        double = size["precision"] == "float64" and same(case) in single
         rows.append(
             [
                 size["scene"] or f"{size['gaussians']:,}", size["precision"], str(size["threads"]),
-                f"{case['iteration']['median_ms']:.1f}", f"{case['splat']['median_ms']:.1f}",
+                f"{ms:.1f}", f"{ms / single[same(case)]:.2f}" if double else "", f"{case['splat']['median_ms']:.1f}",
                 f"{case['view']['blended'] / 1e6:.2f}",
                 *("-" if ns[name] is None else f"{ns[name]:.2f}" for name in ("blend forward", "blend reverse")),
                 memory(case["peak_memory_bytes"]),
             ]
         )  # fmt: skip
-    head = ["Gaussians", "precision", "threads", "iteration, ms", "splat, ms", "blended pairs, M"]
+    head = ["Gaussians", "precision", "threads", "iteration, ms", "times float32", "splat, ms", "blended pairs, M"]
     return table([*head, "blend forward, ns a pair", "blend reverse, ns a pair", "peak memory"], rows)
 
 
