@@ -14,9 +14,11 @@ from endotsr.conformance.format import SCHEMAS, Rule, schema_text
 from endotsr.conformance.generate import check, moved, solve_all
 from endotsr.conformance.generator import fnv1a, single, words
 from endotsr.conformance.npy import npy_bytes
+from endotsr.conformance.operations_splatting import raster_of
 from endotsr.conformance.solve import MARGIN, reference
 from endotsr.conformance.store import golden_folder, read_golden
 from endotsr.errors import InputError
+from endotsr.splatting.compositing_blocks import supports
 
 FOLDER = golden_folder()
 
@@ -241,3 +243,17 @@ def test_writing_ends_with_exit_code_1(copy):
     (copy / "cases/motion/generic/expected/translation.npy").unlink()
     assert run(["generate", "--golden", str(copy), "--write"]) == 1
     assert run(["generate", "--golden", str(copy)]) == 0
+
+
+@pytest.mark.parametrize("operation", ["composite", "render"])
+def test_the_reference_answers_by_two_paths(golden, operation):
+    """They differ in their last bits; a name that no path has is refused."""
+    cases = [case for case in golden.cases if case.operation == operation]
+    case = next(case for case in cases if supports(raster_of(case.settings)))
+    inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
+    answers = [
+        reference(all_operations()[operation], inputs, case.settings, "float32", p) for p in ("definition", "blocks")
+    ]
+    assert any(answers[0][name].tobytes() != answers[1][name].tobytes() for name in answers[0])
+    with pytest.raises(ValueError, match="'rows' is not known; allowed: definition, blocks"):
+        reference(all_operations()[operation], inputs, case.settings, "float32", "rows")

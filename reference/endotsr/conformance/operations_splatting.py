@@ -21,6 +21,7 @@ from endotsr.splatting.render import CONIC_EPSILON, Path, Scene, render_forward,
 from endotsr.splatting.settings import LegacyDeviations, RasterSettings
 
 Found = dict[str, NDArray | float | None]
+PATHS: tuple[Path, ...] = ("definition", "blocks")
 
 
 def raster_of(settings: Settings) -> RasterSettings:
@@ -41,9 +42,15 @@ def camera_of(inputs: Inputs, settings: Settings) -> Camera:
 
 
 def path_of(settings: Settings) -> Path:
-    """Which compositing path answers; both give the same up to rounding."""
-    blocks = settings.get("_path") == "blocks" and compositing_blocks.supports(raster_of(settings))
-    return "blocks" if blocks else "definition"
+    """Which compositing path answers; both give the same up to rounding.
+
+    `blocks` only where that path computes these settings.
+    Raises: ValueError for any other name.
+    """
+    asked = settings.get("_path", "definition")
+    if asked not in PATHS:
+        raise ValueError(f"_path: {asked!r} is not known; allowed: {', '.join(PATHS)}")
+    return "blocks" if asked == "blocks" and compositing_blocks.supports(raster_of(settings)) else "definition"
 
 
 def _covariance(inputs: Inputs, settings: Settings) -> Found:

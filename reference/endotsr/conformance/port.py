@@ -115,7 +115,7 @@ def _inputs(golden: Golden, case: Case) -> dict[str, np.ndarray]:
 
 def _answer(operation: str, inputs: dict, settings: dict[str, Any], precision: str) -> Outputs:
     """With the fast compositing where it applies: the expected values come from the other path."""
-    return reference(all_operations()[operation], inputs, settings, precision, "rows")
+    return reference(all_operations()[operation], inputs, settings, precision, "blocks")
 
 
 def _write(folder: Path, found: Outputs, names: list[str], precision: str) -> None:

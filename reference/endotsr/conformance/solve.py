@@ -12,6 +12,7 @@ from endotsr.conformance.format import Array, Because, Case, Mistake, Output, Ru
 from endotsr.conformance.generator import signs
 from endotsr.conformance.negative import Negative, Request, answer
 from endotsr.conformance.operation import Asked, Inputs, Operation, Outputs, in_precision, tidy
+from endotsr.splatting.render import Path
 
 MARGIN = 10.0  # a mistake counts as caught when it is this many tolerances large
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
@@ -35,8 +36,8 @@ class Solved(NamedTuple):
         return found
 
 
-def reference(operation: Operation, inputs: Inputs, settings: dict, precision: str, path: str) -> Outputs:
-    """The reference's own answer in one precision; path `rows` takes its fast compositing where it can."""
+def reference(operation: Operation, inputs: Inputs, settings: dict, precision: str, path: Path) -> Outputs:
+    """The reference's own answer in one precision; path `blocks` takes its fast compositing where it can."""
     return tidy(operation.compute(in_precision(inputs, precision), settings | {"_path": path}))
 
 
@@ -127,11 +128,11 @@ def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDA
 def _spreads(
     spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
 ) -> dict[str, tuple[float, float]]:
-    def run(arrays: Inputs, precision: str, path: str = "definition") -> Outputs:
+    def run(arrays: Inputs, precision: str, path: Path = "definition") -> Outputs:
         return reference(operation, arrays, spec.settings, precision, path)
 
-    double = [run(inputs, "float64", "rows")]
-    single = [run(inputs, "float32"), run(inputs, "float32", "rows")]
+    double = [run(inputs, "float64", "blocks")]
+    single = [run(inputs, "float32"), run(inputs, "float32", "blocks")]
     if any(a.dtype.kind == "f" for a in inputs.values()) and operation.name not in ("reading", "training"):
         double += [run(_shaken(spec, inputs, STEP["float64"], k), "float64") for k in (1, 2)]
         single += [run(_shaken(spec, inputs, STEP["float32"], k), "float64") for k in (1, 2)]
