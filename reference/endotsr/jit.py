@@ -24,16 +24,23 @@ import numba
 
 F = TypeVar("F", bound=Callable)
 
-_KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simulator", "evaluation", "tradeoff")
+_KERNEL_ROOMS = ("equations", "splatting", "losses", "scene", "fitting", "simulator", "evaluation", "tradeoff", "bench")
+
+
+def kernel_sources() -> list[Path]:
+    """Every source file that may define or inline a kernel."""
+    root = Path(__file__).parent
+    return [
+        root / "jit.py",
+        root / "vectors.py",
+        *(f for room in _KERNEL_ROOMS for f in sorted((root / room).glob("*.py"))),
+    ]
 
 
 def kernel_source_hash() -> str:
-    """First 16 hex digits of the SHA-256 over every source file that may define or inline a kernel."""
-    root = Path(__file__).parent
-    files = [root / "jit.py", root / "vectors.py"]
-    files += [f for room in _KERNEL_ROOMS for f in sorted((root / room).glob("*.py"))]
+    """First 16 hex digits of the SHA-256 over `kernel_sources` and the version of Numba."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for file in files:
+    for file in kernel_sources():
         digest.update(file.name.encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

@@ -157,7 +157,7 @@ def _lowest_bit(typing: Any, bits: Any) -> Any:
 
 @_instructions
 def _prefetch(typing: Any, table: Any, row: Any) -> Any:
-    """First and last number of the row: it may lie in two cache lines."""
+    """First and last number of the row: it may lie in two cache lines (of three the middle one comes by itself)."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = make_array(table)(context, builder, arguments[0])

@@ -128,7 +128,8 @@ def test_calibration_is_the_ratio_of_the_gradients_at_the_render(frame, rendered
     """r / median(g_lap / g_rgb), with a pyramid of its own where the model has none."""
     config = with_loss(ssim_weight=0.3, calibration_views=2)
     config = msgspec.structs.replace(config, model=msgspec.structs.replace(config.model, laplacian=laplacian))
-    monkeypatch.setattr(objective, "render_at", lambda *arguments: rendered)
+    left_out: list[dict] = []
+    monkeypatch.setattr(objective, "render_at", lambda *_, **without: left_out.append(without) or rendered)
     scene, clip = type("Scene", (), {"position": np.zeros((3, 1))}), Clip(frame)
     found = calibrate_on(scene, None, clip, config)  # type: ignore[arg-type]
     terms = parts(rendered, frame)
@@ -136,3 +137,4 @@ def test_calibration_is_the_ratio_of_the_gradients_at_the_render(frame, rendered
     assert found.lambda_lap == pytest.approx(config.loss.gradient_ratio / ratio, rel=1e-12)
     assert clip.asked == [(4, np.dtype(np.float64)), (9, np.dtype(np.float64))]
     assert "frame 4" in found.table and "frame 9" in found.table
+    assert left_out == [{"appearance": False, "spectral_motion": False}] * 2  # a rule of the base model

@@ -106,7 +106,8 @@ def page(result: dict[str, Any]) -> str:
         "judged against the differences of the right forward pass, along every line the checker takes; any other "
         "along two joint lines, and two lines of every block where the forward pass is quick.",
         "- `oracle`: tests that compare with an independent formula or library.",
-        "- `golden`: the reference against the stored answers of `golden/`, both paths and both precisions.",
+        "- `golden`: the reference against the stored answers of `golden/`, both paths in float64, the definition in "
+        "float32.",
         "- `hard`: the tests named after the catalogue of hard cases.",
         "- `properties`: all other tests of the numerical modules.",
         "",

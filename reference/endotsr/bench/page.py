@@ -1,7 +1,7 @@
 """The generated parts of the performance page: tables and sentences made from the JSON of `endotsr bench all`.
 
 A page holds pairs of marks `<!-- bench:NAME:start -->` and `<!-- bench:NAME:end -->`; what stands between them is
-replaced. All words around them are written by hand and hold no measured number.
+replaced. All words around them are written by hand.
 """
 
 import json

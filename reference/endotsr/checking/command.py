@@ -9,7 +9,7 @@ from endotsr.errors import InputError
 def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path | None = None) -> int:
     """Check the named pairs (None or empty = all), print the table, return the exit code.
 
-    names      pair names as in `<name>_forward`
+    names      pair names, as the table shows them
     seed       of the inputs, cotangents and directions; every pair draws its own stream from it
     json_path  where the JSON report goes; None = nowhere
     returns    0 when every check passed, else 1

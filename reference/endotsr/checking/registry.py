@@ -20,7 +20,7 @@ PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pair
 class Pair(NamedTuple):
     """One forward pass and its reverse pass, wrapped so that a checker needs to know nothing about them.
 
-    name      stage name, as in `<name>_forward`
+    name      stage name, with its variant where there are several
     equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
     inputs    rng -> float64 arrays; every one of them is differentiable; non-vacuous and away from kinks
     forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())

@@ -46,7 +46,7 @@ def _overview() -> str:
     lines = ["usage: endotsr bench WHAT [OPTIONS]", "", "what to measure:"]
     lines += [f"  {name:<10}{(options.__doc__ or '').splitlines()[0]}" for name, (options, _) in MEASURES.items()]
     return "\n".join(
-        [*lines, "", "`endotsr bench WHAT --help` lists the options; `iteration` is measured without WHAT."]
+        [*lines, "", "`endotsr bench WHAT --help` lists the options; options without WHAT measure `iteration`."]
     )
 
 

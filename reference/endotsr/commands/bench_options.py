@@ -99,7 +99,7 @@ class StartOptions:
 
 @dataclass
 class AllOptions:
-    """Everything above in one go, for a quiet machine: JSON, pictures, and the page that shows them."""
+    """Start, stages, peers and scaling in one go, for a quiet machine: JSON, pictures, and the page that shows them."""
 
     out: Path
     """folder for the results"""

@@ -38,7 +38,7 @@ class EvaluateOptions:
     sequence: Annotated[str | None, tyro.conf.arg(metavar="SEQUENCE")] = None
     """where the sequence of the run is now (default: where it was)"""
     lpips: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """AlexNet LPIPS weights (npz or pth)"""
+    """AlexNet LPIPS weights (.npz)"""
     paper_row: Annotated[Literal["pulling"] | None, tyro.conf.arg(metavar="{pulling}")] = None
     """also show the published figures of this clip"""
     threads: int = 0

@@ -35,8 +35,8 @@ class TradeoffOptions:
     scale: float = 1.0
     """size of the picture, relative to that of the scene"""
     budget: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
-    """print the cheapest measured setting that keeps a time per frame ("10 ms", "30 fps"), an error ("1/255", "1e-3")
-    or a training time ("5 min")"""
+    """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
+    ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
     images: bool = False
     """also keep image and gradients of every setting in DIR/images"""
     repeats: int = LEAST_REPEATS

@@ -9,7 +9,7 @@ activation. In: three arrays (10, B, N) and one time; out: ten offsets a Gaussia
 of what the offsets are used for.
 
 The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,
-basis) row is streamed once, in pieces that stay in the first-level cache.
+basis) row is streamed once, in pieces that stay in the second-level cache.
 """
 
 from typing import Literal, NamedTuple

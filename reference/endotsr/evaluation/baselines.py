@@ -12,7 +12,7 @@ flow_interpolation dense optical flow (DIS, medium) in both directions between t
 Excluded pixels. Only the temporal mean looks at the masks of the training frames: an instrument that passes through
 would otherwise be smeared over the tissue. The other three use the training pixels as they are, instrument included,
 and leave it to the metric to zero what is excluded in the *test* frame. On EndoNeRF `pulling` these choices give
-27.17, 37.71, 40.51 and 41.59 dB (full image, 7:1 split); zeroing the neighbours by their own masks first would
+27.17, 37.71, 40.51 and 41.61 dB (full image, 7:1 split); zeroing the neighbours by their own masks first would
 cost 10 dB, a temporal mean that ignores the masks 1.2 dB.
 """
 

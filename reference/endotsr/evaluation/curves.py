@@ -77,7 +77,7 @@ def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
 
 
 def charts(log: LogEntries, evaluation: dict[str, Any] | None = None) -> list[Chart]:
-    """All charts the given data allows: loss, PSNR, loss terms, Gaussians, held-out PSNR frame by frame."""
+    """All charts the given data allows: loss, PSNR, loss terms, Gaussians."""
     evaluation = evaluation or {}
     found = []
     if series(log, "loss")[0].size:

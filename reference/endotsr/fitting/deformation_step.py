@@ -1,7 +1,7 @@
 """Fast path of training: the reverse pass of the deformation, its Adam step and the next forward pass in one sweep.
 
 The gradient of the FDM is (3, 10, B, N), three quarters of all gradients, and is needed once. Here it exists
-for one piece of one row at a time, in the first-level cache. The curves of the next iteration are taken there as well,
+for one piece of one row at a time, in the second-level cache. The curves of the next iteration are taken there as well,
 from the numbers just changed: the arrays need not come from memory a second time. The arithmetic is that of
 `deformation_reverse`, `adam_update` and `deformation_forward`, in the same order: all results are equal bit by bit
 (tested).

@@ -149,13 +149,17 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
 def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, config: Config) -> Calibration:
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
+    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model.
+
     Raises: CalibrationError with a per-view table when no view gives a ratio.
     """
     chosen = sequence.train_index[calibration_views(len(sequence.train_index), config.loss.calibration_views)]
     views = []
     for index in chosen:
         frame = sequence.frame(int(index), gaussians.position.dtype)
-        rendered = render_at(gaussians, spectral, config, frame.camera, frame.time)
+        rendered = render_at(
+            gaussians, spectral, config, frame.camera, frame.time, appearance=False, spectral_motion=False
+        )
         targets = frame_targets(frame, config)
         supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)
         photometric = photometric_loss(rendered.colour, targets, config.loss.ssim_weight)

@@ -1,8 +1,9 @@
 """The training: one view an iteration, on the published schedule (specification, equation 6 and B10-B12).
 
-`TrainingState` is all that a run carries from one iteration to the next, and all that a checkpoint holds;
-everything else (targets, atoms, rates) is a function of the state, the sequence and the configuration. So a
-resumed run equals an uninterrupted one bit by bit, and no result depends on the number of threads.
+`TrainingState` is all that a run carries from one iteration to the next and, but for `ahead`, which is then computed
+anew, all that a checkpoint holds; everything else (targets, atoms, rates) is a function of the state, the sequence and
+the configuration. So a resumed run equals an uninterrupted one bit by bit, and no result depends on the number of
+threads.
 """
 
 import copy

@@ -37,7 +37,7 @@ class Pulsation(_Section, frozen=True, kw_only=True):
     on: bool = True
     """switch"""
     amplitude: NonNegative = 0.7
-    """scale of the displacement, mm (the beat reaches 1.3 times this)"""
+    """scale of the displacement, mm (the beat reaches 1.2 times this)"""
     cycles: Positive = 5.0
     """beats per sequence"""
     width: Positive = 9.0

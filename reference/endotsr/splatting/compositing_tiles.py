@@ -3,7 +3,7 @@
 The planes of a tile (T, red, ...) stand in one buffer at constant offsets and are indexed with unsigned integers: no
 alias or wrap-around checks, so the loops over pixels become vector code. In a plane the pixels of a block, as many as a
 vector has lanes, stand side by side, row after row of the block; blocks follow one another along a row of blocks.
-A tile is as wide as the first-level cache allows: a Gaussian across an edge is visited twice.
+A Gaussian across an edge is visited twice, so a tile is wide; a wider one leaves too few tiles to share.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
 The exponent of a Gaussian on the screen is -q/2 with q = r dy^2 + A (dx - m dy)^2, A = c/det, m = b/c,
 r = 1/c: a sum of squares, so q >= 0 always and a needle keeps its digits (B5). One record of 11 numbers
-per Gaussian stands in one or two cache lines; its gradient record has 10.
+per Gaussian stands in one or two cache lines (float64: two or three); its gradient record has 10.
 """
 
 import math

@@ -1,6 +1,6 @@
 """The generated parts of the documentation page: Markdown from the JSON files of docs/results.
 
-The words around them are written by hand and hold no measured number.
+The words around them are written by hand.
 """
 
 from typing import Any
