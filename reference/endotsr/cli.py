@@ -1,10 +1,12 @@
 """The command `endotsr`: finds the subcommand, imports it alone, and turns a person's mistakes into one line.
 
 Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit codes: 0 done, 1 a check or
-comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM).
+comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM), 141 stopped because
+the reader of its output left (128 + SIGPIPE, as other programs).
 """
 
 import importlib
+import io
 import os
 import sys
 
@@ -28,6 +30,8 @@ COMMANDS = {
 def main(argv: list[str] | None = None) -> int:
     """Run one command; `argv` without the program name. Returns the exit code."""
     argv = sys.argv[1:] if argv is None else argv
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal without the letters of a file name
     if not argv or argv[0] in ("-h", "--help"):
         print(_overview())
         return 0
@@ -50,7 +54,7 @@ def main(argv: list[str] | None = None) -> int:
         return 130
     except BrokenPipeError:  # the reader of our output left (`endotsr ... | head`)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return 141
     except OSError as error:
         from endotsr.runs import os_error_line
 

@@ -14,8 +14,12 @@ Numba's disk cache notices an edit of the file that holds a kernel, but not of t
 The cache therefore lives in a folder named after a hash of all kernel sources: an edited kernel is never stale.
 """
 
+import atexit
 import hashlib
 import os
+import shutil
+import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -51,7 +55,33 @@ def _use_hashed_cache_folder() -> None:
         return  # the caller chose a folder and keeps it fresh
     from platformdirs import user_cache_dir
 
-    numba.config.CACHE_DIR = os.path.join(user_cache_dir("endotsr"), "kernels", kernel_source_hash())  # type: ignore[attr-defined]
+    folder = Path(user_cache_dir("endotsr")) / "kernels" / kernel_source_hash()
+    if not _takes_files(folder):
+        folder = _passing_folder(folder)
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+
+
+def _takes_files(folder: Path) -> bool:
+    """Whether files can be made there. Numba would take another place without a word: beside the sources, unhashed."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _passing_folder(wanted: Path) -> Path:
+    """A folder of this process and its children, gone with it."""
+    folder = tempfile.mkdtemp(prefix="endotsr-kernels-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    warnings.warn(
+        f"{wanted} cannot be written: kernels are compiled anew at every start; "
+        "set NUMBA_CACHE_DIR to a folder that can be written",
+        stacklevel=1,
+    )
+    return Path(folder)
 
 
 _use_hashed_cache_folder()

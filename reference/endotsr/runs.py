@@ -61,6 +61,16 @@ class RunFolder:
         """sequence.json."""
         return _read_json(self.path / "sequence.json")
 
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Inside, this process alone trains the run; the system lets go of the lock of a process that was killed.
+
+        Raises: InputError if another process holds it. Without effect where the system or the disk knows no locks.
+        """
+        with self.log.open("ab") as file:
+            _lock(file, self.path)
+            yield
+
     def remove_leftovers(self) -> None:
         """Temporary files of a process that was killed."""
         for pattern in (".*.part", ".partial-*"):
@@ -70,6 +80,19 @@ class RunFolder:
     def update(self, **entries: Any) -> None:
         """Replace or add entries of run.json."""
         write_json(self.path / "run.json", self.record() | entries)
+
+
+def _lock(file: IO[bytes], path: Path) -> None:
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{path}: another process trains this run; let it end, or stop it") from None
+    except OSError:
+        return
 
 
 def refuse_existing(path: Path) -> None:

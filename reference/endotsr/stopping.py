@@ -3,14 +3,20 @@
 Python raises the exception at whatever the main thread is doing. Within a callback of compiled code (the loader of a
 kernel) nobody can catch it: Python drops it there, and the command goes on or fails of something else. Whoever works
 for long therefore asks `stop_asked` now and then, and calls an error after a signal an interruption.
+
+Work that would be lost half-done is put into `finishing`: there the first signal is only remembered for a moment.
 """
 
+import _thread
 import contextlib
 import signal
 import threading
 from collections.abc import Iterator
 
+PATIENCE = 0.7  # seconds that work inside `finishing` has to come to an end after the first signal
+
 _asked = threading.Event()
+_finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blocks, started by the first signal
 
 
 @contextlib.contextmanager
@@ -20,8 +26,13 @@ def signals_stop() -> Iterator[None]:
         yield
         return
 
-    def stop(*_: object) -> None:
+    def stop(number: int, _: object) -> None:
+        first = not _asked.is_set()
         _asked.set()
+        if first and _finishing:
+            _finishing[-1].args = (number,)
+            _finishing[-1].start()
+            return
         raise KeyboardInterrupt
 
     _asked.clear()
@@ -31,6 +42,22 @@ def signals_stop() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def finishing() -> Iterator[None]:
+    """Inside, the first signal raises nothing for PATIENCE seconds; whoever works there looks at `stop_asked`.
+
+    When they are over, or at a second signal, KeyboardInterrupt comes as everywhere else.
+    """
+    clock = threading.Timer(PATIENCE, _thread.interrupt_main)
+    clock.daemon = True
+    _finishing.append(clock)
+    try:
+        yield
+    finally:
+        _finishing.remove(clock)
+        clock.cancel()
 
 
 def stop_asked() -> bool:

@@ -94,6 +94,7 @@ def test_table_writes_a_dash_for_no_value():
         "baselines": {},
         "published": [],
         "training": {"mean": {}},
+        "run": {"iteration": 7, "iterations_planned": 7},
         "lpips_reason": "no weights",
     }
     table = held_out_table(metrics)

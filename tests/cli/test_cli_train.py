@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
 
+from endotsr import stopping
 from endotsr.cli import main
 from endotsr.commands import progress
 from endotsr.config import load_config
@@ -133,7 +134,7 @@ def test_a_signal_that_a_callback_swallows_still_stops_the_run(then, how, tmp_pa
     """Python drops an exception within a callback of compiled code; the run must not go on, nor end as a failure."""
     out, update, dropped = tmp_path / "run", progress.Progress.update, []
     monkeypatch.setattr(sys, "unraisablehook", lambda about: dropped.append(about.exc_type))
-    callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(how))
+    callback = ctypes.CFUNCTYPE(None)(lambda: (signal.raise_signal(how), signal.raise_signal(how), None)[-1])
 
     def interrupt(self, entry):
         update(self, entry)
@@ -152,8 +153,123 @@ def test_a_signal_that_a_callback_swallows_still_stops_the_run(then, how, tmp_pa
     assert code == 130 and "--resume" in said.strip().splitlines()[-1]
     assert RunFolder(out).record()["status"] == "interrupted"
     assert len((out / "log.jsonl").read_text().splitlines()) == 3
+    assert RunFolder(out).checkpoint.exists() == (then == "goes on")  # only a whole iteration is kept
     monkeypatch.undo()
     assert main(resume(out)) == 0  # the signal is forgotten
+
+
+def signal_at(number, monkeypatch, then):
+    """Sends a signal in the middle of an iteration, and does `then`."""
+    update = progress.Progress.update
+
+    def interrupt(self, entry):
+        update(self, entry)
+        if entry["iteration"] == number:
+            signal.raise_signal(signal.SIGINT)
+            then()
+
+    monkeypatch.setattr(progress.Progress, "update", interrupt)
+
+
+def test_a_signal_lets_the_iteration_end_and_nothing_is_lost(finished_run, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "run"
+    signal_at(4, monkeypatch, lambda: None)
+    code, said = run_line(capsys, *train_only(out))
+    assert code == 130 and "the checkpoint of iteration 4 is kept" in said.strip().splitlines()[-1]
+    monkeypatch.undo()
+    assert RunFolder(out).record()["iterations_done"] == 4
+    assert main(resume(out)) == 0
+    assert_same_run(finished_run, out)
+
+
+@pytest.mark.parametrize("how", ["a second signal", "the end of patience"])
+def test_an_iteration_that_does_not_end_is_given_up(how, finished_run, tmp_path, capsys, monkeypatch):
+    out, after = tmp_path / "run", []
+
+    def then():
+        if how == "a second signal":
+            signal.raise_signal(signal.SIGINT)
+        else:
+            time.sleep(60)
+        after.append("reached")
+
+    monkeypatch.setattr(stopping, "PATIENCE", 0.05)
+    signal_at(9, monkeypatch, then)
+    code, said = run_line(capsys, *train_only(out))
+    assert code == 130 and not after and "the checkpoint of iteration 7 is kept" in said.strip().splitlines()[-1]
+    monkeypatch.undo()
+    assert main(resume(out)) == 0
+    assert_same_run(finished_run, out)
+
+
+def test_results_of_an_unfinished_run_say_so_and_show_its_checkpoint_alone(tmp_path, capsys, monkeypatch):
+    """The log is two iterations longer than the checkpoint."""
+    out = tmp_path / "run"
+    signal_at(9, monkeypatch, lambda: signal.raise_signal(signal.SIGINT))
+    assert main(train_only(out)) == 130
+    monkeypatch.undo()
+    assert main(["evaluate", str(out)]) == 0
+    assert "checkpoint of iteration 7 of 30, the run is not finished" in capsys.readouterr().out
+    about = json.loads((out / "metrics.json").read_text())["run"]
+    assert (about["iteration"], about["iterations_planned"], about["status"]) == (7, 30, "interrupted")
+    page = (out / "report.html").read_text()
+    assert "7 of 30, the run is not finished" in page and "Gaussians at iteration 7" in page
+
+
+def test_a_signal_while_the_checkpoint_is_written_leaves_the_one_before(tmp_path, capsys, monkeypatch):
+    out, save = tmp_path / "run", trainer.save_state
+
+    def slow(path, state, *rest):
+        if state.iteration == 9:
+            signal.raise_signal(signal.SIGTERM)
+        save(path, state, *rest)
+
+    monkeypatch.setattr(trainer, "save_state", slow)
+    signal_at(9, monkeypatch, lambda: None)
+    code, said = run_line(capsys, *train_only(out))
+    assert code == 130 and "the checkpoint of iteration 7 is kept" in said.strip().splitlines()[-1]
+    assert RunFolder(out).record()["status"] == "interrupted"
+
+
+def test_a_run_is_trained_by_one_process_alone(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("fcntl")
+    out = tmp_path / "run"
+    signal_at(2, monkeypatch, lambda: None)
+    assert main(train_only(out)) == 130
+    monkeypatch.undo()
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    with RunFolder(out).locked():
+        assert_refused(capsys, resume(out), str(out), "another process trains this run")
+    assert before == {p.name: p.read_bytes() for p in out.iterdir()}
+    assert main(resume(out)) == 0  # the lock ends with its holder
+
+
+def test_weights_that_cannot_be_read_are_refused_before_the_training(tmp_path, capsys):
+    out = tmp_path / "run"
+    assert_refused(capsys, train_words(out, "--lpips", str(tmp_path / "none.npz")), "none.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes the reading end of a pipe")
+def test_a_reader_that_left_is_no_success(tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "endotsr.cli", *train_only(tmp_path / "run")]
+    assert subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=300).returncode == 141
+    os.close(writer)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes the standard output")
+@pytest.mark.parametrize("how", ["closed", "ascii"])
+def test_output_that_takes_no_text_does_not_stop_a_run(how, tmp_path):
+    out = tmp_path / "größe"
+    words = [sys.executable, "-m", "endotsr.cli", *train_only(out, "--iterations", "2")]
+    environment = os.environ | ({"PYTHONIOENCODING": "ascii"} if how == "ascii" else {})
+    close = (lambda: os.close(1)) if how == "closed" else None
+    done = subprocess.run(words, env=environment, preexec_fn=close, stderr=subprocess.PIPE, text=True, timeout=300)
+    assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr
+    assert RunFolder(out).record()["status"] == "finished"
 
 
 def test_an_error_without_a_signal_is_a_failure(tmp_path, monkeypatch):

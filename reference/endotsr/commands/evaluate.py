@@ -119,7 +119,12 @@ def _about_run(folder: RunFolder, model: "Model") -> dict[str, Any]:
         "versions",
         "machine",
     )
-    about = {"iteration": model.iteration, "gaussians": model.gaussians.count}
+    about = {
+        "iteration": model.iteration,
+        "iterations_planned": model.config.training.iterations,
+        "status": record.get("status"),
+        "gaussians": model.gaussians.count,
+    }
     return about | {key: record.get(key) for key in (*kept, "input")} | {"settings": msgspec.to_builtins(model.config)}
 
 
@@ -163,7 +168,8 @@ def _write_report(
     from endotsr.evaluation.report import write_report
     from endotsr.evaluation.report_data import FramePictures, ReportData
 
-    record, log = folder.record(), read_log(folder.log)
+    record, reached = folder.record(), metrics["run"]["iteration"]
+    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= reached]  # what the checkpoint has seen
     picture = curves_png(log, metrics)
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
@@ -221,6 +227,12 @@ def _gain(row: dict[str, Any], whole: dict[str, Any]) -> float | None:
     return None if a is None or b is None else a - b
 
 
+def iterations(run: dict[str, Any]) -> str:
+    """How far the measured checkpoint is: "6000", or "2000 of 6000, the run is not finished"."""
+    done, planned = run["iteration"], run["iterations_planned"]
+    return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
+
+
 def facts(metrics: dict[str, Any]) -> dict[str, Any]:
     """What a reader of the report wants to know about the run."""
     run = metrics["run"]
@@ -230,7 +242,7 @@ def facts(metrics: dict[str, Any]) -> dict[str, Any]:
         "Sequence": f"{about['source']}, {about['frames']} frames of {about['width']}x{about['height']}",
         "Frames": f"{about['training_frames']} for training, {about['held_out_frames']} held out",
         "Tissue": f"{about['tissue_share']:.1%} of the pixels",
-        "Iterations": run["iteration"],
+        "Iterations": iterations(run),
         "Gaussians": run["gaussians"],
         "Detail weight": run["lambda_lap"],
         "Seed": run["seed"],
@@ -257,6 +269,8 @@ def held_out_table(metrics: dict[str, Any]) -> str:
         lines.append(" ".join([f"{label:<{width}}", *cells]))
     inside = metrics["training"]["mean"].get("psnr_tissue")
     lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
+    if metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
+        lines.append(f"checkpoint of iteration {iterations(metrics['run'])}")
     if metrics["lpips_reason"]:
         lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")
     return "\n".join(lines)

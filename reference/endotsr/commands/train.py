@@ -1,7 +1,7 @@
 """`endotsr train`: a sequence in, a run folder out."""
 
+import contextlib
 import shutil
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ from endotsr.runs import (
     versions,
 )
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.stopping import stop_asked
+from endotsr.stopping import finishing, stop_asked
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
@@ -84,6 +84,8 @@ def run(words: list[str]) -> int:
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
         raise InputError("train: --out RUN is missing: the run folder to create")
+    if options.evaluate:
+        check_lpips(options.lpips)
     if options.resume:
         folder, sequence = _resume(options.out, options.sequence, words)
     else:
@@ -97,6 +99,13 @@ def run(words: list[str]) -> int:
 
         evaluate_run(folder, sequence, lpips=options.lpips)
     return 0
+
+
+def check_lpips(path: Path | None) -> None:
+    """Raises InputError for LPIPS weights that cannot be used: before a training, not after it."""
+    from endotsr.evaluation.lpips import load_lpips_weights
+
+    load_lpips_weights(path)
 
 
 def _settings(options: TrainOptions) -> Config:
@@ -137,7 +146,8 @@ def train_new(
     }
     folder = create_run(out, config, record, sequence_record(sequence))
     try:
-        train_on(folder, state, sequence, config)
+        with folder.locked():
+            train_on(folder, state, sequence, config)
     except RunStopped as stopped:
         if folder.checkpoint.exists():
             raise
@@ -168,18 +178,22 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
-    folder.remove_leftovers()
-    state = load_training(folder, kept) if folder.checkpoint.exists() else new_training(sequence, kept)
-    print(f"resuming {out} after iteration {state.iteration} of {kept.training.iterations}", flush=True)
-    if state.iteration < kept.training.iterations:
-        entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
-        folder.update(status="running", resumed=[*folder.record()["resumed"], entry])
-        train_on(folder, state, sequence, kept)
+    with folder.locked():
+        folder.remove_leftovers()
+        state = load_training(folder, kept) if folder.checkpoint.exists() else new_training(sequence, kept)
+        print(f"resuming {out} after iteration {state.iteration} of {kept.training.iterations}", flush=True)
+        if state.iteration < kept.training.iterations:
+            entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
+            folder.update(status="running", resumed=[*folder.record()["resumed"], entry])
+            train_on(folder, state, sequence, kept)
     return folder, sequence
 
 
 def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config) -> Any:
     """Train from `state` to the end, with log, checkpoints and progress; returns the last state.
+
+    A signal lets the iteration in hand end and writes a checkpoint, so that nothing is lost; a second signal, or an
+    iteration that takes too long, falls back to the last checkpoint.
 
     Raises:  KeyboardInterrupt or RunStopped (a full disk) with a line that says how to go on; the last checkpoint
              and the log up to it are whole in both cases. FloatingPointError if the loss is not finite.
@@ -194,14 +208,16 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
     offset, began = log.seconds, time.monotonic()
     last_tick = began
     saved = state.iteration if folder.checkpoint.exists() else None
+    whole = False  # whether the run was stopped between two iterations
 
     def on_iteration(entry: dict[str, Any]) -> None:
-        nonlocal last_tick
+        nonlocal last_tick, whole
         tick = time.monotonic()
         log.append(entry | {"seconds": round(tick - last_tick, 5)})
         last_tick = tick
         progress.update(entry)
         if stop_asked():
+            whole = True
             raise KeyboardInterrupt
 
     def on_checkpoint(reached: Any) -> None:
@@ -211,13 +227,18 @@ def train_on(folder: RunFolder, state: Any, sequence: "Sequence", config: Config
         folder.update(iterations_done=saved, lambda_lap=reached.lambda_lap, **_costs(offset, began))
 
     try:
-        compile_ahead(config, progress.say)
-        last = train(state, sequence, config, on_iteration, on_checkpoint, on_message=progress.say)
+        with finishing():
+            compile_ahead(config, progress.say)
+            last = train(state, sequence, config, on_iteration, on_checkpoint, on_message=progress.say)
         if saved != last.iteration:
             on_checkpoint(last)
         folder.update(status="finished", finished=now(), iterations_done=last.iteration, **_costs(offset, began))
     except (KeyboardInterrupt, Exception) as error:
         if isinstance(error, KeyboardInterrupt) or stop_asked():
+            if whole:
+                with contextlib.suppress(OSError, KeyboardInterrupt):  # the checkpoint before is still there
+                    progress.say(f"stopping after iteration {state.iteration}, writing a checkpoint")
+                    on_checkpoint(state)
             _mark(folder, "interrupted")
             raise KeyboardInterrupt(_way_on(folder, saved)) from None
         _mark(folder, "failed")
@@ -262,4 +283,4 @@ def _say_sequence(source: str, sequence: "Sequence") -> None:
     )
     for note in sequence.notes:
         print(f"  {note}")
-    sys.stdout.flush()
+    print(end="", flush=True)

@@ -31,10 +31,10 @@ def headline(data: ReportData) -> str:
         (mean.get("lpips"), 4, "", "LPIPS (AlexNet)"),
     ]
     boxes = [_card(parts.number(value, digits), unit, label) for value, digits, unit, label in cards if mean]
-    gaussians = curves.series(data.log, "gaussians")[1]
+    reached, gaussians = curves.series(data.log, "gaussians")
     seconds = curves.series(data.log, "seconds")[1]
     if gaussians.size:
-        boxes.append(_card(parts.cell(int(gaussians[-1])), "", "Gaussians at the end"))
+        boxes.append(_card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
     if "Training time" in data.facts:
         boxes.append(_card(parts.text(data.facts["Training time"]), "", "training time"))
     elif seconds.size:
