@@ -90,7 +90,10 @@ def test_evaluate_again_gives_the_same_numbers(finished_run, tmp_path, capsys):
 
 def test_table_writes_a_dash_for_no_value():
     metrics = {
-        "held_out": {"mean": {"psnr_full": None, "psnr_tissue": 20.0}, "per_frame": [{}]},
+        "held_out": {
+            "mean": {"psnr_full": None, "psnr_tissue": 20.0},
+            "per_frame": [{"name": "right", "psnr_tissue": 20.0}, {"name": "covered", "psnr_tissue": None}],
+        },
         "baselines": {},
         "published": [],
         "training": {"mean": {}},
@@ -99,6 +102,7 @@ def test_table_writes_a_dash_for_no_value():
     }
     table = held_out_table(metrics)
     assert "20.00" in table and "no weights" in table and "nan" not in table.lower()
+    assert "without a finite value there: covered" in table
 
 
 def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):

@@ -151,6 +151,13 @@ def test_absent_values_are_a_dash_with_a_reason(page):
     assert not re.search(r"\b(nan|inf|None)\b", " ".join(Reader(page).words))
 
 
+def test_a_frame_without_tissue_is_named():
+    rows = [{"frame": 3, "name": "right", "psnr_tissue": 30.0}, {"frame": 5, "name": "covered", "psnr_tissue": None}]
+    evaluation = {"held_out": {"mean": {"psnr_tissue": 30.0}, "per_frame": rows}, "baselines": {}}
+    page = report_html(ReportData(title="x", evaluation=evaluation))
+    assert "left out of the means of the tissue, without a finite value there: covered." in page
+
+
 def test_text_cannot_break_the_page():
     evil = '<script>alert("x")</script>&"\''
     page = report_html(

@@ -470,3 +470,13 @@ def test_a_tile_that_is_not_the_first_is_read_into_its_own_cells():
             found[places(buffer.dtype)], image[height : 2 * height, width : 2 * width], atol=1e-14
         )
         assert not found[height * width :].any()
+
+
+def test_the_opacity_of_a_picture_of_one_row_counts():
+    """`d_opacity` without rows means that nothing depends on it; one row is a picture."""
+    d_opacity, transmittance = np.random.default_rng(0).normal(size=(2, 1, TILE_WIDTH))
+    nothing, nothings = np.zeros((1, TILE_WIDTH)), np.zeros((3, 1, TILE_WIDTH))
+    buffer = np.zeros(6 * compositing_tiles.PLANE)
+    compositing_tiles.read_tile(buffer, 0, 0, nothings, nothing, transmittance, nothings, nothing, d_opacity)
+    behind = buffer[compositing_tiles.PLANE :][places(buffer.dtype)][0]
+    np.testing.assert_array_equal(behind, -(d_opacity * transmittance)[0])

@@ -257,6 +257,8 @@ def facts(metrics: dict[str, Any]) -> dict[str, Any]:
 
 def held_out_table(metrics: dict[str, Any]) -> str:
     """The held-out means of model, baselines and published figures as text."""
+    from endotsr.evaluation.evaluate import left_out
+
     rows = [("this model", metrics["held_out"]["mean"])]
     rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
     rows += [(entry["label"], entry) for entry in metrics["published"]]
@@ -269,6 +271,8 @@ def held_out_table(metrics: dict[str, Any]) -> str:
         lines.append(" ".join([f"{label:<{width}}", *cells]))
     inside = metrics["training"]["mean"].get("psnr_tissue")
     lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
+    if frames := left_out(metrics):
+        lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
     if metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
         lines.append(f"checkpoint of iteration {iterations(metrics['run'])}")
     if metrics["lpips_reason"]:

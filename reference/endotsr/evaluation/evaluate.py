@@ -75,6 +75,12 @@ def evaluate_frames(
     return Evaluation(tuple(rows), {key: summary[key] for key in keys}, excluded, bad)
 
 
+def left_out(evaluation: dict[str, Any]) -> list[str]:
+    """Names of the held-out frames whose tissue PSNR is no number, so that no mean holds it: frames without tissue."""
+    rows = (evaluation.get("held_out") or {}).get("per_frame") or []
+    return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
+
+
 def baseline_table(
     sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
 ) -> dict[str, dict[str, Any]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from endotsr.evaluation import curves, figures
 from endotsr.evaluation import report_parts as parts
+from endotsr.evaluation.evaluate import left_out
 from endotsr.evaluation.report_data import COLUMNS, FramePictures, ReportData
 
 OPENED_FRAMES = 3  # the worst frames are unfolded, the others one touch away
@@ -111,6 +112,8 @@ def _absent_reasons(data: ReportData) -> str:
     reasons = []
     if reason := data.evaluation.get("lpips_reason"):
         reasons.append(f"LPIPS: {reason}")
+    if frames := left_out(data.evaluation):
+        reasons.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
     if count := data.evaluation.get("not_finite"):
         reasons.append(f"{count} value(s) were not finite numbers and are shown as a dash")
     return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""
