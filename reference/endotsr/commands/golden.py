@@ -47,7 +47,7 @@ class RunOptions(_Reported):
     timeout: float = 600.0
     """seconds allowed for one call"""
     keep: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """keep requests and outputs in this folder"""
+    """keep requests and outputs in this folder, in place of those of an earlier run"""
 
 
 @dataclass
@@ -122,21 +122,24 @@ def _judge(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.conformance.judge import judge
-    from endotsr.conformance.port import run_port, write_requests
+    from endotsr.conformance.judge import judge, without_claim
+    from endotsr.conformance.port import KEPT, clear_kept, refuse_command, run_port, write_requests
     from endotsr.conformance.store import golden_folder, read_golden
 
     options = parse(RunOptions, words, "golden run")
+    refuse_command(options.port)
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
         root = options.keep or Path(scratch)
-        requests, folders = root / "requests", [root / "outputs", root / "outputs_again"]
+        requests, *folders = (root / name for name in KEPT)
+        clear_kept(root)
         write_requests(golden, requests, options.precision, options.level)
         calls = folders if options.level >= 5 else folders[:1]
         notes = [run_port(options.port, requests, folder, options.timeout) for folder in calls]
         again = folders[1] if options.level >= 5 else None
         report = judge(golden, folders[0], options.precision, level=options.level, again=again)
-        report.notes += filter(None, notes)
+        if any(notes):
+            without_claim(report, list(filter(None, notes)))
         return _tell(report, golden, folders[0], options)
 
 
