@@ -55,6 +55,12 @@ def test_unknown_name_and_unwritable_file(two_pairs, tmp_path):
         run(["right"], 0, tmp_path / "missing" / "report.json")
 
 
+def test_a_seed_below_zero_is_refused(two_pairs, capsys):
+    with pytest.raises(InputError, match="--seed -1 is not allowed; allowed: an integer >= 0"):
+        run(["right"], -1, None)
+    assert capsys.readouterr().out == ""
+
+
 def test_a_pair_stream_does_not_depend_on_other_pairs():
     one = registry.pair_stream("a", 0).random(3)
     assert np.array_equal(one, registry.pair_stream("a", 0).random(3))

@@ -3,13 +3,15 @@
 import json
 import shutil
 
+import numba
 import numpy as np
 import pytest
-from tiny import SEQUENCE, SETTINGS
+from tiny import SEQUENCE, SETTINGS, assert_refused
 
 from endotsr.cli import main
 from endotsr.commands.evaluate import held_out_table
 from endotsr.commands.pictures import depth_bytes, depth_step
+from endotsr.commands.threads import use_threads
 from endotsr.opencv import read_png
 
 
@@ -100,6 +102,19 @@ def test_table_writes_a_dash_for_no_value():
     assert "20.00" in table and "no weights" in table and "nan" not in table.lower()
 
 
+@pytest.mark.parametrize("command", ["evaluate", "render", "calibrate"])
+def test_threads_below_zero_are_refused(command, finished_run, tmp_path, capsys):
+    more = ["--out", str(tmp_path / "out")] if command == "render" else []
+    words = [command, str(finished_run), *more, "--threads", "-1"]
+    assert_refused(capsys, words, "threads", "-1 is not allowed; allowed: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_more_threads_than_cores_are_all_cores():
+    most = numba.config.NUMBA_NUM_THREADS
+    assert use_threads(10_000) == most and 1 <= use_threads(0) <= most and use_threads(1) == 1
+
+
 def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):
     before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
     words = ["calibrate", str(finished_run), "--json", str(tmp_path / "found.json"), "--loss.ssim-weight", "0.2"]
@@ -135,6 +150,11 @@ def test_bench_times_every_stage(tmp_path, capsys):
     slowest = max(stage["median_ms"] for stage in result["stages"].values())
     assert 0 < slowest and result["iteration"]["quartiles_ms"][1] > 0  # times themselves are not for a test
     assert all(name in said for name in result["stages"]) and "peak memory" in said
+
+
+@pytest.mark.parametrize("what", ["stages", "peers"])
+def test_bench_that_names_its_threads_takes_no_zero(what, capsys):
+    assert_refused(capsys, ["bench", what, "--threads", "0"], "--threads 0 is not allowed; allowed: an integer >= 1")
 
 
 def test_bench_refuses_nothing_to_time(capsys):

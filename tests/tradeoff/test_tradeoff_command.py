@@ -51,6 +51,7 @@ def test_budget_reads_the_measurement(measured, capsys):
         (["--run", "a", "--splats", "b"], "give one of --run and --splats"),
         (["--repeats", "3"], "allowed: an integer >= 7"),
         (["--scale", "0"], "allowed: a number > 0"),
+        (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
     ],
 )
 def test_mistakes(measured, capsys, words, said):
@@ -62,6 +63,7 @@ def test_mistakes_of_train(tmp_path, capsys):
     for words, said in (
         (["--minutes", "0"], "allowed: a number > 0"),
         (["--iterations", "0"], "allowed: an integer >= 1"),
+        (["--threads", "-1"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
         ([str(tmp_path / "none")], "not found"),
     ):
         assert main(["tradeoff", "train", "--out", str(tmp_path / "out"), *words]) == 2

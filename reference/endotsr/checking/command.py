@@ -13,7 +13,7 @@ def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path
     seed       of the inputs, cotangents and directions; every pair draws its own stream from it
     json_path  where the JSON report goes; None = nowhere
     returns    0 when every check passed, else 1
-    Raises:    InputError for an unknown name or an unwritable file.
+    Raises:    InputError for an unknown name, a seed below 0 or an unwritable file.
     """
     from endotsr.checking.checker import check_pair
     from endotsr.checking.precision import check_precision
