@@ -13,6 +13,7 @@ from endotsr.commands.evaluate import held_out_table
 from endotsr.commands.pictures import depth_bytes, depth_step
 from endotsr.commands.threads import use_threads
 from endotsr.opencv import read_png
+from endotsr.runs import os_error_line, write_json
 
 
 def render(run, out, *words):
@@ -108,6 +109,30 @@ def test_threads_below_zero_are_refused(command, finished_run, tmp_path, capsys)
     words = [command, str(finished_run), *more, "--threads", "-1"]
     assert_refused(capsys, words, "threads", "-1 is not allowed; allowed: ")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["missing/found.json", "file/found.json", ""])
+def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    file = str(tmp_path / name)
+    for words in (
+        ["calibrate", str(finished_run), "--json", file],
+        ["gradcheck", "--json", file],
+        ["golden", "judge", str(tmp_path), "--level", "0", "--json", file],
+        ["golden", "judge", str(tmp_path), "--level", "0", "--html", file],
+        ["golden", "run", "--port", "true {requests} {outputs}", "--level", "0", "--html", file],
+        *(["bench", what, "--json", file] for what in ("iteration", "stages", "scaling", "peers", "start")),
+        *(["bench", what, "--plot", file] for what in ("stages", "scaling")),
+    ):
+        assert_refused(capsys, words, f"error: {file}: cannot be written: ", "allowed: ")
+
+
+def test_an_error_while_writing_names_the_file_that_was_asked_for(tmp_path):
+    for folder in (tmp_path / "missing", tmp_path / "file"):
+        (tmp_path / "file").touch()
+        with pytest.raises(OSError, match=r"found\.json") as refused:
+            write_json(folder / "found.json", {})
+        assert os_error_line(refused.value).startswith(f"{folder / 'found.json'}: ")
 
 
 def test_more_threads_than_cores_are_all_cores():

@@ -15,6 +15,7 @@ from endotsr.commands.bench_options import (
 )
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
+from endotsr.runs import refuse_unwritable, write_json
 
 LEAST = {"gaussians": 4, "largest": 1000, "repeats": 1, "width": 16, "height": 16, "threads": 0}
 MORE = {"stages": {"threads": 1}, "peers": {"threads": 1}}  # their results name the number: it is not left open
@@ -31,6 +32,7 @@ def run(words: list[str]) -> int:
     options, measure = MEASURES[what]
     chosen = parse(options, rest, f"bench {what}")
     _refuse_nothing(what, chosen)
+    refuse_unwritable(getattr(chosen, "json", None), getattr(chosen, "plot", None))
     measure(chosen)
     return 0
 
@@ -53,7 +55,6 @@ def _overview() -> str:
 
 def _record(path: Path | None, result: dict[str, Any]) -> None:
     from endotsr.bench.suite import dated
-    from endotsr.runs import write_json
 
     if path:
         write_json(path, dated(result))

@@ -10,6 +10,7 @@ import tyro
 
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
+from endotsr.runs import refuse_unwritable
 
 Outdir = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUTDIR")]
 Level = Literal[0, 1, 2, 3, 4, 5]
@@ -116,6 +117,7 @@ def _judge(words: list[str]) -> int:
     for folder in filter(None, (options.outdir, options.again)):
         if not folder.is_dir():
             raise InputError(f"{folder}: not a folder")
+    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     report = judge(golden, options.outdir, options.precision, level=options.level, again=options.again)
     return _tell(report, golden, options.outdir, options)
@@ -128,6 +130,7 @@ def _run(words: list[str]) -> int:
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
+    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
         root = options.keep or Path(scratch)
