@@ -182,6 +182,24 @@ def test_bench_that_names_its_threads_takes_no_zero(what, capsys):
     assert_refused(capsys, ["bench", what, "--threads", "0"], "--threads 0 is not allowed; allowed: an integer >= 1")
 
 
+@pytest.mark.parametrize(
+    ("what", "name"),
+    [
+        *(("stages", name) for name in ("gaussians", "precisions", "threads")),
+        *(("peers", name) for name in ("gaussians", "precisions")),
+        ("scaling", "axes"),
+    ],
+)
+def test_bench_refuses_an_empty_list(what, name, capsys):
+    assert_refused(capsys, ["bench", what, f"--{name}"], f"--{name} is empty", "allowed: one or more")
+
+
+def test_bench_times_scenes_alone(tmp_path, capsys):
+    """An empty list of sizes is no mistake beside a scene; this one is then not found."""
+    words = ["bench", "stages", "--gaussians", "--scenes", str(tmp_path / "none.npz")]
+    assert_refused(capsys, words, "none.npz")
+
+
 def test_bench_refuses_nothing_to_time(capsys):
     assert main(["bench", "--repeats", "0"]) == 2
     assert "--repeats 0" in capsys.readouterr().err
