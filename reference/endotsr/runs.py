@@ -105,11 +105,32 @@ def refuse_existing(path: Path) -> None:
         )
     if os.path.lexists(path):
         raise InputError(f"{path}: exists already; choose another --out")
+    refuse_folder(path)
+
+
+def refuse_folder(path: Path) -> None:
+    """Raises InputError if this is no folder and cannot become one; makes nothing."""
+    if path.is_dir():
+        return
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already and is not a folder; choose another --out")
     above = next(parent for parent in path.absolute().parents if parent.exists())
     if not above.is_dir():
         raise InputError(f"{path}: cannot be created: {above} is not a folder")
     if not os.access(above, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be created: no permission to write in {above}")
+
+
+def refuse_unwritable(*files: Path | None) -> None:
+    """Raises InputError if one of the files (None = not asked for) cannot be written; called before the work."""
+    for file in filter(None, files):
+        above = file.parent
+        if file.is_dir():
+            raise InputError(f"{file}: cannot be written: it is a folder; allowed: the name of a file")
+        if not above.is_dir():
+            raise InputError(f"{file}: cannot be written: {above} is not a folder; allowed: a file in one that exists")
+        if not os.access(file if file.exists() else above, os.W_OK):
+            raise InputError(f"{file}: cannot be written: no permission")
 
 
 def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:
@@ -196,13 +217,19 @@ def write_json(path: Path, data: Any) -> None:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step."""
+    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step.
+
+    Raises: OSError of the file system, with `path` in place of the temporary name, which nobody gave.
+    """
     temporary = path.with_name(f".partial-{path.name}")  # keeps the ending, which writers look at
     try:
         write(temporary)
         os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):  # of a folder that is missing or is none
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
+            error.filename = str(path)
         raise
 
 

@@ -51,8 +51,29 @@ def test_same_seed_same_report(two_pairs, capsys):
 def test_unknown_name_and_unwritable_file(two_pairs, tmp_path):
     with pytest.raises(InputError, match="'left' is not a registered stage; allowed: right, wrong"):
         run(["left"], 0, None)
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match=r"missing/report\.json: cannot be written: .*missing is not a folder"):
         run(["right"], 0, tmp_path / "missing" / "report.json")
+
+
+def test_the_table_is_printed_before_the_file_is_written(monkeypatch, capsys, tmp_path):
+    folder = tmp_path / "vanishing"
+    folder.mkdir()
+
+    def inputs(rng):
+        if folder.exists():
+            folder.rmdir()
+        return {"x": rng.uniform(1, 2, 5)}
+
+    monkeypatch.setattr(registry, "all_pairs", lambda: {"right": square("right", 1.0)._replace(inputs=inputs)})
+    with pytest.raises(InputError, match=r"report\.json: cannot be written"):
+        run(["right"], 0, folder / "report.json")
+    assert "all passed" in capsys.readouterr().out
+
+
+def test_a_seed_below_zero_is_refused(two_pairs, capsys):
+    with pytest.raises(InputError, match="--seed -1 is not allowed; allowed: an integer >= 0"):
+        run(["right"], -1, None)
+    assert capsys.readouterr().out == ""
 
 
 def test_a_pair_stream_does_not_depend_on_other_pairs():

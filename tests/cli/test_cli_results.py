@@ -3,14 +3,17 @@
 import json
 import shutil
 
+import numba
 import numpy as np
 import pytest
-from tiny import SEQUENCE, SETTINGS
+from tiny import SEQUENCE, SETTINGS, assert_refused
 
 from endotsr.cli import main
 from endotsr.commands.evaluate import held_out_table
 from endotsr.commands.pictures import depth_bytes, depth_step
+from endotsr.commands.threads import use_threads
 from endotsr.opencv import read_png
+from endotsr.runs import os_error_line, write_json
 
 
 def render(run, out, *words):
@@ -105,6 +108,43 @@ def test_table_writes_a_dash_for_no_value():
     assert "without a finite value there: covered" in table
 
 
+@pytest.mark.parametrize("command", ["evaluate", "render", "calibrate"])
+def test_threads_below_zero_are_refused(command, finished_run, tmp_path, capsys):
+    more = ["--out", str(tmp_path / "out")] if command == "render" else []
+    words = [command, str(finished_run), *more, "--threads", "-1"]
+    assert_refused(capsys, words, "threads", "-1 is not allowed; allowed: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["missing/found.json", "file/found.json", ""])
+def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    file = str(tmp_path / name)
+    for words in (
+        ["calibrate", str(finished_run), "--json", file],
+        ["gradcheck", "--json", file],
+        ["golden", "judge", str(tmp_path), "--level", "0", "--json", file],
+        ["golden", "judge", str(tmp_path), "--level", "0", "--html", file],
+        ["golden", "run", "--port", "true {requests} {outputs}", "--level", "0", "--html", file],
+        *(["bench", what, "--json", file] for what in ("iteration", "stages", "scaling", "peers", "start")),
+        *(["bench", what, "--plot", file] for what in ("stages", "scaling")),
+    ):
+        assert_refused(capsys, words, f"error: {file}: cannot be written: ", "allowed: ")
+
+
+def test_an_error_while_writing_names_the_file_that_was_asked_for(tmp_path):
+    for folder in (tmp_path / "missing", tmp_path / "file"):
+        (tmp_path / "file").touch()
+        with pytest.raises(OSError, match=r"found\.json") as refused:
+            write_json(folder / "found.json", {})
+        assert os_error_line(refused.value).startswith(f"{folder / 'found.json'}: ")
+
+
+def test_more_threads_than_cores_are_all_cores():
+    most = numba.config.NUMBA_NUM_THREADS
+    assert use_threads(10_000) == most and 1 <= use_threads(0) <= most and use_threads(1) == 1
+
+
 def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):
     before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
     words = ["calibrate", str(finished_run), "--json", str(tmp_path / "found.json"), "--loss.ssim-weight", "0.2"]
@@ -140,6 +180,29 @@ def test_bench_times_every_stage(tmp_path, capsys):
     slowest = max(stage["median_ms"] for stage in result["stages"].values())
     assert 0 < slowest and result["iteration"]["quartiles_ms"][1] > 0  # times themselves are not for a test
     assert all(name in said for name in result["stages"]) and "peak memory" in said
+
+
+@pytest.mark.parametrize("what", ["stages", "peers"])
+def test_bench_that_names_its_threads_takes_no_zero(what, capsys):
+    assert_refused(capsys, ["bench", what, "--threads", "0"], "--threads 0 is not allowed; allowed: an integer >= 1")
+
+
+@pytest.mark.parametrize(
+    ("what", "name"),
+    [
+        *(("stages", name) for name in ("gaussians", "precisions", "threads")),
+        *(("peers", name) for name in ("gaussians", "precisions")),
+        ("scaling", "axes"),
+    ],
+)
+def test_bench_refuses_an_empty_list(what, name, capsys):
+    assert_refused(capsys, ["bench", what, f"--{name}"], f"--{name} is empty", "allowed: one or more")
+
+
+def test_bench_times_scenes_alone(tmp_path, capsys):
+    """An empty list of sizes is no mistake beside a scene; this one is then not found."""
+    words = ["bench", "stages", "--gaussians", "--scenes", str(tmp_path / "none.npz")]
+    assert_refused(capsys, words, "none.npz")
 
 
 def test_bench_refuses_nothing_to_time(capsys):

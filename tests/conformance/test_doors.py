@@ -1,5 +1,6 @@
 """The reference goes through the doors of a port: a folder of outputs, and a command called with requests."""
 
+import json
 import re
 import sys
 
@@ -108,6 +109,37 @@ def test_a_port_that_fails_gets_verdicts(tmp_path, capsys):
         run(["run", "--port", "true"])
     with pytest.raises(InputError, match="started"):
         run(["run", "--port", "no-such-program {requests} {outputs}"])
+
+
+def test_outputs_of_an_earlier_port_are_not_judged(tmp_path, capsys):
+    words = ["run", "--level", "0", "--keep", str(tmp_path / "kept"), "--port"]
+    reference = f"{sys.executable} -m endotsr.cli golden reference {{outputs}} --requests {{requests}}"
+    assert run([*words, reference]) == 0 and "level 0, float32" in capsys.readouterr().out
+    assert run([*words, f"{sys.executable} -c 0 {{requests}} {{outputs}}"]) == 1
+    said = capsys.readouterr().out
+    assert said.endswith("no level is complete\n") and " 0 of 10 outputs" in said
+    assert not list((tmp_path / "kept" / "outputs").iterdir())
+
+
+def test_a_port_that_answers_and_then_fails_has_no_claim(tmp_path, capsys):
+    script = tmp_path / "port.py"
+    script.write_text("import sys\nfrom endotsr.cli import main\nsys.exit(main(sys.argv[1:]) + 3)\n")
+    port = f"{sys.executable} {script} golden reference {{outputs}} --requests {{requests}}"
+    report = tmp_path / "report.json"
+    assert run(["run", "--level", "0", "--port", port, "--json", str(report)]) == 1
+    said = capsys.readouterr().out
+    assert "10 of 10 outputs" in said and said.endswith("no claim: the port ended with code 3\n")
+    assert json.loads(report.read_text())["level"] == -1
+
+
+@pytest.mark.parametrize("name", ["requests", "outputs", "outputs_again"])
+def test_foreign_files_in_the_kept_folder_stay(name, tmp_path):
+    mine = tmp_path / name / "mine.txt"
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    with pytest.raises(InputError, match=f"{name} was not made by .*allowed: a folder without requests, outputs"):
+        run(["run", "--level", "0", "--keep", str(tmp_path), "--port", "true {requests} {outputs}"])
+    assert mine.read_text() == "mine" and [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_refusal_like_no_known_mistake_says_so_and_shows_the_difference(golden, tmp_path):

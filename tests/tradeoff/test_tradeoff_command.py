@@ -1,11 +1,13 @@
 """`endotsr tradeoff` from the outside: files, second call, budget, mistakes."""
 
 import json
+from pathlib import Path
 
 import pytest
 from test_splat_file import write_npz
 
 from endotsr.cli import main
+from endotsr.tradeoff.results import Measurement, Trainings, read_result
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,7 @@ def test_budget_reads_the_measurement(measured, capsys):
         (["--run", "a", "--splats", "b"], "give one of --run and --splats"),
         (["--repeats", "3"], "allowed: an integer >= 7"),
         (["--scale", "0"], "allowed: a number > 0"),
+        (["--threads", "-1", "--out", "new"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
     ],
 )
 def test_mistakes(measured, capsys, words, said):
@@ -58,14 +61,73 @@ def test_mistakes(measured, capsys, words, said):
     assert said in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--run", "nope"],
+        ["--splats", "nope.ply"],
+        ["--splats", "nope.ply", "--images"],
+        ["--splats", "nope.ply", "--budget", "10 ms"],
+        ["train", "nope"],
+        ["train", "--scale", "0"],
+    ],
+)
+def test_a_refused_call_leaves_no_folder(words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tradeoff", *words, "--out", "out"]) == 2
+    assert capsys.readouterr().err.startswith("endotsr: error: ") and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [[], ["train"]])
+def test_an_output_folder_that_cannot_be_is_refused_before_the_work(words, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["tradeoff", *words, "--out", str(tmp_path / "file")]) == 2
+    assert "is not a folder" in capsys.readouterr().err
+    assert main(["tradeoff", *words, "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "is not a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "budget", "key"), [("tradeoff", "1/255", "scene"), ("training", "1 h", "sequence")])
+def test_a_measurement_without_its_keys_is_refused(name, budget, key, tmp_path, capsys):
+    (tmp_path / f"{name}.json").write_text('{"format": 1}')
+    assert main(["tradeoff", "--out", str(tmp_path), "--budget", budget]) == 2
+    said = capsys.readouterr().err
+    assert f"{name}.json: not a whole measurement" in said and f"missing required field `{key}`" in said
+
+
+def test_keys_that_are_missing_deeper_are_named_too(measured, tmp_path, capsys):
+    whole = json.loads((measured / "out" / "tradeoff.json").read_text())
+    without = {key: value for key, value in whole["points"][0].items() if key != "both"}
+    for change, said in (
+        ({"points": [without]}, "missing required field `both` - at `$.points[0]`"),
+        ({"points": 3}, "Expected `array`, got `int` - at `$.points`"),
+        ({"points": whole["points"][:0]}, "which is not among the points"),
+        ({"fronts": {"forward": []}}, "fronts.forward"),
+    ):
+        (tmp_path / "tradeoff.json").write_text(json.dumps(whole | change))
+        assert main(["tradeoff", "--out", str(tmp_path), "--budget", "1/255"]) == 2
+        assert said in capsys.readouterr().err
+
+
+RESULTS = sorted((Path(__file__).parents[2] / "docs" / "results").glob("tradeoff*.json"))
+
+
+@pytest.mark.parametrize("file", RESULTS, ids=lambda file: file.stem)
+def test_recorded_measurements_are_whole(file):
+    assert read_result(file, Trainings if "training" in file.name else Measurement)["format"] == 1
+
+
 def test_mistakes_of_train(tmp_path, capsys):
     for words, said in (
         (["--minutes", "0"], "allowed: a number > 0"),
         (["--iterations", "0"], "allowed: an integer >= 1"),
+        (["--threads", "-1"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
         ([str(tmp_path / "none")], "not found"),
     ):
         assert main(["tradeoff", "train", "--out", str(tmp_path / "out"), *words]) == 2
         assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "out").mkdir()
     (tmp_path / "out" / "training.json").write_text("{}")
     assert main(["tradeoff", "train", "--out", str(tmp_path / "out")]) == 2
     assert "not a measurement of this version" in capsys.readouterr().err

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.errors import InputError
+
 Arrays = Mapping[str, NDArray]
 
 PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses", "pairs_chain")
@@ -59,7 +61,12 @@ def all_pairs() -> dict[str, Pair]:
 
 
 def pair_stream(name: str, seed: int) -> np.random.Generator:
-    """The random stream of one pair: depends on its name and the seed only, not on which other pairs run."""
+    """The random stream of one pair: depends on its name and the seed only, not on which other pairs run.
+
+    Raises: InputError for a seed below 0, which NumPy does not take.
+    """
+    if seed < 0:
+        raise InputError(f"--seed {seed} is not allowed; allowed: an integer >= 0")
     return np.random.default_rng([seed, *name.encode()])
 
 

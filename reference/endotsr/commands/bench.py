@@ -15,8 +15,11 @@ from endotsr.commands.bench_options import (
 )
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
+from endotsr.runs import refuse_unwritable, write_json
 
 LEAST = {"gaussians": 4, "largest": 1000, "repeats": 1, "width": 16, "height": 16, "threads": 0}
+MORE = {"stages": {"threads": 1}, "peers": {"threads": 1}}  # their results name the number: it is not left open
+LISTS = ("gaussians", "precisions", "threads", "axes")
 
 
 def run(words: list[str]) -> int:
@@ -29,17 +32,23 @@ def run(words: list[str]) -> int:
         raise InputError(f"bench: unknown {what!r}; allowed: {', '.join(MEASURES)}")
     options, measure = MEASURES[what]
     chosen = parse(options, rest, f"bench {what}")
-    _refuse_nothing(chosen)
+    _refuse_nothing(what, chosen)
+    refuse_unwritable(getattr(chosen, "json", None), getattr(chosen, "plot", None))
     measure(chosen)
     return 0
 
 
-def _refuse_nothing(options: Any) -> None:
-    for name, least in LEAST.items():
+def _refuse_nothing(what: str, options: Any) -> None:
+    for name, least in (LEAST | MORE.get(what, {})).items():
         values = getattr(options, name, least)
         for value in values if isinstance(values, tuple) else (values,):
             if value < least:
                 raise InputError(f"bench: --{name} {value} is not allowed; allowed: an integer >= {least}")
+    scenes = getattr(options, "scenes", ())
+    for name in LISTS:
+        if getattr(options, name, None) == () and not (name == "gaussians" and scenes):
+            other = ", or none with --scenes" if name == "gaussians" and what == "stages" else ""
+            raise InputError(f"bench: --{name} is empty, which leaves nothing to time; allowed: one or more{other}")
 
 
 def _overview() -> str:
@@ -52,7 +61,6 @@ def _overview() -> str:
 
 def _record(path: Path | None, result: dict[str, Any]) -> None:
     from endotsr.bench.suite import dated
-    from endotsr.runs import write_json
 
     if path:
         write_json(path, dated(result))

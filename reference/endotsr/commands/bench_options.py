@@ -36,7 +36,7 @@ class StagesOptions:
     """Time every stage of an iteration, beside the limit that the measured peaks of this machine set it."""
 
     gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
-    """numbers of Gaussians of the common workload; none with an empty list"""
+    """numbers of Gaussians of the common workload; none with an empty list, beside --scenes"""
     scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
     """trained scenes (npz) to time as well"""
     precisions: tuple[Precision, ...] = ("float32", "float64")

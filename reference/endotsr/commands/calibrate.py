@@ -8,7 +8,7 @@ import tyro
 
 from endotsr.commands.options import differences, parse, with_short_names
 from endotsr.config import PAPER, Config
-from endotsr.runs import open_run, write_json
+from endotsr.runs import open_run, refuse_unwritable, write_json
 
 
 @dataclass
@@ -43,6 +43,7 @@ def run(words: list[str]) -> int:
     folder = open_run(first.run)
     kept = folder.config()
     options = parse(CalibrateOptions, words, "calibrate", CalibrateOptions(settings=kept))
+    refuse_unwritable(options.json)
     config = with_short_names(options.settings, {"threads": options.threads})
     model = load_model(folder)
     use_threads(config.training.threads)

@@ -10,6 +10,7 @@ import tyro
 
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
+from endotsr.runs import refuse_unwritable
 
 Outdir = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUTDIR")]
 Level = Literal[0, 1, 2, 3, 4, 5]
@@ -47,7 +48,7 @@ class RunOptions(_Reported):
     timeout: float = 600.0
     """seconds allowed for one call"""
     keep: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """keep requests and outputs in this folder"""
+    """keep requests and outputs in this folder, in place of those of an earlier run"""
 
 
 @dataclass
@@ -116,27 +117,32 @@ def _judge(words: list[str]) -> int:
     for folder in filter(None, (options.outdir, options.again)):
         if not folder.is_dir():
             raise InputError(f"{folder}: not a folder")
+    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     report = judge(golden, options.outdir, options.precision, level=options.level, again=options.again)
     return _tell(report, golden, options.outdir, options)
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.conformance.judge import judge
-    from endotsr.conformance.port import run_port, write_requests
+    from endotsr.conformance.judge import judge, without_claim
+    from endotsr.conformance.port import KEPT, clear_kept, refuse_command, run_port, write_requests
     from endotsr.conformance.store import golden_folder, read_golden
 
     options = parse(RunOptions, words, "golden run")
+    refuse_command(options.port)
+    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
         root = options.keep or Path(scratch)
-        requests, folders = root / "requests", [root / "outputs", root / "outputs_again"]
+        requests, *folders = (root / name for name in KEPT)
+        clear_kept(root)
         write_requests(golden, requests, options.precision, options.level)
         calls = folders if options.level >= 5 else folders[:1]
         notes = [run_port(options.port, requests, folder, options.timeout) for folder in calls]
         again = folders[1] if options.level >= 5 else None
         report = judge(golden, folders[0], options.precision, level=options.level, again=again)
-        report.notes += filter(None, notes)
+        if any(notes):
+            without_claim(report, list(filter(None, notes)))
         return _tell(report, golden, folders[0], options)
 
 

@@ -2,9 +2,17 @@
 
 import os
 
+from endotsr.errors import InputError
+
 
 def use_threads(asked: int) -> int:
-    """Let compiled kernels use `asked` threads (0 = all cores), which changes no result; returns the number."""
+    """Let compiled kernels use `asked` threads (0 = all cores), which changes no result; returns the number.
+
+    More than Numba has started, one a core, means all of them. Raises InputError for a number below 0.
+    """
+    if asked < 0:
+        raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")
+
     import numba
 
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]

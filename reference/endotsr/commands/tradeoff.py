@@ -8,7 +8,7 @@ import tyro
 
 from endotsr.commands.options import parse
 from endotsr.errors import InputError
-from endotsr.runs import write_json
+from endotsr.runs import refuse_folder, write_json
 
 if TYPE_CHECKING:
     from endotsr.tradeoff.budget import Budget
@@ -60,12 +60,12 @@ def run(words: list[str]) -> int:
         budget = parse_budget(options.budget)
         if budget.kind == "training":
             return _say_training(options.out, budget)
-    from endotsr.tradeoff.results import read_result
+    from endotsr.tradeoff.results import Measurement, read_result
 
     file = options.out / RESULT
     if budget is None and file.exists():
         raise InputError(f"{options.out}: holds a measurement already; choose another --out, or ask it with --budget")
-    result = read_result(file) if file.exists() else _measure(options)
+    result = read_result(file, Measurement) if file.exists() else _measure(options)
     if budget is not None:
         from endotsr.tradeoff.budget import frame_advice
 
@@ -92,8 +92,9 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
 
     use_threads(options.threads)
     out = options.out
-    (out / "images" if options.images else out).mkdir(parents=True, exist_ok=True)
+    refuse_folder(out)
     scene = chosen_scene(options)
+    (out / "images" if options.images else out).mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:
         found = run_study(
             scene,
@@ -128,12 +129,12 @@ def chosen_scene(options: TradeoffOptions) -> "StudyScene":
 
 def _say_training(out: Path, budget: "Budget") -> int:
     from endotsr.tradeoff.budget import training_advice
-    from endotsr.tradeoff.results import read_result
+    from endotsr.tradeoff.results import Trainings, read_result
 
     file = out / TRAINING
     if not file.exists():
         raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
-    print("\n".join(training_advice(read_result(file), budget).lines))
+    print("\n".join(training_advice(read_result(file, Trainings), budget).lines))
     return 0
 
 

@@ -11,6 +11,7 @@ from endotsr.commands.options import parse
 from endotsr.commands.sources import SIMULATED
 from endotsr.commands.tradeoff import TRAINING, StepBar
 from endotsr.errors import InputError
+from endotsr.runs import refuse_folder
 
 
 @dataclass
@@ -58,7 +59,7 @@ def run(words: list[str]) -> int:
     preset = options.preset or ("demo" if options.sequence == SIMULATED else "paper")
     data = msgspec.to_builtins(PRESETS[preset])
     data["sequence"]["scale"] = options.scale
-    options.out.mkdir(parents=True, exist_ok=True)
+    refuse_folder(options.out)
     with StepBar("iterations") as bar:
         result = run_training_study(
             options.out / TRAINING,

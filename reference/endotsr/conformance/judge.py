@@ -53,7 +53,7 @@ class Report(msgspec.Struct, kw_only=True):
     precision: str
     asked_level: int
     level: int
-    """highest level that is complete, -1 = none"""
+    """highest level that is complete, -1 = none; also of a port that fails"""
     without: tuple[str, ...]
     """operations that the port declares not to do"""
     claim: str
@@ -121,6 +121,12 @@ def conclude(
         claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
         suspects=suspects_of(golden, {r.name: (r.status, r.looks_like) for r in reports}), notes=notes,
     )  # fmt: skip
+
+
+def without_claim(report: Report, reasons: list[str]) -> None:
+    """Take the claim away: a port that fails has none, whatever it wrote before it failed."""
+    report.notes += reasons
+    report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
 
 
 def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...]) -> str:

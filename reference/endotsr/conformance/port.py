@@ -1,6 +1,8 @@
 """The two file doors: requests that a port answers, and the reference as a port of itself."""
 
+import os
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,31 @@ from endotsr.conformance.operation import Outputs
 from endotsr.conformance.solve import reference, stored
 from endotsr.conformance.store import Golden
 from endotsr.errors import InputError
+
+KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golden run`
+
+
+def clear_kept(root: Path) -> None:
+    """Remove what an earlier `golden run --keep` left in this folder, so that old outputs are never judged.
+
+    Ours are the folders below, if the requests among them are such that `write_requests` made.
+    Raises: InputError if one of the names is taken by anything else; nothing is removed then.
+    """
+    taken = [path for path in (root / name for name in KEPT) if os.path.lexists(path)]
+    if not taken:
+        return
+    try:
+        read_struct(root / KEPT[0] / "requests.json", Requests)
+        foreign = [path for path in taken if path.is_symlink() or not path.is_dir()]
+    except (OSError, msgspec.DecodeError):
+        foreign = taken
+    if foreign:
+        raise InputError(
+            f"--keep: {foreign[0]} was not made by `endotsr golden run` and is left alone; "
+            f"allowed: a folder without {', '.join(KEPT)}, or one of an earlier run"
+        )
+    for path in taken:
+        shutil.rmtree(path)
 
 
 def write_requests(golden: Golden, folder: Path, precision: Precision, level: int) -> None:
@@ -45,13 +72,18 @@ def write_requests(golden: Golden, folder: Path, precision: Precision, level: in
     (folder / "requests.json").write_text(to_json(head), encoding="utf-8")
 
 
+def refuse_command(command: str) -> None:
+    """Raises InputError if a port's command does not say where {requests} and {outputs} go."""
+    if "{requests}" not in command or "{outputs}" not in command:
+        raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+
+
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
     """Call the port's command once; returns a note when it failed. No shell is involved.
 
     Raises: InputError if the command names no {requests} or {outputs}, or cannot be started.
     """
-    if "{requests}" not in command or "{outputs}" not in command:
-        raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+    refuse_command(command)
     outputs.mkdir(parents=True, exist_ok=True)
     try:
         split = shlex.split(command)

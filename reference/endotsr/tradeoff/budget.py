@@ -4,6 +4,7 @@ Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), an error (`1/255`, `0.5/
 training time (`5 min`, `1 h`).
 """
 
+import math
 import re
 from typing import Any, Literal, NamedTuple
 
@@ -35,19 +36,25 @@ class Advice(NamedTuple):
 def parse_budget(text: str) -> Budget:
     """Raises InputError naming the allowed forms."""
     plain = " ".join(text.lower().split())
+    found = None
     if fraction := re.fullmatch(rf"{NUMBER} ?/ ?{NUMBER}", plain):
-        numerator, denominator = map(float, fraction.groups())
-        if numerator > 0 and denominator > 0:
-            return Budget("error", numerator / denominator, text)
-    elif found := re.fullmatch(rf"{NUMBER} ?(us|ms|s|min|h|fps)?", plain):
-        amount, unit = float(found[1]), found[2]
-        if amount > 0:
-            if unit is None:
-                return Budget("error", amount, text)
-            if unit == "fps":
-                return Budget("frame", 1 / amount, text)
-            return Budget("training" if unit in ("min", "h") else "frame", amount * FACTORS[unit], text)
-    raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each > 0")
+        found = Budget("error", _quotient(*map(float, fraction.groups())), text)
+    elif quantity := re.fullmatch(rf"{NUMBER} ?(us|ms|s|min|h|fps)?", plain):
+        amount, unit = float(quantity[1]), quantity[2]
+        if unit is None:
+            found = Budget("error", amount, text)
+        elif unit == "fps":
+            found = Budget("frame", _quotient(1.0, amount), text)
+        else:
+            found = Budget("training" if unit in ("min", "h") else "frame", amount * FACTORS[unit], text)
+    if found is None or not 0 < found.amount < math.inf:
+        raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each finite and > 0")
+    return found
+
+
+def _quotient(numerator: float, denominator: float) -> float:
+    """Infinite, which is refused, where a denominator is 0."""
+    return numerator / denominator if denominator else math.inf
 
 
 def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:

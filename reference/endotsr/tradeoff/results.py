@@ -2,19 +2,124 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
 
 from endotsr.errors import InputError
 
 FORMAT = 1  # of both; raised when a key changes its name or meaning
 
 
-def read_result(file: Path) -> dict[str, Any]:
-    """A measurement that was written before. Raises InputError if it cannot be read or is of another format."""
+class Seconds(msgspec.Struct):
+    """Of a frame."""
+
+    median: float
+    high: float
+
+
+class Errors(msgspec.Struct):
+    """Of a setting."""
+
+    max: float
+    rms: float
+    gradient: float
+
+
+class Raster(msgspec.Struct):
+    """The rules of compositing of a setting, as far as options name them."""
+
+    alpha_cutoff: float
+    transmittance_stop: float
+    alpha_max: float
+    support: str
+
+
+class Setting(msgspec.Struct):
+    """What was chosen."""
+
+    raster: Raster
+    precision: str
+    scale: float
+
+
+class Point(msgspec.Struct):
+    """One measured setting."""
+
+    name: str
+    setting: Setting
+    error: Errors
+    forward: Seconds
+    both: Seconds
+
+
+class Front(msgspec.Struct):
+    """Names of the points that no other beats."""
+
+    forward: Annotated[list[str], msgspec.Meta(min_length=1)]
+
+
+class Scene(msgspec.Struct):
+    """What was rendered."""
+
+    name: str
+    gaussians: int
+    width: int
+    height: int
+
+
+class Measurement(msgspec.Struct):
+    """The keys of tradeoff.json that a budget looks at."""
+
+    scene: Scene
+    points: list[Point]
+    fronts: Front
+
+    def __post_init__(self) -> None:
+        if unknown := sorted(set(self.fronts.forward) - {point.name for point in self.points}):
+            raise ValueError(f"fronts.forward names {unknown[0]!r}, which is not among the points")
+
+
+class Milestone(msgspec.Struct):
+    """What a training had reached."""
+
+    iteration: int
+    seconds: float
+    psnr_full: float | None
+
+
+class Training(msgspec.Struct):
+    """One training of the study."""
+
+    name: str
+    change: list[str]
+    milestones: list[Milestone]
+
+
+class Trainings(msgspec.Struct):
+    """The keys of training.json that a budget looks at."""
+
+    sequence: str
+    iterations: int
+    preset: str
+    configurations: list[Training]
+
+
+def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[str, Any]:
+    """A measurement that was written before.
+
+    needed   the keys that must be there, with their types; None = a file of the study's own format will do
+    Raises:  InputError if it cannot be read, is of another format, or lacks a key.
+    """
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: cannot be read: {error}") from None
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         raise InputError(f"{file}: not a measurement of this version; measure again with another --out")
+    if needed is not None:
+        try:
+            msgspec.convert(found, needed)
+        except msgspec.ValidationError as error:
+            raise InputError(f"{file}: not a whole measurement: {error}; measure again with another --out") from None
     return found

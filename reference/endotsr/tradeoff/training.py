@@ -188,6 +188,7 @@ def run_training_study(
     """
     full = load(base)
     result = _begun(file, base, full, name, minutes, iterations, weights)
+    file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a sequence that is refused leaves nothing
     base = with_iterations(base, result["iterations"])
     done = {entry["name"]: entry for entry in result["configurations"]}
     chosen = configurations(base)
