@@ -25,7 +25,7 @@ class RenderOptions:
     """folder to create"""
     times: Annotated[tuple[float, ...], tyro.conf.arg(metavar="T [T ...]")] = ()
     """normalised times in [0, 1]"""
-    frames: Literal["test", "train", "all"] | None = None
+    frames: Annotated[Literal["test", "train", "all"] | None, tyro.conf.arg(metavar="{test,train,all}")] = None
     """the frames of the sequence instead of --times (default: test)"""
     count: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """N times evenly spaced over [0, 1], instead of --times: a film with in-between times"""
