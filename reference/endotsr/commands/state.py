@@ -28,7 +28,11 @@ def load_model(folder: RunFolder) -> Model:
 
     if not folder.checkpoint.exists():
         raise InputError(f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --resume`")
-    checkpoint, config, record = load_checkpoint(folder.checkpoint), folder.config(), folder.sequence_record()
+    checkpoint, config, record = (
+        load_checkpoint(folder.checkpoint),
+        folder.config(),
+        folder.sequence_record("times", "train_index"),
+    )
     times = np.array(record["times"])[record["train_index"]]
     spectral = spectral_from(config.model, times)
     return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import msgspec
 import tyro
 
 from endotsr.commands.options import base_settings, differences, parse, with_short_names
@@ -147,7 +146,7 @@ def train_new(
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
-    from endotsr.commands.sources import check_same_input, load_sequence
+    from endotsr.commands.sources import check_same_input, load_sequence, run_source
     from endotsr.commands.state import load_training
     from endotsr.commands.threads import use_threads
     from endotsr.fitting.trainer import new_training
@@ -155,8 +154,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     folder = open_run(out)
     kept = folder.config()
     base, _ = base_settings(words, kept)
-    record = folder.record()["input"]
-    simulator = msgspec.convert(record.get("simulator", {}), SimulatorSettings)
+    remembered, simulator = run_source(folder)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
     asked = _settings(options)
     for line in differences(asked, kept, "run"):
@@ -164,7 +162,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
         if key not in RESUMABLE:
             value = rest.split(" (")[0]
             raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; {key} = {value} differs")
-    source = source or record["source"]
+    source = source or remembered
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
@@ -173,7 +171,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     print(f"resuming {out} after iteration {state.iteration} of {kept.training.iterations}", flush=True)
     if state.iteration < kept.training.iterations:
         entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
-        folder.update(status="running", resumed=[*folder.record()["resumed"], entry])
+        folder.update(status="running", resumed=[*folder.record().get("resumed", []), entry])
         train_on(folder, state, sequence, kept)
     return folder, sequence
 
