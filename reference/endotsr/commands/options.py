@@ -14,6 +14,7 @@ import msgspec
 
 from endotsr.commands.mistakes import mistake_line, setting_type
 from endotsr.config import (
+    MILESTONES,
     Config,
     config_from_dict,
     read_toml,
@@ -40,7 +41,7 @@ class Sources:
     preset: Literal["paper", "sharp", "demo"] | None = None
     config: Path | None = None
     iterations: int | None = None
-    schedule: Literal["stretched", "absolute"] = "stretched"
+    schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
 
 
 def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
@@ -48,14 +49,9 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
     return _tyro(options, _plain_booleans(words), command, **({"default": default} if default else {}))
 
 
-def base_settings(words: list[str], kept: Config | None = None) -> tuple[Config, str]:
-    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
-
-    kept   the settings of a run to resume: the start when the command line names neither of the three
-    """
+def base_settings(words: list[str]) -> tuple[Config, str]:
+    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is)."""
     sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
-    if kept is not None and sources == Sources():
-        return kept, ""
     data = read_toml(sources.config) if sources.config else {}
     if sources.preset:
         data = data | {"preset": sources.preset}
@@ -76,6 +72,27 @@ def base_settings(words: list[str], kept: Config | None = None) -> tuple[Config,
     return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
 
 
+def asked_settings(words: list[str], kept: Config) -> Config:
+    """The settings `kept` of a run, with what TOML file, `--iterations` and `--schedule` of the command line ask for.
+
+    Every other setting stays as the run has it, so that only what was asked for can differ from the run.
+    """
+    base, _ = base_settings(words)
+    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    asked = read_toml(sources.config) if sources.config else {}
+    named = {(section, key) for section, values in asked.items() if isinstance(values, dict) for key in values}
+    if sources.iterations is not None:
+        named.add(("training", "iterations"))
+        if sources.schedule is not None:
+            named |= {(section, key) for section, keys in MILESTONES.items() for key in keys}
+    data, wanted = msgspec.to_builtins(kept), msgspec.to_builtins(base)
+    for section, key in named:
+        data[section][key] = wanted[section][key]
+    if sources.preset or "preset" in asked:
+        data["preset"] = wanted["preset"]
+    return config_from_dict(data, str(sources.config or "command line"))
+
+
 def with_short_names(config: Config, given: dict[str, Any]) -> Config:
     """The settings with the short options that were given (not None), checked."""
     data = msgspec.to_builtins(config)
@@ -89,7 +106,8 @@ def with_short_names(config: Config, given: dict[str, Any]) -> Config:
 def differences(config: Config, other: Config, name: str) -> list[str]:
     """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
     ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
-    return [
+    preset = [f"preset = {config.preset!r} ({name}: {other.preset!r})"] if config.preset != other.preset else []
+    return preset + [
         f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
         for section, values in ours.items()
         if isinstance(values, dict)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from endotsr.commands.options import base_settings, differences, parse, with_short_names
+from endotsr.commands.options import asked_settings, base_settings, differences, parse, with_short_names
 from endotsr.config import PAPER, PRESETS, Config
 from endotsr.errors import InputError
 from endotsr.runs import (
@@ -153,15 +153,13 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
 
     folder = open_run(out)
     kept = folder.config()
-    base, _ = base_settings(words, kept)
+    base = asked_settings(words, kept)
     remembered, simulator = run_source(folder)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
     asked = _settings(options)
-    for line in differences(asked, kept, "run"):
-        key, rest = line.split(" = ", 1)
-        if key not in RESUMABLE:
-            value = rest.split(" (")[0]
-            raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; {key} = {value} differs")
+    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
+    if refused:
+        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; asked: {', '.join(refused)}")
     source = source or remembered
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)
