@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from tiny import SEQUENCE, SETTINGS
+from tiny import SEQUENCE, SETTINGS, assert_refused
 
 from endotsr.cli import main
 from endotsr.commands.evaluate import held_out_table
@@ -109,6 +109,39 @@ def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_p
     assert f"lambda_lap = {found['lambda_lap']:.6g} ({len(found['ratios'])} views)" in said
     assert "simulated-000000" in said and "loss.ssim_weight = 0.2 (run: 0.1)" in said
     assert before == {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--sequence.scale", "0.5"], "sequence.scale = 0.5 (run: 1.0)"),
+        (
+            ["--model.frequencies", "4", "--model.bases", "9"],
+            "model.bases = 9 (run: 17), model.frequencies = 4 (run: 8)",
+        ),
+        (["--preset", "sharp"], "preset = 'sharp' (run: 'paper')"),
+        (["--training.precision", "float64"], "training.precision = 'float64' (run: 'float32')"),
+        (["--loss.depth-weight", "2"], "loss.depth_weight = 2.0 (run: 1.0)"),
+    ],
+)
+def test_calibrate_refuses_settings_that_it_would_not_use(words, named, finished_run, capsys):
+    assert_refused(capsys, ["calibrate", str(finished_run), *words], f"calibrate: {named}: fixed by the run", "allowed")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--loss.upsampling", "half_pixel"],
+        ["--loss.gradient-ratio", "0.5"],
+        ["--loss.calibration-views", "3"],
+        ["--raster.alpha-cutoff", "0.2"],
+    ],
+)
+def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_run, tmp_path):
+    main(["calibrate", str(finished_run), "--json", str(tmp_path / "as_it_is.json")])
+    assert main(["calibrate", str(finished_run), *words, "--json", str(tmp_path / "replaced.json")]) == 0
+    before, after = (json.loads((tmp_path / name).read_text()) for name in ("as_it_is.json", "replaced.json"))
+    assert before["lambda_lap"] != after["lambda_lap"]
 
 
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
