@@ -180,6 +180,13 @@ def test_unusable_file_is_one_line(text, named, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_file_with_a_byte_order_mark_is_read(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[model]\nbeta = 0.4\n", encoding="utf-8-sig")
+    assert file.read_bytes().startswith(b"\xef\xbb\xbf")
+    assert load_config(file).model.beta == 0.4
+
+
 def test_every_setting_of_every_preset_is_read_back(tmp_path):
     from endotsr.config import PRESETS, config_to_toml
 
@@ -198,3 +205,5 @@ def test_missing_words(capsys):
     assert_refused(capsys, ["train", "simulated"], "--out")
     assert_refused(capsys, ["train", "--out", "run"], "SEQUENCE")
     assert_refused(capsys, ["render"], "RUN", "--out")
+    assert_refused(capsys, ["demo"], "demo: --out RUN is missing")
+    assert_refused(capsys, ["demo", "--ou", "x"], "--ou: no such option; did you mean --out?")
