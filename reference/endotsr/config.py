@@ -298,7 +298,7 @@ def load_config(path: Path) -> Config:
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, unchecked. Raises InputError naming the file."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))  # some editors begin with a byte-order mark
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     except tomllib.TOMLDecodeError as error:

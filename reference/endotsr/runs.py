@@ -53,13 +53,13 @@ class RunFolder:
         """The resolved settings of the run."""
         return load_config(self.path / "config.toml")
 
-    def record(self) -> dict[str, Any]:
-        """run.json as it is now."""
-        return _read_json(self.path / "run.json")
+    def record(self, *needed: str) -> dict[str, Any]:
+        """run.json as it is now. Raises InputError if one of the `needed` keys (`input.source`) is not there."""
+        return _read_json(self.path / "run.json", needed)
 
-    def sequence_record(self) -> dict[str, Any]:
-        """sequence.json."""
-        return _read_json(self.path / "sequence.json")
+    def sequence_record(self, *needed: str) -> dict[str, Any]:
+        """sequence.json. Raises InputError if one of the `needed` keys is not there."""
+        return _read_json(self.path / "sequence.json", needed)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -249,11 +249,20 @@ def replacing_folder(path: Path) -> Iterator[Path]:
         raise
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: holds {type(data).__name__}; allowed: an object with keys, as the run wrote it")
+    for dotted in needed:
+        value: Any = data
+        for key in dotted.split("."):
+            if not isinstance(value, dict) or key not in value:
+                raise InputError(f"{path}: {dotted} is missing; the file is not as the run wrote it")
+            value = value[key]
+    return data
 
 
 def _finite(data: Any) -> Any:

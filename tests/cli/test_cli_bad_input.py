@@ -136,6 +136,6 @@ def test_render_refuses_times_and_existing_output(tmp_path, capsys):
     assert_refused(capsys, [*words, "--camera", "2"], "--camera 2", "0 to 1")
     assert_refused(capsys, [*words, "--count", "0"], "--count 0", ">= 1")
     assert_refused(capsys, [*words, "--count", "3", "--frames", "all"], "one of")
-    assert_refused(capsys, words, "no checkpoint yet")
+    assert_refused(capsys, words, "no checkpoint yet", f"`endotsr train --out {tmp_path / 'run'} --resume`")
     (tmp_path / "out").mkdir()
     assert_refused(capsys, words, "out", "exists already")

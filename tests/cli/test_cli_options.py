@@ -114,6 +114,51 @@ def test_unusable_setting_is_one_line(words, named, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--frame", "0:5"], "--frame: no such option; did you mean --frames?"),
+        (["--iteration", "10"], "--iteration: no such option; did you mean --iterations?"),
+        (["--scal", "0.5"], "--scal: no such option; did you mean --scale?"),
+        (["--scal=0.5"], "--scal: no such option; did you mean --scale?"),
+        (["--ou", "y2"], "--ou: no such option; did you mean --out?"),
+        (["--excluded-value", "black"], "--excluded-value: no such option; did you mean --sequence.excluded-value?"),
+        (["--resum"], "--resum: no such option; did you mean --resume?"),
+        (["--frobnicate"], "--frobnicate: no such option; `endotsr train --help` lists the options"),
+        (["again"], "'again': one word too many; `endotsr train --help` lists the options"),
+    ],
+)
+def test_a_mistyped_option_is_named_with_the_one_that_was_meant(words, said, tmp_path, capsys):
+    assert_refused(capsys, ["train", "simulated", "--out", str(tmp_path / "run"), *words], f"error: {said}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mistyped_option_is_named_before_the_words_that_are_missing(capsys):
+    assert_refused(capsys, ["render", "--ot", "x"], "--ot: no such option; did you mean --out?")
+    assert_refused(capsys, ["render", "run", "--out", "x", "--model.beta", "1"], "--model.beta: no such option")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["train", "simulated", "--preset", "fast"], "--preset 'fast' is not allowed; allowed: paper, sharp, demo"),
+        (["train", "simulated", "--preset", "None"], "--preset 'None' is not allowed; allowed: paper, sharp, demo"),
+        (["evaluate", "run", "--paper-row", "x"], "--paper-row 'x' is not allowed; allowed: pulling"),
+        (["render", "run", "--frames", "x", "--out", "y"], "--frames 'x' is not allowed; allowed: test, train, all"),
+    ],
+)
+def test_choices_are_listed_in_their_order_and_without_none(words, said, capsys):
+    assert_refused(capsys, words, f"error: {said}\n")
+
+
+@pytest.mark.parametrize("command", [["render"], ["tradeoff", "train"]])
+def test_help_lists_no_choice_called_none(command, capsys):
+    from endotsr.cli import main
+
+    assert main([*command, "--help"]) == 0
+    assert "None," not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
     ("text", "named"),
     [
         ("[model]\nbetta = 1\n", ["unknown key model.betta", "allowed: appearance"]),
@@ -135,6 +180,13 @@ def test_unusable_file_is_one_line(text, named, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_file_with_a_byte_order_mark_is_read(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("[model]\nbeta = 0.4\n", encoding="utf-8-sig")
+    assert file.read_bytes().startswith(b"\xef\xbb\xbf")
+    assert load_config(file).model.beta == 0.4
+
+
 def test_every_setting_of_every_preset_is_read_back(tmp_path):
     from endotsr.config import PRESETS, config_to_toml
 
@@ -153,3 +205,5 @@ def test_missing_words(capsys):
     assert_refused(capsys, ["train", "simulated"], "--out")
     assert_refused(capsys, ["train", "--out", "run"], "SEQUENCE")
     assert_refused(capsys, ["render"], "RUN", "--out")
+    assert_refused(capsys, ["demo"], "demo: --out RUN is missing")
+    assert_refused(capsys, ["demo", "--ou", "x"], "--ou: no such option; did you mean --out?")

@@ -156,6 +156,39 @@ def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_p
     assert before == {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--sequence.scale", "0.5"], "sequence.scale = 0.5 (run: 1.0)"),
+        (
+            ["--model.frequencies", "4", "--model.bases", "9"],
+            "model.bases = 9 (run: 17), model.frequencies = 4 (run: 8)",
+        ),
+        (["--preset", "sharp"], "preset = 'sharp' (run: 'paper')"),
+        (["--training.precision", "float64"], "training.precision = 'float64' (run: 'float32')"),
+        (["--loss.depth-weight", "2"], "loss.depth_weight = 2.0 (run: 1.0)"),
+    ],
+)
+def test_calibrate_refuses_settings_that_it_would_not_use(words, named, finished_run, capsys):
+    assert_refused(capsys, ["calibrate", str(finished_run), *words], f"calibrate: {named}: fixed by the run", "allowed")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--loss.upsampling", "half_pixel"],
+        ["--loss.gradient-ratio", "0.5"],
+        ["--loss.calibration-views", "3"],
+        ["--raster.alpha-cutoff", "0.2"],
+    ],
+)
+def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_run, tmp_path):
+    main(["calibrate", str(finished_run), "--json", str(tmp_path / "as_it_is.json")])
+    assert main(["calibrate", str(finished_run), *words, "--json", str(tmp_path / "replaced.json")]) == 0
+    before, after = (json.loads((tmp_path / name).read_text()) for name in ("as_it_is.json", "replaced.json"))
+    assert before["lambda_lap"] != after["lambda_lap"]
+
+
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
     from endotsr.errors import CalibrationError
     from endotsr.fitting import trainer

@@ -3,9 +3,11 @@
 import errno
 import json
 import os
+import shutil
 
 import numpy as np
 import pytest
+from tiny import assert_refused
 
 from endotsr import runs
 from endotsr.commands.sources import remembered_cameras, sequence_record
@@ -144,6 +146,42 @@ def test_machine_and_versions_say_something():
     assert {"endotsr", "python", "numpy", "numba"} <= set(runs.versions())
     peak = runs.peak_memory_bytes()
     assert peak is None or peak > 10_000_000
+
+
+def damaged_copy(run, out, name, text):
+    """A run folder whose file `name` holds `text`."""
+    shutil.copytree(run, out)
+    (out / name).write_text(text)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{}", "input.source is missing"),
+        ('{"input": {}}', "input.source is missing"),
+        ('{"input": 3}', "input.source is missing"),
+        ('{"input": {"source": "simulated"}}', "input.arrays_sha256 is missing"),
+        ('{"input": {"source": "x", "arrays_sha256": {}, "simulator": {"width": "x"}}}', "input.simulator.width = 'x'"),
+        ("[]", "holds list; allowed: an object"),
+    ],
+)
+def test_run_json_without_its_keys_is_one_line(text, said, finished_run, tmp_path, capsys):
+    run = damaged_copy(finished_run, tmp_path / "run", "run.json", text)
+    for words in (["evaluate", str(run)], ["calibrate", str(run)], ["train", "--out", str(run), "--resume"]):
+        assert_refused(capsys, words, f"{run / 'run.json'}: ", said)
+
+
+@pytest.mark.parametrize("key", ["names", "times", "train_index", "test_index", "cameras", "static_camera", "unit"])
+def test_sequence_json_without_its_keys_is_one_line(key, finished_run, tmp_path, capsys):
+    record = json.loads((finished_run / "sequence.json").read_text())
+    del record[key]
+    run = damaged_copy(finished_run, tmp_path / "run", "sequence.json", json.dumps(record))
+    words = ["render", str(run), "--out", str(tmp_path / "pictures")]
+    assert_refused(capsys, words, f"{run / 'sequence.json'}: {key} is missing")
+    assert not (tmp_path / "pictures").exists()
+    if key in ("times", "train_index"):
+        assert_refused(capsys, ["evaluate", str(run)], f"{run / 'sequence.json'}: {key} is missing")
 
 
 @pytest.mark.parametrize("moving", [False, True])

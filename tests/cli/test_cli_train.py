@@ -343,7 +343,11 @@ def test_resume_of_a_finished_run_changes_nothing(finished_run, tmp_path, capsys
     ("more", "named"),
     [
         (["--model.beta", "0.2"], ["model.beta = 0.2", "keeps the settings"]),
-        (["--iterations", "40"], ["keeps the settings"]),
+        (["--model.beta", "0.2"], ["asked: model.beta = 0.2 (run: 0.3)\n"]),
+        (["--iterations", "40"], ["keeps the settings", "asked: training.iterations = 40 (run: 30)\n"]),
+        (["--scale", "0.5", "--seed", "1"], ["asked: sequence.scale = 0.5 (run: 1.0), training.seed = 1 (run: 0)\n"]),
+        (["--preset", "sharp"], ["asked: preset = 'sharp' (run: 'paper')\n"]),
+        (["--iterations", "30", "--schedule", "absolute"], ["loss.detail_from = 1000 (run: 5)"]),
         (["--seed", "1"], ["training.seed = 1"]),
         (["--simulator.seed", "1"], ["images differ", "sha256"]),
     ],
@@ -359,6 +363,36 @@ def test_resume_may_repeat_the_command_line(finished_run, tmp_path):
     out = tmp_path / "run"
     shutil.copytree(finished_run, out)
     assert main(train_only(out, "--resume", "--threads", "2")) == 0
+
+
+def test_resume_compares_only_what_was_asked_for(tmp_path, capsys):
+    out = tmp_path / "run"
+    file = tmp_path / "mine.toml"
+    file.write_text("[model]\nbeta = 0.4\n[loss]\ndetail_from = 600\n")
+    words = ["--scale", "0.75", "--initialisation.motion-threshold", "30", "--iterations", "6"]
+    assert main(train_only(out, "--config", str(file), *words)) == 0
+    kept = (out / "config.toml").read_bytes()
+    for repeated in (
+        ["--iterations", "6"],
+        ["--scale", "0.75"],
+        ["--preset", "paper"],
+        ["--config", str(file), "--iterations", "6"],
+        ["--config", str(out / "config.toml")],
+    ):
+        assert main([*resume(out), *repeated]) == 0, repeated
+    assert (out / "config.toml").read_bytes() == kept
+    file.write_text("[model]\nbeta = 0.45\nbases = 17\n")
+    asked = [*resume(out), "--config", str(file)]
+    assert_refused(capsys, asked, "asked: model.beta = 0.45 (run: 0.4)\n")
+    file.write_text('preset = "sharp"\n')
+    assert_refused(capsys, asked, "asked: preset = 'sharp' (run: 'paper')\n")
+
+
+def test_resume_of_a_demo_needs_none_of_its_options(tmp_path, capsys):
+    out = tmp_path / "run"
+    assert main(["demo", *train_only(out, "--scale", "0.75", "--iterations", "4")[2:]]) == 0
+    assert main(["demo", "--out", str(out), "--resume", "--no-evaluate"]) == 0
+    assert_refused(capsys, ["demo", "--out", str(out), "--resume", "--seed", "2"], "training.seed = 2 (run: 0)")
 
 
 def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypatch):

@@ -8,14 +8,26 @@ import tyro
 
 from endotsr.commands.options import differences, parse, with_short_names
 from endotsr.config import PAPER, Config
+from endotsr.errors import InputError
 from endotsr.runs import open_run, refuse_unwritable, write_json
+
+# What equation (7) reads beside the trained Gaussians and the sequence; no other setting would change the answer.
+REPLACEABLE = (
+    "loss.ssim_weight",
+    "loss.upsampling",
+    "loss.gradient_ratio",
+    "loss.calibration_views",
+    "raster",
+    "training.threads",
+)
 
 
 @dataclass
 class CalibrateOptions:
     """The detail weight that equation (7) finds on the checkpoint of a run, with a table of its views.
 
-    The run is not changed. Every setting of the run can be replaced, such as --loss.ssim-weight 0.2.
+    The run is not changed. What the rule reads can be replaced: --loss.ssim-weight, --loss.upsampling,
+    --loss.gradient-ratio, --loss.calibration-views and the settings of --raster. All others are fixed by the run.
     """
 
     run: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="RUN")] = None
@@ -34,7 +46,6 @@ def run(words: list[str]) -> int:
     from endotsr.commands.sources import load_run_sequence
     from endotsr.commands.state import load_model
     from endotsr.commands.threads import use_threads
-    from endotsr.errors import InputError
     from endotsr.fitting.trainer import calibrate_on
 
     first = parse(CalibrateOptions, words, "calibrate")
@@ -45,11 +56,13 @@ def run(words: list[str]) -> int:
     options = parse(CalibrateOptions, words, "calibrate", CalibrateOptions(settings=kept))
     refuse_unwritable(options.json)
     config = with_short_names(options.settings, {"threads": options.threads})
+    replaced = differences(config, kept, "run")
+    _refuse_fixed(replaced, folder.path)
     model = load_model(folder)
     use_threads(config.training.threads)
     sequence = load_run_sequence(folder, options.sequence)
     found = calibrate_on(model.gaussians, model.spectral, sequence, config)
-    for line in differences(config, kept, "run"):
+    for line in replaced:
         print(f"setting replaced: {line}")
     print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")
     print(found.table)
@@ -57,3 +70,12 @@ def run(words: list[str]) -> int:
     if options.json:
         write_json(options.json, {"iteration": model.iteration, **found._asdict()})
     return 0
+
+
+def _refuse_fixed(replaced: list[str], run_path: Path) -> None:
+    """Raises InputError for settings that the trained run has fixed: they would be named and then not used."""
+    fixed = [line for line in replaced if not line.split(" = ")[0].startswith(REPLACEABLE)]
+    if fixed:
+        raise InputError(
+            f"calibrate: {', '.join(fixed)}: fixed by the run {run_path}; allowed: {', '.join(REPLACEABLE)}"
+        )

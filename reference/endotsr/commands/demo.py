@@ -8,6 +8,7 @@ import tyro
 
 from endotsr.commands.options import parse
 from endotsr.commands.sources import SIMULATED
+from endotsr.errors import InputError
 
 
 @dataclass
@@ -35,4 +36,7 @@ def run(words: list[str]) -> int:
 
     if {"-h", "--help"} & set(words):
         parse(DemoOptions, words, "demo")
-    return train.run([SIMULATED, "--preset", "demo", *words])
+    words = [SIMULATED, "--preset", "demo", *words]
+    if parse(train.TrainOptions, words, "demo").out is None:
+        raise InputError("demo: --out RUN is missing: the run folder to create")
+    return train.run(words)

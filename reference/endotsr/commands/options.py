@@ -12,16 +12,15 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
+from endotsr.commands.mistakes import mistake_line, setting_type
 from endotsr.config import (
+    MILESTONES,
     Config,
-    allowed_values,
     config_from_dict,
     read_toml,
-    refuse_unknown_keys,
     with_iterations,
 )
 from endotsr.errors import InputError
-from endotsr.simulator.settings import SimulatorSettings
 
 T = TypeVar("T")
 
@@ -34,9 +33,6 @@ SHORT_NAMES = {
     "threads": "training.threads",
 }
 
-# What the dotted options of a command line start from.
-ROOTS: dict[str, Any] = {f.name: f.type for f in msgspec.structs.fields(Config)} | {"simulator": SimulatorSettings}
-
 
 @dataclass
 class Sources:
@@ -45,24 +41,17 @@ class Sources:
     preset: Literal["paper", "sharp", "demo"] | None = None
     config: Path | None = None
     iterations: int | None = None
-    schedule: Literal["stretched", "absolute"] = "stretched"
+    schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
 
 
 def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
     """The options of one command. `--help` prints them and leaves with SystemExit(0); a mistake is an InputError."""
-    return _tyro(
-        options, _plain_booleans(words), prog=f"endotsr {command}", **({"default": default} if default else {})
-    )
+    return _tyro(options, _plain_booleans(words), command, **({"default": default} if default else {}))
 
 
-def base_settings(words: list[str], kept: Config | None = None) -> tuple[Config, str]:
-    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
-
-    kept   the settings of a run to resume: the start when the command line names neither of the three
-    """
-    sources, _ = _tyro(Sources, words, return_unknown_args=True, add_help=False)
-    if kept is not None and sources == Sources():
-        return kept, ""
+def base_settings(words: list[str]) -> tuple[Config, str]:
+    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is)."""
+    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
     data = read_toml(sources.config) if sources.config else {}
     if sources.preset:
         data = data | {"preset": sources.preset}
@@ -83,6 +72,27 @@ def base_settings(words: list[str], kept: Config | None = None) -> tuple[Config,
     return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
 
 
+def asked_settings(words: list[str], kept: Config) -> Config:
+    """The settings `kept` of a run, with what TOML file, `--iterations` and `--schedule` of the command line ask for.
+
+    Every other setting stays as the run has it, so that only what was asked for can differ from the run.
+    """
+    base, _ = base_settings(words)
+    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    asked = read_toml(sources.config) if sources.config else {}
+    named = {(section, key) for section, values in asked.items() if isinstance(values, dict) for key in values}
+    if sources.iterations is not None:
+        named.add(("training", "iterations"))
+        if sources.schedule is not None:
+            named |= {(section, key) for section, keys in MILESTONES.items() for key in keys}
+    data, wanted = msgspec.to_builtins(kept), msgspec.to_builtins(base)
+    for section, key in named:
+        data[section][key] = wanted[section][key]
+    if sources.preset or "preset" in asked:
+        data["preset"] = wanted["preset"]
+    return config_from_dict(data, str(sources.config or "command line"))
+
+
 def with_short_names(config: Config, given: dict[str, Any]) -> Config:
     """The settings with the short options that were given (not None), checked."""
     data = msgspec.to_builtins(config)
@@ -96,7 +106,8 @@ def with_short_names(config: Config, given: dict[str, Any]) -> Config:
 def differences(config: Config, other: Config, name: str) -> list[str]:
     """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
     ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
-    return [
+    preset = [f"preset = {config.preset!r} ({name}: {other.preset!r})"] if config.preset != other.preset else []
+    return preset + [
         f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
         for section, values in ours.items()
         if isinstance(values, dict)
@@ -105,66 +116,27 @@ def differences(config: Config, other: Config, name: str) -> list[str]:
     ]
 
 
-def _tyro(options: Any, words: list[str], **settings: Any) -> Any:
+def _tyro(options: Any, words: list[str], command: str, **settings: Any) -> Any:
     import tyro
 
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(options, args=words, **settings)
+            return tyro.cli(options, args=words, prog=f"endotsr {command}", **settings)
     except SystemExit as leaving:
         if not leaving.code:
             raise
-        raise InputError(_one_line(said.getvalue())) from None
+        looked_through = [] if settings.get("return_unknown_args") else words
+        raise InputError(mistake_line(options, looked_through, said.getvalue(), command)) from None
 
 
 def _plain_booleans(words: list[str]) -> list[str]:
     """`--model.appearance false` as `--model.no-appearance`, so that a switch reads as it does in a TOML file."""
     out: list[str] = []
     for word in [part for w in words for part in (w.split("=", 1) if re.match(r"--[\w.-]+\.[\w-]+=", w) else [w])]:
-        if out and word.lower() in ("true", "false") and _setting_type(out[-1]) is bool:
+        if out and word.lower() in ("true", "false") and setting_type(out[-1]) is bool:
             section, key = out[-1].rsplit(".", 1)
             out[-1] = f"{section}.{'' if word.lower() == 'true' else 'no-'}{key}"
         else:
             out.append(word)
     return out
-
-
-def _setting_type(word: str) -> Any:
-    """The type of the setting that an option word such as `--model.beta` names, or None."""
-    kind = ROOTS
-    for name in word.removeprefix("--").replace("-", "_").split("."):
-        if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-            kind = {f.name: f.type for f in msgspec.structs.fields(kind)}
-        kind = kind.get(name) if isinstance(kind, dict) else None
-    return kind
-
-
-def _one_line(box: str) -> str:
-    """What tyro says in a box, as one line; for a setting, what is allowed."""
-    lines = [line.strip("│ ").strip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
-    lines = [line for line in lines if line and not line.startswith("──")]
-    end = next(
-        (i for i, line in enumerate(lines) if line.startswith(("For full help", "Argument helptext", "Got errors"))),
-        None,
-    )
-    text = " ".join(lines[:end])
-    named = re.search(r"--\w+(\.[\w-]+)+", text)
-    if not named:
-        return text
-    key, kind = named[0][2:].replace("-", "_"), _setting_type(named[0])
-    if kind is None:
-        section, rest = key.split(".", 1)
-        if section == "simulator":
-            refuse_unknown_keys(_nested(rest), SimulatorSettings, "command line", "simulator.")
-        else:
-            refuse_unknown_keys({section: _nested(rest)}, Config, "command line")
-        return text
-    value = re.search(r"(?:instantiated from \[|choice |: )('[^']*')", text)
-    given = f" = {value[1]}" if value else ""
-    return f"command line: {key}{given} is not allowed; allowed: {allowed_values(kind)}"
-
-
-def _nested(dotted: str) -> dict[str, Any]:
-    first, _, rest = dotted.partition(".")
-    return {first: _nested(rest) if rest else None}

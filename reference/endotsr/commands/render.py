@@ -25,7 +25,7 @@ class RenderOptions:
     """folder to create"""
     times: Annotated[tuple[float, ...], tyro.conf.arg(metavar="T [T ...]")] = ()
     """normalised times in [0, 1]"""
-    frames: Literal["test", "train", "all"] | None = None
+    frames: Annotated[Literal["test", "train", "all"] | None, tyro.conf.arg(metavar="{test,train,all}")] = None
     """the frames of the sequence instead of --times (default: test)"""
     count: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """N times evenly spaced over [0, 1], instead of --times: a film with in-between times"""
@@ -54,7 +54,7 @@ def run(words: list[str]) -> int:
 
     options = parse(RenderOptions, words, "render")
     folder = open_run(options.run)
-    views = wanted_views(folder.sequence_record(), options)
+    views = wanted_views(folder.sequence_record("names", "times", "train_index", "test_index"), options)
     refuse_existing(options.out)
     use_threads(options.threads)
     render = renderer(folder, without=options.without)
@@ -119,7 +119,7 @@ def write_views(target: Path, folder: RunFolder, views: list[View], render, npy:
     from endotsr.commands.sources import remembered_cameras
     from endotsr.opencv import write_png
 
-    record = folder.sequence_record()
+    record = folder.sequence_record("names", "cameras", "static_camera", "unit")
     cameras = remembered_cameras(record)
     for name in ("colour", "depth", "opacity"):
         (target / name).mkdir()

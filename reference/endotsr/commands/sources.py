@@ -84,11 +84,18 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
             )
 
 
+def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
+    """Where the sequence of a run was, and how it was simulated. Raises InputError if run.json does not say."""
+    record = folder.record("input.source", "input.arrays_sha256")["input"]
+    where = str(folder.path / "run.json")
+    simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
+    return str(record["source"]), simulator
+
+
 def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
     """The sequence that a run was trained on, from where it was or from `source`; it must be the same."""
-    record = folder.record()["input"]
-    simulator = msgspec.convert(record.get("simulator", {}), SimulatorSettings)
-    source = source or str(record["source"])
+    remembered, simulator = run_source(folder)
+    source = source or remembered
     sequence = load_sequence(source, folder.config(), simulator)
     check_same_input(folder, sequence, source)
     return sequence

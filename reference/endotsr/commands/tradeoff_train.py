@@ -29,7 +29,7 @@ class TradeoffTrainOptions:
     """length of the whole study: it sets the iterations of each training, and none begins that would exceed it"""
     iterations: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """iterations of each training instead"""
-    preset: Literal["paper", "sharp", "demo"] | None = None
+    preset: Annotated[Literal["paper", "sharp", "demo"] | None, tyro.conf.arg(metavar="{paper,sharp,demo}")] = None
     """settings of the base training (default: demo for `simulated`, paper for a folder)"""
     scale: float = 1.0
     """image scale of the base training"""

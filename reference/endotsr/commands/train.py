@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import msgspec
 import tyro
 
-from endotsr.commands.options import base_settings, differences, parse, with_short_names
+from endotsr.commands.options import asked_settings, base_settings, differences, parse, with_short_names
 from endotsr.config import PAPER, PRESETS, Config
 from endotsr.errors import InputError
 from endotsr.runs import (
@@ -157,24 +156,21 @@ def train_new(
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
-    from endotsr.commands.sources import check_same_input, load_sequence
+    from endotsr.commands.sources import check_same_input, load_sequence, run_source
     from endotsr.commands.state import load_training
     from endotsr.commands.threads import use_threads
     from endotsr.fitting.trainer import new_training
 
     folder = open_run(out)
     kept = folder.config()
-    base, _ = base_settings(words, kept)
-    record = folder.record()["input"]
-    simulator = msgspec.convert(record.get("simulator", {}), SimulatorSettings)
+    base = asked_settings(words, kept)
+    remembered, simulator = run_source(folder)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
     asked = _settings(options)
-    for line in differences(asked, kept, "run"):
-        key, rest = line.split(" = ", 1)
-        if key not in RESUMABLE:
-            value = rest.split(" (")[0]
-            raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; {key} = {value} differs")
-    source = source or record["source"]
+    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
+    if refused:
+        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; asked: {', '.join(refused)}")
+    source = source or remembered
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
@@ -184,7 +180,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
         print(f"resuming {out} after iteration {state.iteration} of {kept.training.iterations}", flush=True)
         if state.iteration < kept.training.iterations:
             entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
-            folder.update(status="running", resumed=[*folder.record()["resumed"], entry])
+            folder.update(status="running", resumed=[*folder.record().get("resumed", []), entry])
             train_on(folder, state, sequence, kept)
     return folder, sequence
 

@@ -100,7 +100,7 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     from endotsr.runs import open_run
 
     folder = open_run(path)
-    model, record = load_model(folder), folder.sequence_record()
+    model, record = load_model(folder), folder.sequence_record("names", "test_index", "cameras", "static_camera")
     frame = int(record["test_index"][len(record["test_index"]) // 2])
     try:
         noise = sensor_noise(load_run_sequence(folder))

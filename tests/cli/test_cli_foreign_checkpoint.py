@@ -1,0 +1,109 @@
+"""A checkpoint beside settings that it was not trained with: one line that names file, setting and both values."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from tiny import assert_refused, assert_same_run, train_words
+
+from endotsr.cli import main
+
+
+@pytest.fixture
+def run(finished_run, tmp_path):
+    """A copy of a finished run that a test may spoil."""
+    shutil.copytree(finished_run, tmp_path / "run")
+    return tmp_path / "run"
+
+
+def edit(run, old, new):
+    text = (run / "config.toml").read_text()
+    assert old in text
+    (run / "config.toml").write_text(text.replace(old, new))
+
+
+def commands(run):
+    """Every command that reads a checkpoint."""
+    return (
+        ["render", str(run), "--out", str(run.parent / "pictures")],
+        ["evaluate", str(run)],
+        ["calibrate", str(run)],
+        ["train", "--out", str(run), "--resume", "--no-evaluate"],
+    )
+
+
+def forget_settings(file):
+    """The checkpoint with a header that does not hold the settings: only its arrays tell."""
+    with np.load(file) as opened:
+        entries = dict(opened)
+    header = json.loads(entries["header"].tobytes())
+    del header["header"]["config"]
+    entries["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(file, **entries)
+
+
+EDITS = [
+    ("bases = 17", "bases = 9", "model.bases = 17", "says 9"),
+    ("frequencies = 8", "frequencies = 4", "model.frequencies = 8", "says 4"),
+    ("harmonics_degree = 3", "harmonics_degree = 1", "model.harmonics_degree = 3", "says 1"),
+    ('precision = "float32"', 'precision = "float64"', "training.precision = 'float32'", "says 'float64'"),
+    ("appearance = true", "appearance = false", "model.appearance = True", "says False"),
+    ("spectral_motion = true", "spectral_motion = false", "model.spectral_motion = True", "says False"),
+    ("deformation = true", "deformation = false", "model.deformation = True", "says False"),
+]
+
+
+@pytest.mark.parametrize("remembered", [True, False])
+@pytest.mark.parametrize(("old", "new", "trained", "says"), EDITS, ids=[edit[1] for edit in EDITS])
+def test_an_edited_setting_that_shapes_the_arrays_is_refused(old, new, trained, says, remembered, run, capsys):
+    edit(run, old, new)
+    if not remembered:
+        forget_settings(run / "checkpoint.npz")
+    for words in commands(run):
+        assert_refused(capsys, words, f"{run / 'checkpoint.npz'}: trained with {trained}", f"config.toml {says}")
+
+
+def test_any_other_edited_setting_is_refused(run, capsys):
+    edit(run, "beta = 0.3", "beta = 0.5")
+    for words in commands(run):
+        assert_refused(capsys, words, "trained with model.beta = 0.3", f"{run / 'config.toml'} says 0.5")
+
+
+def test_empty_settings_are_refused(run, capsys):
+    (run / "config.toml").write_text("")
+    for words in commands(run):
+        assert_refused(capsys, words, "trained with loss.smoothness_from = 5", "says 1001")
+
+
+def test_the_checkpoint_of_another_run_is_refused(run, tmp_path, capsys):
+    other = tmp_path / "other"
+    assert main(train_words(other, "--no-evaluate", "--iterations", "3", "--seed", "4")) == 0
+    shutil.copy(other / "checkpoint.npz", run)
+    for words in commands(run):
+        assert_refused(capsys, words, f"{run / 'checkpoint.npz'}: trained with ", f"{run / 'config.toml'} says ")
+
+
+def test_a_checkpoint_from_before_the_residuals_is_of_the_run(run, tmp_path, monkeypatch):
+    from endotsr.fitting import trainer
+
+    early = tmp_path / "early"
+    save = trainer.save_state
+
+    def stop(path, state, config):
+        save(path, state, config)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(trainer, "save_state", stop)
+    assert main(train_words(early, "--no-evaluate")) == 130
+    monkeypatch.undo()
+    forget_settings(early / "checkpoint.npz")
+    assert main(["render", str(early), "--out", str(tmp_path / "pictures")]) == 0
+    assert main(["train", "--out", str(early), "--resume", "--no-evaluate"]) == 0
+    assert_same_run(run, early)
+
+
+def test_settings_that_change_no_number_may_be_edited(run):
+    edit(run, "checkpoint_every = 7", "checkpoint_every = 10")
+    edit(run, "threads = 1", "threads = 2")
+    assert main(["train", "--out", str(run), "--resume", "--no-evaluate"]) == 0
