@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from data_folder import data_folder
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.sequences.endonerf import clip_depth, input_hashes, read_endonerf, write_endonerf
+from endotsr.sequences.files import check_pairing
 from synthetic_folder import FOCAL, identity_rows, write_synthetic_folder
 
 EVERYTHING = SequenceConfig(depth_percentiles=(0.0, 100.0))
@@ -304,6 +306,60 @@ def test_hard_E3_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
     (tmp_path / "masks" / stamp(4, "mask")).rename(tmp_path / "masks" / stamp(5, "mask"))
     with pytest.raises(InputError, match=r"masks: has no file for frame 60-0 "):
         read_endonerf(tmp_path, EVERYTHING)
+
+
+NUMBERED = lambda i, kind: f"frame{i + 1}.png"
+LETTERS = lambda i, kind: f"{'abcdefghij'[i]}.{kind}.png"
+VERSIONED = lambda i, kind: f"frame_v1_{i:04d}.png" if kind == "mask" else f"frame_{i:04d}.png"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        (
+            NUMBERED,
+            "masks/frame3.png",
+            "masks/frame3_v2.png",
+            r"masks/frame3_v2.png: numbers in this name: 2; .*9 of.*10",
+        ),
+        (NUMBERED, "masks/frame4.png", "masks/zz.png", r"masks/zz.png: numbers in this name: 0; .* frame1.png .*: 1; "),
+        (NUMBERED, None, "images/overview.png", r"images/overview.png: numbers in this name: 0; .*10 of the 11 files"),
+        (LETTERS, "masks/d.mask.png", "masks/zz.png", r"masks: has no file for frame d \(images/d.color.png\)"),
+        (LETTERS, "depth/a.depth.png", "depth/a7.depth.png", r"depth/a7.depth.png: numbers in this name: 1"),
+        (
+            VERSIONED,
+            "masks/frame_v1_0003.png",
+            "masks/frame_v2_0003.png",
+            r"masks/frame_v2_0003.png: the names of masks",
+        ),
+        (
+            lambda i, kind: f"{'abcdefghij'[i]}.png" if kind == "mask" else NUMBERED(i, kind),
+            None,
+            None,
+            r"masks/a.png: no",
+        ),
+    ],
+)
+def test_hard_E3_a_name_out_of_pattern_never_shifts_the_others(tmp_path, name, old, new, message):
+    written = write_synthetic_folder(tmp_path, frames=10, width=40, name=name)
+    if new is not None:
+        cv2.imwrite(str(tmp_path / new), np.where(written.tissue[3], 0, 255).astype(np.uint8))
+    if old is not None:
+        (tmp_path / old).unlink()
+    with pytest.raises(InputError, match=message):
+        read_endonerf(tmp_path, EVERYTHING)
+
+
+def test_hard_E3_one_name_in_two_spellings_does_not_pair():
+    images = [Path("images/a.png"), Path("images/b.png")]
+    with pytest.raises(InputError, match=r"masks: the files do not match one to one; images holds 2 files, masks 3"):
+        check_pairing(images, [Path("masks/a.PNG"), Path("masks/a.png"), Path("masks/b.png")])
+
+
+@pytest.mark.parametrize("name", [NUMBERED, LETTERS, VERSIONED])
+def test_hard_E3_names_in_one_pattern_pair(tmp_path, name):
+    written = write_synthetic_folder(tmp_path, frames=10, width=40, name=name)
+    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).masks, written.tissue)
 
 
 @pytest.mark.parametrize("percentiles", [(99.0, 3.0), (-1.0, 99.0), (1.0, 100.5), (float("nan"), 99.0)])

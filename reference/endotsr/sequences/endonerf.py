@@ -4,9 +4,9 @@
     depth/*.png      z in millimetres, 0 = none
     masks/*.png      or gt_masks/*.png, white = excluded unless the configuration says otherwise
 
-File names are free; frames are ordered and paired by the number in the name. In: a folder and the `SequenceConfig`.
-Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an `InputError` of one
-line that names file, frame and reason. Knows nothing of models or training.
+File names are free, in one pattern a folder; frames are ordered and paired by the number in the name. In: a folder and
+the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an
+`InputError` of one line that names file, frame and reason. Knows nothing of models or training.
 """
 
 from concurrent.futures import ThreadPoolExecutor
