@@ -410,5 +410,6 @@ def test_real_sequence(masks, share):
     assert sequence.tissue_share == pytest.approx(share, abs=1e-4)
     assert sequence.static_camera and sequence.cameras[0].fx == pytest.approx(569.468, abs=1e-3)
     assert (sequence.cameras[0].cx, sequence.cameras[0].cy) == (320, 256)
+    assert len(sequence.notes) == 2
     with pytest.raises(InputError, match="other polarity"):
         read_endonerf(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))

@@ -117,6 +117,11 @@ def _name_keys(files: list[Path]) -> list[tuple[str]]:
     return [(key,) for key in (short if len(set(short)) == len(short) else [file.stem for file in files])]
 
 
+def shortened(names: list[str]) -> str:
+    """A list of names for a message: five of them at most, and how many more there are."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
 def hash_files(root: Path, files: Iterable[Path]) -> dict[str, str]:
     """SHA-256 in hex of every file, by its path relative to `root` (with forward slashes), in the given order."""
     found = {}
