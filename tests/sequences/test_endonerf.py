@@ -1,6 +1,7 @@
 """Reading EndoNeRF folders: what is right is read exactly, what is wrong is named."""
 
 import dataclasses
+import os
 import time
 from pathlib import Path
 
@@ -354,6 +355,20 @@ def test_hard_E3_one_name_in_two_spellings_does_not_pair():
     images = [Path("images/a.png"), Path("images/b.png")]
     with pytest.raises(InputError, match=r"masks: the files do not match one to one; images holds 2 files, masks 3"):
         check_pairing(images, [Path("masks/a.PNG"), Path("masks/a.png"), Path("masks/b.png")])
+
+
+@pytest.mark.parametrize("where", ["images", "masks", "depth"])
+def test_a_file_name_that_is_not_utf8_is_named(tmp_path, where):
+    written = write_synthetic_folder(tmp_path, name=NUMBERED)
+    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)
+    file = tmp_path / where / "frame3.png"
+    try:
+        file.rename(tmp_path / where / os.fsdecode(b"caf\xe9-frame3.png"))
+    except (OSError, UnicodeDecodeError):
+        pytest.skip("this file system takes UTF-8 names only")
+    with pytest.raises(InputError, match=rf"{where}/caf\\xe9-frame3.png: the name is not UTF-8; allowed") as caught:
+        input_hashes(tmp_path, EVERYTHING)
+    str(caught.value).encode("utf-8")
 
 
 @pytest.mark.parametrize("name", [NUMBERED, LETTERS, VERSIONED])

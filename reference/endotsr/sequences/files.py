@@ -1,6 +1,7 @@
 """The picture files of a sequence folder: listing them in time order, pairing them across folders, hashing them."""
 
 import hashlib
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -14,14 +15,15 @@ ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, 
 def list_pictures(folder: Path) -> list[Path]:
     """PNG files of a folder in time order: by the numbers in their names, or by name where no name has a number.
 
-    Raises:  InputError if the folder is missing or holds no PNG, if a name has more or fewer numbers in it than the
-    others, or if two files carry the same number.
+    Raises:  InputError if the folder is missing or holds no PNG, if a name is not UTF-8 or has more or fewer numbers in
+    it than the others, or if two files carry the same number.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
     files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".png" and not f.name.startswith("."))
     if not files:
         raise InputError(f"{folder}: holds no PNG file")
+    _check_names_are_text(files)
     _check_names_alike(files)
     numbers = frame_numbers(files)
     if numbers is None:
@@ -81,6 +83,16 @@ def _check_same_keys(here: list, there: list, reference: list[Path], other: list
             )
     if here != there:  # one name in two spellings, such as a.png and a.PNG
         raise InputError(f"{other[0].parent}: the files do not match one to one; {_counts(reference, other)}")
+
+
+def _check_names_are_text(files: list[Path]) -> None:
+    """Refuse a path that is not UTF-8: it could be read, but not be written into the record of a run."""
+    for file in files:
+        try:
+            str(file).encode("utf-8")
+        except UnicodeEncodeError:
+            shown = os.fsencode(file).decode("utf-8", "backslashreplace")
+            raise InputError(f"{shown}: the name is not UTF-8; allowed: file and folder names in UTF-8") from None
 
 
 def _check_names_alike(files: list[Path]) -> None:
