@@ -143,7 +143,10 @@ def test_hard_E1_wrong_polarity_is_recognised(tmp_path, mask_folder, depth_behin
     """By missing depth, and where the tool has depth too, by colour."""
     write_synthetic_folder(tmp_path, mask_folder=mask_folder, depth_behind_tool=depth_behind_tool)
     wrong = SequenceConfig(masks=mask_folder, excluded_value="black")
-    with pytest.raises(InputError, match=rf"{mask_folder}: .*other polarity: set excluded_value = 'white'"):
+    toml = r'\(TOML: \[sequence\] excluded_value = "white"\).* --sequence.allow-mask-share'
+    with pytest.raises(
+        InputError, match=rf"{mask_folder}: .*other polarity: set --sequence.excluded-value white {toml}"
+    ):
         read_endonerf(tmp_path, wrong)
     forced = SequenceConfig(masks=mask_folder, excluded_value="black", allow_mask_share=True)
     assert read_endonerf(tmp_path, forced).tissue_share < 0.5
@@ -154,7 +157,10 @@ def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
     for value, share in ((0, "100.0%"), (255, "0.0%")):
         for file in (tmp_path / "masks").iterdir():
             cv2.imwrite(str(file), np.full((24, 32), value, np.uint8))
-        with pytest.raises(InputError, match=rf"masks: {share} of the pixels count as tissue; .*allow_mask_share"):
+        with pytest.raises(
+            InputError,
+            match=rf"masks: {share} of the pixels count as tissue; .*--sequence.allow-mask-share .*allow_mask_share",
+        ):
             read_endonerf(tmp_path, SequenceConfig())
         sequence = read_endonerf(tmp_path, SequenceConfig(allow_mask_share=True))
         assert sequence.tissue_share == (value == 0)
@@ -395,6 +401,24 @@ def test_kept_frames_are_not_shared_with_a_changed_copy(tmp_path):
 def test_missing_sequence_folder(tmp_path):
     with pytest.raises(InputError, match=r"nowhere: sequence folder not found"):
         read_endonerf(tmp_path / "nowhere", SequenceConfig())
+
+
+def test_a_file_in_place_of_the_sequence_folder(tmp_path):
+    (tmp_path / "clip.mp4").write_bytes(b"")
+    with pytest.raises(InputError, match=r"clip.mp4: is a file; allowed: a folder with images/, depth/, masks/"):
+        read_endonerf(tmp_path / "clip.mp4", SequenceConfig())
+
+
+@pytest.mark.parametrize("content", [b"1 0 0 0 24\n", b"", b"PK\x03\x04zip", None])
+def test_a_pose_file_that_is_no_array_gets_no_advice_on_pickles(tmp_path, content):
+    write_synthetic_folder(tmp_path)
+    if content is None:
+        np.save(tmp_path / "poses_bounds.npy", np.array([{}] * 5, object), allow_pickle=True)
+    else:
+        (tmp_path / "poses_bounds.npy").write_bytes(content)
+    with pytest.raises(InputError, match=r"poses_bounds.npy: not a plain .* an .npy file of numbers") as caught:
+        read_endonerf(tmp_path, SequenceConfig())
+    assert "pickle" not in str(caught.value)
 
 
 def test_all_depth_in_front_of_the_near_plane(tmp_path):

@@ -51,6 +51,8 @@ def select_files(folder: Path, config: SequenceConfig) -> Folder:
     Raises:  InputError for a missing folder, a file without its partner, a bad frame range or an impossible split.
     """
     folder = Path(folder)
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file; allowed: a folder with images/, depth/, {config.masks}/ and poses")
     if not folder.is_dir():
         raise InputError(f"{folder}: sequence folder not found")
     images, masks, depth = (list_pictures(folder / name) for name in ("images", config.masks, "depth"))

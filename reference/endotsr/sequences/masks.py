@@ -76,9 +76,7 @@ def check_tissue_share(masks: NDArray[np.bool_], where: str, excluded_value: str
         if share < LEAST_TISSUE_SHARE
         else f"the masks exclude nothing: they may be empty or hold no {excluded_value} pixel"
     )
-    raise InputError(
-        f"{where}: {share:.1%} of the pixels count as tissue; {cause}; set allow_mask_share if this is right"
-    )
+    raise InputError(f"{where}: {share:.1%} of the pixels count as tissue; {cause}; if this is right, set {ALLOW}")
 
 
 def check_polarity(
@@ -104,7 +102,10 @@ def check_polarity(
     missing = depth == 0
     on_tissue, on_excluded = float(missing[masks].mean()), float(missing[~masks].mean())
     other = "black" if excluded_value == "white" else "white"
-    advice = f"the masks seem to have the other polarity: set excluded_value = {other!r} (or allow_mask_share to go on)"
+    advice = (
+        f"the masks seem to have the other polarity: set --sequence.excluded-value {other}"
+        f' (TOML: [sequence] excluded_value = "{other}"); to go on with these masks, set {ALLOW}'
+    )
     if missing.mean() >= LEAST_MISSING_SHARE and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:
