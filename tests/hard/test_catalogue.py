@@ -39,6 +39,6 @@ def test_the_catalogue_is_complete():
     """The families and how many cases each has: a lost row of the table is noticed."""
     sizes = {letter: sum(case[0] == letter for case in CATALOGUE) for letter in sorted({c[0] for c in CATALOGUE})}
     assert sizes == {
-        "A": 6, "C": 7, "D": 5, "E": 4, "F": 8, "G": 5, "H": 5, "I": 1, "K": 3, "L": 7, "M": 2, "N": 4, "O": 4,
+        "A": 6, "C": 7, "D": 5, "E": 6, "F": 8, "G": 5, "H": 5, "I": 1, "K": 3, "L": 7, "M": 2, "N": 4, "O": 4,
         "P": 7, "Q": 2, "S": 4, "T": 4, "W": 6, "X": 3,
     }  # fmt: skip

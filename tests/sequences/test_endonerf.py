@@ -1,7 +1,9 @@
 """Reading EndoNeRF folders: what is right is read exactly, what is wrong is named."""
 
 import dataclasses
+import os
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,6 +13,7 @@ from data_folder import data_folder
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.sequences.endonerf import clip_depth, input_hashes, read_endonerf, write_endonerf
+from endotsr.sequences.files import check_pairing
 from synthetic_folder import FOCAL, identity_rows, write_synthetic_folder
 
 EVERYTHING = SequenceConfig(depth_percentiles=(0.0, 100.0))
@@ -140,7 +143,10 @@ def test_hard_E1_wrong_polarity_is_recognised(tmp_path, mask_folder, depth_behin
     """By missing depth, and where the tool has depth too, by colour."""
     write_synthetic_folder(tmp_path, mask_folder=mask_folder, depth_behind_tool=depth_behind_tool)
     wrong = SequenceConfig(masks=mask_folder, excluded_value="black")
-    with pytest.raises(InputError, match=rf"{mask_folder}: .*other polarity: set excluded_value = 'white'"):
+    toml = r'\(TOML: \[sequence\] excluded_value = "white"\).* --sequence.allow-mask-share'
+    with pytest.raises(
+        InputError, match=rf"{mask_folder}: .*other polarity: set --sequence.excluded-value white {toml}"
+    ):
         read_endonerf(tmp_path, wrong)
     forced = SequenceConfig(masks=mask_folder, excluded_value="black", allow_mask_share=True)
     assert read_endonerf(tmp_path, forced).tissue_share < 0.5
@@ -151,7 +157,10 @@ def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
     for value, share in ((0, "100.0%"), (255, "0.0%")):
         for file in (tmp_path / "masks").iterdir():
             cv2.imwrite(str(file), np.full((24, 32), value, np.uint8))
-        with pytest.raises(InputError, match=rf"masks: {share} of the pixels count as tissue; .*allow_mask_share"):
+        with pytest.raises(
+            InputError,
+            match=rf"masks: {share} of the pixels count as tissue; .*--sequence.allow-mask-share .*allow_mask_share",
+        ):
             read_endonerf(tmp_path, SequenceConfig())
         sequence = read_endonerf(tmp_path, SequenceConfig(allow_mask_share=True))
         assert sequence.tissue_share == (value == 0)
@@ -306,6 +315,74 @@ def test_hard_E3_time_stamps_in_file_names_order_and_pair_the_frames(tmp_path):
         read_endonerf(tmp_path, EVERYTHING)
 
 
+NUMBERED = lambda i, kind: f"frame{i + 1}.png"
+LETTERS = lambda i, kind: f"{'abcdefghij'[i]}.{kind}.png"
+VERSIONED = lambda i, kind: f"frame_v1_{i:04d}.png" if kind == "mask" else f"frame_{i:04d}.png"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        (
+            NUMBERED,
+            "masks/frame3.png",
+            "masks/frame3_v2.png",
+            r"masks/frame3_v2.png: numbers in this name: 2; .*9 of.*10",
+        ),
+        (NUMBERED, "masks/frame4.png", "masks/zz.png", r"masks/zz.png: numbers in this name: 0; .* frame1.png .*: 1; "),
+        (NUMBERED, None, "images/overview.png", r"images/overview.png: numbers in this name: 0; .*10 of the 11 files"),
+        (LETTERS, "masks/d.mask.png", "masks/zz.png", r"masks: has no file for frame d \(images/d.color.png\)"),
+        (LETTERS, "depth/a.depth.png", "depth/a7.depth.png", r"depth/a7.depth.png: numbers in this name: 1"),
+        (
+            VERSIONED,
+            "masks/frame_v1_0003.png",
+            "masks/frame_v2_0003.png",
+            r"masks/frame_v2_0003.png: the names of masks",
+        ),
+        (
+            lambda i, kind: f"{'abcdefghij'[i]}.png" if kind == "mask" else NUMBERED(i, kind),
+            None,
+            None,
+            r"masks/a.png: no",
+        ),
+    ],
+)
+def test_hard_E3_a_name_out_of_pattern_never_shifts_the_others(tmp_path, name, old, new, message):
+    written = write_synthetic_folder(tmp_path, frames=10, width=40, name=name)
+    if new is not None:
+        cv2.imwrite(str(tmp_path / new), np.where(written.tissue[3], 0, 255).astype(np.uint8))
+    if old is not None:
+        (tmp_path / old).unlink()
+    with pytest.raises(InputError, match=message):
+        read_endonerf(tmp_path, EVERYTHING)
+
+
+def test_hard_E3_one_name_in_two_spellings_does_not_pair():
+    images = [Path("images/a.png"), Path("images/b.png")]
+    with pytest.raises(InputError, match=r"masks: the files do not match one to one; images holds 2 files, masks 3"):
+        check_pairing(images, [Path("masks/a.PNG"), Path("masks/a.png"), Path("masks/b.png")])
+
+
+@pytest.mark.parametrize("where", ["images", "masks", "depth"])
+def test_a_file_name_that_is_not_utf8_is_named(tmp_path, where):
+    written = write_synthetic_folder(tmp_path, name=NUMBERED)
+    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).images, written.images)
+    file = tmp_path / where / "frame3.png"
+    try:
+        file.rename(tmp_path / where / os.fsdecode(b"caf\xe9-frame3.png"))
+    except (OSError, UnicodeDecodeError):
+        pytest.skip("this file system takes UTF-8 names only")
+    with pytest.raises(InputError, match=rf"{where}/caf\\xe9-frame3.png: the name is not UTF-8; allowed") as caught:
+        input_hashes(tmp_path, EVERYTHING)
+    str(caught.value).encode("utf-8")
+
+
+@pytest.mark.parametrize("name", [NUMBERED, LETTERS, VERSIONED])
+def test_hard_E3_names_in_one_pattern_pair(tmp_path, name):
+    written = write_synthetic_folder(tmp_path, frames=10, width=40, name=name)
+    np.testing.assert_array_equal(read_endonerf(tmp_path, EVERYTHING).masks, written.tissue)
+
+
 @pytest.mark.parametrize("percentiles", [(99.0, 3.0), (-1.0, 99.0), (1.0, 100.5), (float("nan"), 99.0)])
 def test_bad_percentiles_are_named(tmp_path, percentiles):
     write_synthetic_folder(tmp_path)
@@ -324,6 +401,24 @@ def test_kept_frames_are_not_shared_with_a_changed_copy(tmp_path):
 def test_missing_sequence_folder(tmp_path):
     with pytest.raises(InputError, match=r"nowhere: sequence folder not found"):
         read_endonerf(tmp_path / "nowhere", SequenceConfig())
+
+
+def test_a_file_in_place_of_the_sequence_folder(tmp_path):
+    (tmp_path / "clip.mp4").write_bytes(b"")
+    with pytest.raises(InputError, match=r"clip.mp4: is a file; allowed: a folder with images/, depth/, masks/"):
+        read_endonerf(tmp_path / "clip.mp4", SequenceConfig())
+
+
+@pytest.mark.parametrize("content", [b"1 0 0 0 24\n", b"", b"PK\x03\x04zip", None])
+def test_a_pose_file_that_is_no_array_gets_no_advice_on_pickles(tmp_path, content):
+    write_synthetic_folder(tmp_path)
+    if content is None:
+        np.save(tmp_path / "poses_bounds.npy", np.array([{}] * 5, object), allow_pickle=True)
+    else:
+        (tmp_path / "poses_bounds.npy").write_bytes(content)
+    with pytest.raises(InputError, match=r"poses_bounds.npy: not a plain .* an .npy file of numbers") as caught:
+        read_endonerf(tmp_path, SequenceConfig())
+    assert "pickle" not in str(caught.value)
 
 
 def test_all_depth_in_front_of_the_near_plane(tmp_path):
@@ -354,5 +449,6 @@ def test_real_sequence(masks, share):
     assert sequence.tissue_share == pytest.approx(share, abs=1e-4)
     assert sequence.static_camera and sequence.cameras[0].fx == pytest.approx(569.468, abs=1e-3)
     assert (sequence.cameras[0].cx, sequence.cameras[0].cy) == (320, 256)
+    assert len(sequence.notes) == 2
     with pytest.raises(InputError, match="other polarity"):
         read_endonerf(folder, SequenceConfig(masks=masks, excluded_value="black", frames="0:12"))

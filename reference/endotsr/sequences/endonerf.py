@@ -4,9 +4,9 @@
     depth/*.png      z in millimetres, 0 = none
     masks/*.png      or gt_masks/*.png, white = excluded unless the configuration says otherwise
 
-File names are free; frames are ordered and paired by the number in the name. In: a folder and the `SequenceConfig`.
-Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an `InputError` of one
-line that names file, frame and reason. Knows nothing of models or training.
+File names are free, in one pattern a folder; frames are ordered and paired by the number in the name. In: a folder and
+the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an
+`InputError` of one line that names file, frame and reason. Knows nothing of models or training.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, read_png, write_png
-from endotsr.sequences.files import check_pairing, hash_files, list_pictures
-from endotsr.sequences.masks import check_polarity, check_tissue_share, threshold_masks
+from endotsr.sequences.files import check_pairing, hash_files, list_pictures, shortened
+from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_share, sparse_step, threshold_masks
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames, time_stamps
@@ -28,6 +28,9 @@ from endotsr.splatting.camera import scale_camera
 
 NEAR = 0.2  # near plane of every preset, scene units
 LEAST_SIDE = 16  # pixels; below, the three-level pyramid has nothing left to compare
+FAR_OFF = 4.0  # times the usual median depth; measured medians of a sequence lie within 1.2
+ANOTHER_SCALE = 64.0  # times the usual median depth: 8 bits stretched to 16 make 256
+LEAST_DEPTH_SHARE = 0.05  # of a frame: the median of less may be that of a few outliers
 UNIT = "mm"
 
 
@@ -48,6 +51,8 @@ def select_files(folder: Path, config: SequenceConfig) -> Folder:
     Raises:  InputError for a missing folder, a file without its partner, a bad frame range or an impossible split.
     """
     folder = Path(folder)
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file; allowed: a folder with images/, depth/, {config.masks}/ and poses")
     if not folder.is_dir():
         raise InputError(f"{folder}: sequence folder not found")
     images, masks, depth = (list_pictures(folder / name) for name in ("images", config.masks, "depth"))
@@ -88,8 +93,10 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_mask_share)
     notes += [
         f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
-        _depth_note(depth, near, files.depth[0].parent),
+        _depth_note(depth, near, files.depth),
     ]
+    mask_names = [str(file) for file in files.masks]
+    notes += check_single_masks(masks, depth, images, mask_names, config.allow_mask_share)
     height, width = images.shape[2:]
     cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
     if config.scale != 1.0:
@@ -158,14 +165,18 @@ def _read_pictures(
     images = np.empty((n, 3, height, width), np.uint8)
     depth = np.empty((n, height, width), np.float32)
     masks: list[NDArray] = [first] * n
+    depth_types = [first.dtype] * n
 
     def read_frame(i: int) -> None:
         images[i] = _read_colour(files.images[i], width, height)
         masks[i] = _read_grey(files.masks[i], width, height)
-        depth[i] = clip_depth(_read_grey(files.depth[i], width, height), config.depth_percentiles)
+        raw = _read_grey(files.depth[i], width, height)
+        depth_types[i] = raw.dtype
+        depth[i] = clip_depth(raw, config.depth_percentiles)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame that has one
+    _check_depth_scale(depth, files.depth, depth_types)
     return images, threshold_masks(masks, [str(file) for file in files.masks], notes), depth
 
 
@@ -204,9 +215,10 @@ def _read_sized(path: Path, width: int, height: int) -> NDArray:
     return pixels
 
 
-def _depth_note(depth: NDArray[np.float32], near: float, where: Path) -> str:
+def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path]) -> str:
     """A sentence on the depth prior; refuses a sequence without any."""
     valid = depth > 0
+    where = files[0].parent
     if not valid.any():
         raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
     values = depth[valid]
@@ -214,12 +226,39 @@ def _depth_note(depth: NDArray[np.float32], near: float, where: Path) -> str:
         raise InputError(f"{where}: the largest depth is {values.max():g}, in front of the near plane at {near:g}")
     empty = np.flatnonzero(~valid.any(axis=(1, 2)))
     behind = float((values <= near).mean())
+    far_off = [f"{files[i].name} ({ratio:.3g} times)" for i, ratio in _far_off(depth, FAR_OFF)]
     return (
         f"depth in {UNIT}, {values.min():g} to {values.max():g} after clipping;"
         f" missing on {1 - valid.mean():.4f} of the pixels"
         + (f"; frames without any: {', '.join(map(str, empty))}" if empty.size else "")
         + (f"; {behind:.1%} of it lies in front of the near plane at {near:g}" if behind else "")
+        + (f"; far from the usual median, perhaps in another unit: {shortened(far_off)}" if far_off else "")
     )
+
+
+def _check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype]) -> None:
+    """Refuse a depth picture that fills the 16 bits while others hold millimetres in 8 bits.
+
+    Mixed bit depths alone are legal, published sequences have them: one far value makes a picture 16-bit.
+    """
+    for i, ratio in _far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
+        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_SHARE * depth[i].size:
+            bits = 8 * types[i].itemsize
+            other = next(j for j, kind in enumerate(types) if kind != types[i])
+            raise InputError(
+                f"{files[i]}: {bits}-bit picture, its median depth is {ratio:.3g} times the usual one, while"
+                f" {files[other].name} has {8 * types[other].itemsize} bits; allowed: {UNIT} in every picture"
+            )
+
+
+def _far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]]:
+    """Frames whose median depth is over `factor` times the usual one or under its inverse, with that ratio."""
+    step = sparse_step(depth.shape[1])
+    sparse = depth[:, ::step, ::step]
+    medians = {i: float(np.median(frame[frame > 0])) for i, frame in enumerate(sparse) if (frame > 0).any()}
+    usual = float(np.median(list(medians.values()) or [1.0]))
+    ratios = [(i, median / usual) for i, median in medians.items()]
+    return [(i, ratio) for i, ratio in ratios if not 1 / factor <= ratio <= factor]
 
 
 def _scaled(

@@ -1,23 +1,30 @@
 """The picture files of a sequence folder: listing them in time order, pairing them across folders, hashing them."""
 
 import hashlib
+import os
 import re
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
 from endotsr.errors import InputError
 
+ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
+
 
 def list_pictures(folder: Path) -> list[Path]:
-    """PNG files of a folder in time order: by the numbers in their names where every name has them, else by name.
+    """PNG files of a folder in time order: by the numbers in their names, or by name where no name has a number.
 
-    Raises:  InputError if the folder is missing or holds no PNG, or if two files carry the same number.
+    Raises:  InputError if the folder is missing or holds no PNG, if a name is not UTF-8 or has more or fewer numbers in
+    it than the others, or if two files carry the same number.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
     files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".png" and not f.name.startswith("."))
     if not files:
         raise InputError(f"{folder}: holds no PNG file")
+    _check_names_are_text(files)
+    _check_names_alike(files)
     numbers = frame_numbers(files)
     if numbers is None:
         return files
@@ -33,10 +40,7 @@ def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:
 
     None if the names carry no such number. A single file has its last group of digits.
     """
-    groups = [re.findall(r"\d+", file.stem) for file in files]
-    if not groups[0] or len({len(g) for g in groups}) != 1:
-        return None
-    columns = [[int(digits) for digits in column] for column in zip(*groups)]
+    columns = _digit_columns(files)
     varying = [column for column in columns if len(set(column)) > 1]
     if len(files) == 1:
         varying = columns[-1:]
@@ -44,26 +48,90 @@ def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:
 
 
 def check_pairing(reference: list[Path], other: list[Path]) -> None:
-    """Refuse two folders whose files do not belong together, by count and by frame number.
+    """Refuse two folders whose files do not belong together: by frame number, or by name where neither has numbers.
 
-    Raises:  InputError naming the first frame that has no partner.
+    Raises:  InputError naming the first frame that has no partner, or the file whose name cannot be paired.
     """
     here, there = frame_numbers(reference), frame_numbers(other)
-    a, b = reference[0].parent, other[0].parent
-    if here and there and len(here[0]) == len(there[0]) and here != there:
-        lonely = sorted(set(here) - set(there))
-        if lonely:
-            name = reference[here.index(lonely[0])].name
-            raise InputError(
-                f"{b}: has no file for frame {_text(lonely[0])} ({a.name}/{name}); {_counts(reference, other)}"
-            )
-        surplus = sorted(set(there) - set(here))
-        name = other[there.index(surplus[0])].name
+    if here is None and there is None:
+        _check_same_keys(_name_keys(reference), _name_keys(other), reference, other)
+    elif here is None or there is None:
+        bare, numbered = (reference, other) if here is None else (other, reference)
         raise InputError(
-            f"{a}: has no file for frame {_text(surplus[0])} ({b.name}/{name}); {_counts(reference, other)}"
+            f"{bare[0]}: no frame number tells the names of {bare[0].parent.name} apart, while"
+            f" {numbered[0].parent.name} has them ({numbered[0].name}); {_counts(reference, other)}; {ALLOWED_NAMES}"
         )
-    if len(reference) != len(other):
-        raise InputError(f"{b}: the number of files does not match; {_counts(reference, other)}")
+    elif len(here[0]) != len(there[0]):
+        wide, narrow = (reference, other) if len(here[0]) > len(there[0]) else (other, reference)
+        raise InputError(
+            f"{_departing(wide)}: the names of {wide[0].parent.name} differ in more than one number, those of"
+            f" {narrow[0].parent.name} ({narrow[0].name}) in fewer; {_counts(reference, other)}; {ALLOWED_NAMES}"
+        )
+    else:
+        _check_same_keys(here, there, reference, other)
+
+
+def _check_same_keys(here: list, there: list, reference: list[Path], other: list[Path]) -> None:
+    """Refuse the first file whose key, a frame number or a name, the other folder lacks."""
+    for keys, files, missing_keys, missing_files in ((here, reference, there, other), (there, other, here, reference)):
+        known = set(missing_keys)
+        lonely = next((i for i, key in enumerate(keys) if key not in known), None)
+        if lonely is not None:
+            raise InputError(
+                f"{missing_files[0].parent}: has no file for frame {_text(keys[lonely])}"
+                f" ({files[0].parent.name}/{files[lonely].name}); {_counts(reference, other)}"
+            )
+    if here != there:  # one name in two spellings, such as a.png and a.PNG
+        raise InputError(f"{other[0].parent}: the files do not match one to one; {_counts(reference, other)}")
+
+
+def _check_names_are_text(files: list[Path]) -> None:
+    """Refuse a path that is not UTF-8: it could be read, but not be written into the record of a run."""
+    for file in files:
+        try:
+            str(file).encode("utf-8")
+        except UnicodeEncodeError:
+            shown = os.fsencode(file).decode("utf-8", "backslashreplace")
+            raise InputError(f"{shown}: the name is not UTF-8; allowed: file and folder names in UTF-8") from None
+
+
+def _check_names_alike(files: list[Path]) -> None:
+    """Refuse a file whose name holds more or fewer numbers than most: no order by number would include it."""
+    counts = [len(re.findall(r"\d+", file.stem)) for file in files]
+    usual, frequency = Counter(counts).most_common(1)[0]
+    if frequency == len(files):
+        return
+    odd = next(i for i, count in enumerate(counts) if count != usual)
+    raise InputError(
+        f"{files[odd]}: numbers in this name: {counts[odd]}; in the names of {frequency} of the {len(files)} files"
+        f" here, {files[counts.index(usual)].name} for one: {usual}; {ALLOWED_NAMES}"
+    )
+
+
+def _digit_columns(files: list[Path]) -> list[list[int]]:
+    """The groups of digits of every name: one list a group, with one number a file."""
+    groups = [re.findall(r"\d+", file.stem) for file in files]
+    return [[int(digits) for digits in column] for column in zip(*groups)]
+
+
+def _departing(files: list[Path]) -> Path:
+    """The first file without a number that most names share, such as a version; else the first file."""
+    for column in _digit_columns(files):
+        value, frequency = Counter(column).most_common(1)[0]
+        if len(files) / 2 < frequency < len(files):
+            return next(file for file, number in zip(files, column) if number != value)
+    return files[0]
+
+
+def _name_keys(files: list[Path]) -> list[tuple[str]]:
+    """What pairs names without numbers: all before the first dot if that tells the files apart, else the stem."""
+    short = [file.name.split(".")[0] for file in files]
+    return [(key,) for key in (short if len(set(short)) == len(short) else [file.stem for file in files])]
+
+
+def shortened(names: list[str]) -> str:
+    """A list of names for a message: five of them at most, and how many more there are."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 def hash_files(root: Path, files: Iterable[Path]) -> dict[str, str]:
@@ -83,7 +151,7 @@ def _counts(a: list[Path], b: list[Path]) -> str:
     return f"{a[0].parent.name} holds {len(a)} files, {b[0].parent.name} {len(b)}"
 
 
-def _text(number: tuple[int, ...]) -> str:
+def _text(number: tuple) -> str:
     return "-".join(map(str, number))
 
 

@@ -13,16 +13,23 @@ Instruments and borders are where stereo depth is missing, so depth decides when
 colour does.
 """
 
+from collections import Counter
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.sequences.files import shortened
 
 LEAST_TISSUE_SHARE = 0.05
 MOST_SOFT_SHARE = 0.05  # of a frame: more pixels between black and white are no mask
 LEAST_MISSING_SHARE = 0.01  # of all pixels: with less missing depth, depth says nothing about polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
+SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN for one frame, where less evidence must weigh more
+OPPOSITE_SHARE = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
+ALLOW = "--sequence.allow-mask-share (TOML: [sequence] allow_mask_share = true)"
 
 
 def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> NDArray[np.bool_]:
@@ -31,10 +38,13 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
     raw      n pictures (H, W) of integers; {0, 1} when no value of any picture exceeds 1, else {0, 255} (or {0, 65535})
     returns  (n, H, W) bool, True = white: at least half of full white
 
-    In-between values are counted in `notes`. Raises InputError naming a picture with more than 5 % of them.
+    In-between values are counted in `notes`. Raises InputError naming a picture with more than 5 % of them, or an
+    8-bit picture among pictures whose white is 65535 (or the other way round).
     """
     largest = max(int(picture.max()) for picture in raw)
     white = 1 if largest <= 1 else 255 if largest <= 255 else 65535
+    if white == 65535:
+        _check_one_bit_depth(names, [picture.dtype for picture in raw])
     soft_total = 0
     result = np.empty((len(raw), *raw[0].shape), bool)
     for i, picture in enumerate(raw):
@@ -66,9 +76,7 @@ def check_tissue_share(masks: NDArray[np.bool_], where: str, excluded_value: str
         if share < LEAST_TISSUE_SHARE
         else f"the masks exclude nothing: they may be empty or hold no {excluded_value} pixel"
     )
-    raise InputError(
-        f"{where}: {share:.1%} of the pixels count as tissue; {cause}; set allow_mask_share if this is right"
-    )
+    raise InputError(f"{where}: {share:.1%} of the pixels count as tissue; {cause}; if this is right, set {ALLOW}")
 
 
 def check_polarity(
@@ -94,7 +102,10 @@ def check_polarity(
     missing = depth == 0
     on_tissue, on_excluded = float(missing[masks].mean()), float(missing[~masks].mean())
     other = "black" if excluded_value == "white" else "white"
-    advice = f"the masks seem to have the other polarity: set excluded_value = {other!r} (or allow_mask_share to go on)"
+    advice = (
+        f"the masks seem to have the other polarity: set --sequence.excluded-value {other}"
+        f' (TOML: [sequence] excluded_value = "{other}"); to go on with these masks, set {ALLOW}'
+    )
     if missing.mean() >= LEAST_MISSING_SHARE and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:
@@ -105,6 +116,113 @@ def check_polarity(
     if excluded_redness - tissue_redness > REDNESS_MARGIN and not allow:
         raise InputError(f"{where}: with {excluded_value} = excluded, {found}; {advice}")
     return found
+
+
+def check_single_masks(
+    masks: NDArray[np.bool_],
+    depth: NDArray[np.floating],
+    images: NDArray[np.uint8],
+    names: list[str],
+    allow: bool,
+) -> list[str]:
+    """Refuse a mask that is wrong while the others are right, which no sum over the frames shows.
+
+    masks, depth, images   as for `check_polarity`
+    names    n mask files
+    returns  notes on frames without any tissue or without anything excluded: both are legal, and rare
+
+    Wrong if (a) a frame has some tissue, but less than 5 %, while half the frames have more; (b) it differs on more
+    than 75 % of the pixels from the frame before and the frame after it (frames without tissue left out); or (c) it
+    resembles the opposite of most masks, and the pictures contradict it but not most of the others.
+
+    Raises:  InputError naming the file, the reason and the setting that overrides; with `allow` it becomes a note.
+    """
+    step = sparse_step(masks.shape[1])
+    sparse = masks[:, ::step, ::step]
+    shares = np.count_nonzero(masks, axis=(1, 2)) / masks[0].size
+    wrong = _too_little_tissue(shares) | _against_pictures(
+        sparse, depth[:, ::step, ::step], images[:, :, ::step, ::step]
+    )
+    wrong |= _against_neighbours(sparse, shares)
+    notes = []
+    if wrong:
+        first = min(wrong)
+        more = f" (more masks look wrong: {len(wrong) - 1})" if len(wrong) > 1 else ""
+        found = f"{names[first]}: {wrong[first]}{more}"
+        if not allow:
+            raise InputError(f"{found}; is this mask inverted? If it is right, set {ALLOW}")
+        notes.append(found)
+    for frames, what in ((shares == 0, "no tissue, hence nothing to compare"), (shares == 1, "nothing excluded")):
+        if frames.any():
+            notes.append(f"{what}: mask {shortened([Path(names[i]).name for i in np.flatnonzero(frames)])}")
+    return notes
+
+
+def sparse_step(height: int) -> int:
+    """The step between rows and columns that leaves about 128 rows: enough for a share or a median, and quick."""
+    return max(1, height // 128)
+
+
+def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
+    """Refuse 8-bit masks among 16-bit ones: what is white in one kind is almost black in the other."""
+    usual, frequency = Counter(types).most_common(1)[0]
+    odd = next((i for i, kind in enumerate(types) if kind != usual), None)
+    if odd is not None:
+        raise InputError(
+            f"{names[odd]}: {8 * types[odd].itemsize}-bit picture; {frequency} of the {len(types)} masks have"
+            f" {8 * usual.itemsize} bits, {Path(names[types.index(usual)]).name} for one; allowed: one bit depth"
+        )
+
+
+def _too_little_tissue(shares: NDArray[np.floating]) -> dict[int, str]:
+    usual = float(np.median(shares))
+    if usual < LEAST_TISSUE_SHARE:
+        return {}
+    few = np.flatnonzero((shares > 0) & (shares < LEAST_TISSUE_SHARE))
+    return {int(i): f"{shares[i]:.1%} of the pixels count as tissue, in the median frame {usual:.1%}" for i in few}
+
+
+def _against_neighbours(masks: NDArray[np.bool_], shares: NDArray[np.floating]) -> dict[int, str]:
+    """Frames that are nearly the opposite of the two nearest frames with tissue."""
+    found = {}
+    usable = [int(i) for i in np.flatnonzero(shares > 0)]
+    for k, i in enumerate(usable):
+        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # the first and the last frame have both on one side
+        differing = [float((masks[i] != masks[j]).mean()) for j in usable[start : start + 3] if j != i]
+        if shares[i] < 1 and len(differing) == 2 and min(differing) > OPPOSITE_SHARE:
+            found[i] = (
+                f"it differs from the masks of the nearest two frames on {min(differing):.1%} of the pixels or more"
+            )
+    return found
+
+
+def _against_pictures(
+    masks: NDArray[np.bool_], depth: NDArray[np.floating], images: NDArray[np.uint8]
+) -> dict[int, str]:
+    """Frames that resemble the opposite of the usual mask and that depth, or else colour, contradicts."""
+    verdicts = [_verdict(mask, frame == 0, image) for mask, frame, image in zip(masks, depth, images)]
+    signs = np.array([sign for sign, _ in verdicts])
+    if np.count_nonzero(signs < 0) >= np.count_nonzero(signs > 0):
+        return {}  # not single frames: a matter of `check_polarity`
+    usual = masks.mean(axis=0) >= 0.5
+    resembles_opposite = (masks != usual).mean(axis=(1, 2)) > 0.5
+    return {int(i): verdicts[i][1] for i in np.flatnonzero((signs < 0) & resembles_opposite)}
+
+
+def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray[np.uint8]) -> tuple[int, str]:
+    """Whether the picture supports one mask (1), contradicts it (-1) or says nothing (0), and by what."""
+    if mask.all() or not mask.any():
+        return 0, ""
+    on_tissue, on_excluded = float(missing[mask].mean()), float(missing[~mask].mean())
+    if missing.mean() >= LEAST_MISSING_SHARE and abs(on_tissue - on_excluded) > SINGLE_MISSING_MARGIN:
+        found = f"depth is missing on {on_tissue:.1%} of its tissue and {on_excluded:.1%} of its excluded pixels"
+        return (-1 if on_tissue > on_excluded else 1), found
+    redness = image[0].astype(np.int32) - image[2]
+    on_tissue, on_excluded = float(redness[mask].mean()), float(redness[~mask].mean())
+    if abs(on_tissue - on_excluded) <= REDNESS_MARGIN:
+        return 0, ""
+    found = f"mean red minus blue is {on_tissue:.0f} on its tissue and {on_excluded:.0f} on its excluded pixels"
+    return (-1 if on_tissue < on_excluded else 1), found
 
 
 def _redness(images: NDArray[np.uint8], masks: NDArray[np.bool_]) -> tuple[float, float]:

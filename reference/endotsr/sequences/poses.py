@@ -15,6 +15,8 @@ from endotsr.errors import InputError
 from endotsr.splatting.camera import Camera, camera_centre
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
+ARRAY_START = b"\x93NUMPY"  # first bytes of every .npy file
+ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
 FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 that still is a rotation written with few digits
 STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry spreads by more
@@ -34,9 +36,15 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
     try:
-        rows = np.load(path, allow_pickle=False)
+        with path.open("rb") as stream:
+            start = stream.read(len(ARRAY_START))
+        # NumPy would take any other file for a pickle and advise to load that.
+        rows = np.load(path, allow_pickle=False) if start == ARRAY_START else None
     except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: not a plain NumPy array file: {str(error).splitlines()[0]}") from None
+        reason = "it holds Python objects" if "allow_pickle" in str(error) else str(error).splitlines()[0]
+        raise InputError(f"{path}: not a plain NumPy array file: {reason}; {ALLOWED_POSES}") from None
+    if rows is None:
+        raise InputError(f"{path}: not a plain NumPy array file; {ALLOWED_POSES}")
     if not isinstance(rows, np.ndarray) or rows.dtype.kind not in "fiu":
         raise InputError(f"{path}: not one array of real numbers")
     if rows.ndim != 2 or rows.shape[1] != 17:
