@@ -27,8 +27,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.equations.fourier import (
+from endotsr.equations.dictionary import (
     atom_statistics,
     dictionary_forward,
     dictionary_reverse,
@@ -37,6 +36,7 @@ from endotsr.equations.fourier import (
     normalise_reverse,
     report_atoms,
 )
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 # %% [markdown]
 # ## The dictionary

@@ -22,8 +22,8 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.equations.deformation import deformation_forward, deformation_reverse
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 rng = np.random.default_rng(3)
 B, N = 17, 4

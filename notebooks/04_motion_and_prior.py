@@ -23,10 +23,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.equations.fourier import dictionary_forward, frequencies
+from endotsr.equations.dictionary import dictionary_forward, frequencies
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
 from endotsr.equations.motion import motion_forward, motion_reverse
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
 rng = np.random.default_rng(4)
 F, N, length = 8, 150, 0.2

@@ -22,7 +22,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_function, check_pair, one_thread, pair_stream, table
+from endotsr.gradcheck import all_pairs, check_function, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.covariance import Shape, covariance_forward, covariance_matrix, covariance_reverse
 
 rng = np.random.default_rng(5)

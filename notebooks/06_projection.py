@@ -22,7 +22,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward
 from endotsr.splatting.projection import projection_forward, projection_reverse, projection_reverse_footprint

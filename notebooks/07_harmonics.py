@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.special import factorial, lpmv
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 
 rng = np.random.default_rng(7)

@@ -23,7 +23,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.compositing import (
@@ -178,7 +178,7 @@ splat = Scene(
 )
 reached = {}
 for panel, (name, settings) in zip(axes[1:], (("exact", EXACT), ("paper", PAPER), ("legacy", LEGACY))):
-    opacity = render_forward(splat, camera, settings, degree=0, path="definition")[0].opacity
+    opacity = render_forward(splat, camera, settings, degree=0, compositor="definition")[0].opacity
     reached[name] = opacity
     shown = panel.imshow(
         np.where(opacity > 0, np.log10(np.maximum(opacity, 1e-12)), np.nan), vmin=-6, vmax=0, cmap="magma"

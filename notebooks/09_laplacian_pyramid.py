@@ -22,8 +22,8 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.equations.laplacian import laplacian_levels, laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
 rng = np.random.default_rng(9)

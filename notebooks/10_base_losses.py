@@ -23,10 +23,10 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.similarity import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.simulator import SimulatorSettings, simulate

@@ -22,10 +22,10 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.config import PAPER, DensityConfig
 from endotsr.fitting.adam import adam_state, adam_step, adam_update
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.scene.density_control import DensityStatistics, densify, empty_statistics, gather_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
@@ -111,9 +111,9 @@ for i in (1, 1500, 3000, 3001, 4500, 6000):
     rates = learning_rates(i, PAPER)
     np.testing.assert_allclose(rates["position"], rate_text(i, 1.6e-3, 0, T), rtol=1e-12)
     np.testing.assert_allclose(rates["fdm_centre"], rate_text(i, 1.6e-3, 0, T), rtol=1e-12)
-    assert ("colour_coefficients" in rates) == (i > K_s)
+    assert ("appearance_coefficients" in rates) == (i > K_s)
     if i > K_s:
-        np.testing.assert_allclose(rates["colour_coefficients"], rate_text(i, 3.125e-3, K_s, T), rtol=1e-12)
+        np.testing.assert_allclose(rates["appearance_coefficients"], rate_text(i, 3.125e-3, K_s, T), rtol=1e-12)
         np.testing.assert_allclose(rates["motion_coefficients"], rate_text(i, 1.6e-4, K_s, T), rtol=1e-12)
 assert [active_degree(i, PAPER) for i in (499, 500, 1000, 1500, 6000)] == [0, 1, 2, 3, 3]
 assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000, 100))
@@ -215,7 +215,7 @@ figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.9), layout="constrained", wid
 steps = np.arange(1, T + 1, 10)
 for name, label in (
     ("position", "position, FDM"),
-    ("colour_coefficients", "colour residual A"),
+    ("appearance_coefficients", "colour residual A"),
     ("motion_coefficients", "translation residual C"),
     ("opacity_logit", "opacity"),
     ("log_scale", "scale"),

@@ -24,8 +24,8 @@ import os
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.config import InitialisationConfig, ModelConfig
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.scene.initialisation import Y00, gaussians_at, initialise
 from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.splatting.camera import backproject

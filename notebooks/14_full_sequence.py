@@ -31,12 +31,12 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import correlate1d
 
-from endotsr.checking import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.config import DEMO, with_iterations
 from endotsr.evaluation.baselines import BASELINES
 from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
 from endotsr.fitting.model import render_at
 from endotsr.fitting.trainer import new_training, training_step, workshop
+from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
 replace = msgspec.structs.replace
@@ -81,14 +81,14 @@ def objective_text(i, terms, config):
     loss = config.loss
     w, w_D, w_S = loss.ssim_weight, loss.depth_weight, loss.smoothness_weight
     i_s, K_s = loss.smoothness_from, config.training.residual_activation
-    a, b = loss.detail_from, loss.detail_full
+    a, b = loss.laplacian_from, loss.laplacian_full
     lambda_lap = loss.lambda_lap * min(1, max(0, (i - a) / (b - a)))
     L_rgb = (1 - w) * terms["l1"] + w * (1 - terms["ssim"])
     total = L_rgb + w_D * terms["depth"]
     if i >= i_s:
         total = total + w_S * terms["smoothness"]
     if i > K_s:
-        total = total + loss.lambda_msp * terms["msp"]
+        total = total + loss.lambda_msp * terms["matern_penalty"]
     if lambda_lap > 0:
         total = total + lambda_lap * terms["laplacian"]
     return total
@@ -131,7 +131,7 @@ alone = dataclasses.replace(sequence, train_index=sequence.train_index[:1])
 still = replace(
     config,
     model=replace(config.model, deformation=False, appearance=False, spectral_motion=False),
-    training=replace(config.training, bridge_share=0.0),
+    training=replace(config.training, bridge_fraction=0.0),
 )
 one_state, one_shop, one_log = train(alone, still)
 others = sequence.train_index[len(sequence.train_index) // 2 :]
@@ -148,7 +148,9 @@ state, shop, log = train(sequence, config)
 for entry in log:
     np.testing.assert_allclose(entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12)
 born = config.training.residual_activation
-assert "msp" not in log[born - 1] and log[born]["msp"] == 0.0, "the residuals start at zero, one iteration after K_s"
+assert "matern_penalty" not in log[born - 1] and log[born]["matern_penalty"] == 0.0, (
+    "the residuals start at zero, one iteration after K_s"
+)
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
 
 # %% tags=["hide-input"]
@@ -160,12 +162,12 @@ for name, label in (
     ("ssim", "$1-\\mathcal{S}$"),
     ("depth", "$\\mathcal{L}_D$"),
     ("laplacian", "$\\mathcal{L}_{\\rm lap}$"),
-    ("msp", "$\\mathcal{L}_{\\rm msp}$"),
+    ("matern_penalty", "$\\mathcal{L}_{\\rm msp}$"),
 ):
     there = [e for e in log if name in e]
     values = np.array([1 - e[name] if name == "ssim" else e[name] for e in there])
     axes[0].semilogy([e["iteration"] for e in there][4:-4], np.maximum(smooth(values), 1e-9)[4:-4], label=label)
-for milestone, label in ((config.loss.detail_from, "detail begins"), (born, "A and S are born")):
+for milestone, label in ((config.loss.laplacian_from, "detail begins"), (born, "A and S are born")):
     axes[0].axvline(milestone, color="0.7", lw=1)
     axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))

@@ -23,7 +23,8 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.checking import (
+from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.gradcheck import (
     all_pairs,
     check_function,
     check_pair,
@@ -33,16 +34,15 @@ from endotsr.checking import (
     summary,
     table,
 )
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.kernels.constants import Y00
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.similarity import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene, render_forward, render_reverse
 from endotsr.splatting.settings import EXACT, PAPER
 
 rng = np.random.default_rng(15)
-Y00 = 0.28209479177387814
 
 
 def made(position, log_scale=-2.0, logit=1.0, colour=0.7, quaternion=(1, 0, 0, 0), dtype=np.float64):

@@ -77,7 +77,7 @@ def load_changed(module: str, source: str) -> None:
     """Put a changed module in the place of the original, and forget everything that was built on that."""
     import numba
 
-    import endotsr.jit as compiler
+    import endotsr.kernels.jit as compiler
 
     stale = dependents(module)
     for name in stale & set(sys.modules):
@@ -100,7 +100,7 @@ def load_changed(module: str, source: str) -> None:
 def load_package() -> None:
     """Import everything once, so that a process loads anew only what its change touches."""
     for name in package_imports():
-        if not name.startswith(("endotsr.cli", "endotsr.commands", "endotsr.__main__")):
+        if not name.startswith(("endotsr.cli.main", "endotsr.cli", "endotsr.__main__")):
             importlib.import_module(name)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from endotsr.checking import all_pairs
+from endotsr.gradcheck import all_pairs
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "reference" / "endotsr"

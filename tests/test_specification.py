@@ -160,7 +160,7 @@ def test_the_demo_preset_is_the_published_schedule_stretched():
     assert {key: demo[key] for key in demo if demo[key] != stretched[key]} == {
         "preset": "demo",
         "model.initial_width": 0.1,
-        "training.bridge_share": 1.0,
+        "training.bridge_fraction": 1.0,
         "initialisation.first_frame_points": 6000,
         "initialisation.other_frame_points": 1500,
     }

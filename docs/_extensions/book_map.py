@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from package_names import NOTEBOOKS, ROOT, equation_pages, markdown_of, notebooks_of
 
-from endotsr.checking import Pair, all_pairs
+from endotsr.gradcheck import Pair, all_pairs
 
 GOLDEN = ROOT / "golden"
 # Displays that are parts of another equation: the blend and the recursion of compositing.

@@ -12,7 +12,7 @@ from package_names import PACKAGE, ROOT
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
-from endotsr.checking import PairReport, all_pairs, check_pair, one_thread, pair_stream
+from endotsr.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
 
 DOCS = ROOT / "docs"
 NOTE = "<!-- Written by docs/_extensions/book_pages.py. Do not edit. -->\n"

@@ -27,7 +27,7 @@ def cell(run: Path, weight: float, rule: str) -> dict:
             "--json",
             str(out),
         ]
-        subprocess.run([sys.executable, "-m", "endotsr.cli", *words], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([sys.executable, "-m", "endotsr.cli.main", *words], check=True, stdout=subprocess.DEVNULL)
         found = json.loads(out.read_text(encoding="utf-8"))
     return {
         "ssim_weight": weight,

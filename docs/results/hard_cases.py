@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from gallery import CASES, DTYPES
 
-from endotsr.runs import machine, now, versions, write_json
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine, now, versions
 
 RECORD = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).parents[1] / "hard_cases.md"

@@ -12,8 +12,8 @@ import json
 import sys
 from pathlib import Path
 
-from endotsr.commands.evaluate import PUBLISHED
-from endotsr.runs import write_json
+from endotsr.cli.evaluate import PUBLISHED
+from endotsr.runs.files import write_json
 
 FOLDER = Path(__file__).parent
 START, END = "<!-- results:start (made by docs/results/record.py) -->", "<!-- results:end -->"

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.bench.page import replaced
-from endotsr.cli import main as endotsr
-from endotsr.runs import replace_file
+from endotsr.cli.main import main as endotsr
+from endotsr.runs.files import replace_file
 from endotsr.tradeoff.document import fragments
 from endotsr.tradeoff.figures import draw
 from endotsr.tradeoff.training_page import draw_training

@@ -34,7 +34,7 @@ class SequenceConfig(_Section, frozen=True, kw_only=True):
     """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only"""
     excluded_value: Literal["white", "black"] = "white"
     """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
-    allow_mask_share: bool = False
+    allow_tissue_fraction: bool = False
     """accept a tissue share below 5 % or of exactly 100 %, and masks that the pictures or the other masks contradict"""
     frames: str = ""
     """frame range start:stop[:step] in Python slice notation; empty = all"""
@@ -111,9 +111,9 @@ class LossConfig(_Section, frozen=True, kw_only=True):
     """weight of the Matern spectral penalty"""
     lambda_lap: NonNegative | Literal["auto"] = 0.83
     """full detail weight; `auto` = calibrate on this sequence by eq. (7)"""
-    detail_from: Count = 1000
+    laplacian_from: Count = 1000
     """last iteration with detail weight 0"""
-    detail_full: Count = 2500
+    laplacian_full: Count = 2500
     """first iteration with full detail weight"""
     upsampling: Literal["co_sited", "half_pixel"] = "co_sited"
     """up-sampling rule of the pyramid"""
@@ -142,9 +142,9 @@ class OptimiserConfig(_Section, frozen=True, kw_only=True):
     """log-scale"""
     rotation: NonNegative = 0.001
     """quaternion"""
-    motion_residual_factor: NonNegative = 0.1
+    spectral_motion_factor: NonNegative = 0.1
     """translation residual C, times `deformation`, decaying"""
-    colour_residual_factor: NonNegative = 31.25 / 16.0
+    appearance_factor: NonNegative = 31.25 / 16.0
     """colour residual A, times `deformation`, decaying"""
     final_factor: Positive = 0.01
     """final / initial rate of the decaying groups"""
@@ -203,7 +203,7 @@ class TrainingConfig(_Section, frozen=True, kw_only=True):
     """iterations between raises of the active harmonic degree"""
     time_jitter: NonNegative = 0.0
     """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
-    bridge_share: Fraction = 0.0
+    bridge_fraction: Fraction = 0.0
     """share of iterations at a time between two training frames, compared with either by its nearness in time"""
     seed: Count = 0
     """seed of every random draw"""
@@ -235,12 +235,12 @@ SHARP = Config(
     preset="sharp",
     model=ModelConfig(initial_width=0.05),
     loss=LossConfig(ssim_weight=0.2, lambda_lap="auto"),
-    training=TrainingConfig(bridge_share=1.0),
+    training=TrainingConfig(bridge_fraction=1.0),
 )
 
 # Milestones of the schedule, by section: they stretch with the length of the run.
 MILESTONES = {
-    "loss": ("smoothness_from", "detail_from", "detail_full"),
+    "loss": ("smoothness_from", "laplacian_from", "laplacian_full"),
     "density": ("start", "until"),
     "training": ("residual_activation", "harmonics_interval"),
 }
@@ -266,7 +266,7 @@ DEMO = msgspec.structs.replace(
     model=ModelConfig(initial_width=0.1),
     initialisation=InitialisationConfig(first_frame_points=6000, other_frame_points=1500),
 )
-DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, bridge_share=1.0))
+DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0))
 PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
 
 
@@ -372,10 +372,10 @@ def _refuse_contradictions(config: Config, where: str) -> None:
             f"{where}: model.frequency_max = {model.frequency_max:g} is not allowed; "
             f"allowed: a number > model.frequency_min = {model.frequency_min:g}"
         )
-    if loss.detail_full < loss.detail_from:
+    if loss.laplacian_full < loss.laplacian_from:
         raise InputError(
-            f"{where}: loss.detail_full = {loss.detail_full} is not allowed; "
-            f"allowed: an integer >= loss.detail_from = {loss.detail_from}"
+            f"{where}: loss.laplacian_full = {loss.laplacian_full} is not allowed; "
+            f"allowed: an integer >= loss.laplacian_from = {loss.laplacian_from}"
         )
     if not 0 <= low < high <= 100:
         raise InputError(

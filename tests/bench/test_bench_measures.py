@@ -6,15 +6,17 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from endotsr.bench import clock, pairs, peaks, scaling, timing, workload
+from endotsr.bench import clock, pairs, peaks, scaling, timing
 from endotsr.bench.case import Case, measure, representative
 from endotsr.bench.clock import STAGES
 from endotsr.bench.limits import limits, work
 from endotsr.bench.stages import ns_per_pair
 from endotsr.bench.stages import table as stage_table
 from endotsr.config import PAPER
-from endotsr.fitting import optimise, trainer
+from endotsr.fitting import trainer
+from endotsr.fitting.fused import step as optimise
 from endotsr.fitting.schedules import densify_now
+from endotsr.scene import workload
 from endotsr.splatting import render
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import PAPER as PAPER_RULES
@@ -75,7 +77,7 @@ def test_stages_of_two_threads_share_the_time(monkeypatch):
 
 def test_representative_iteration_has_everything_but_densification():
     iteration = representative(PAPER) + 1
-    assert iteration > max(PAPER.training.residual_activation, PAPER.loss.detail_full)
+    assert iteration > max(PAPER.training.residual_activation, PAPER.loss.laplacian_full)
     assert not densify_now(iteration, PAPER)
 
 

@@ -11,8 +11,8 @@ from endotsr.bench.case import Case, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.page_parts import MAIN
 from endotsr.bench.stages import grid, ns_per_pair
-from endotsr.cli import main
-from endotsr.commands.bench_options import StagesOptions
+from endotsr.cli.main import main
+from endotsr.cli.parts.bench_options import StagesOptions
 from endotsr.config import PAPER
 from endotsr.errors import InputError
 

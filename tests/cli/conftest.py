@@ -4,7 +4,7 @@ import numba
 import pytest
 from tiny import train_words
 
-from endotsr.cli import main
+from endotsr.cli.main import main
 
 
 @pytest.fixture(autouse=True)

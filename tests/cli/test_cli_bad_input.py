@@ -5,7 +5,7 @@ import pytest
 from tiny import SETTINGS, assert_refused, run_line, train_words, written_folder
 
 from endotsr.opencv import read_png, write_png
-from endotsr.runs import create_run
+from endotsr.runs.folder import create_run
 
 
 def refused(capsys, folder, *named, more=()):

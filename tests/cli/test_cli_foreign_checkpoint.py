@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tiny import assert_refused, assert_same_run, train_words
 
-from endotsr.cli import main
+from endotsr.cli.main import main
 
 
 @pytest.fixture

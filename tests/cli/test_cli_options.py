@@ -3,8 +3,8 @@
 import pytest
 from tiny import assert_refused
 
-from endotsr.commands.options import base_settings, parse, with_short_names
-from endotsr.commands.train import TrainOptions
+from endotsr.cli.parts.options import base_settings, parse, with_short_names
+from endotsr.cli.train import TrainOptions
 from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config
 from endotsr.errors import InputError
 
@@ -43,7 +43,7 @@ def test_preset_of_the_command_line_wins_over_that_of_the_file(tmp_path):
 def test_iterations_stretch_the_schedule():
     config = settings("--iterations", "600")
     assert (config.training.iterations, config.training.residual_activation) == (600, 300)
-    assert (config.loss.detail_from, config.loss.detail_full, config.density.until) == (100, 250, 400)
+    assert (config.loss.laplacian_from, config.loss.laplacian_full, config.density.until) == (100, 250, 400)
 
 
 def test_absolute_schedule_keeps_milestones():
@@ -152,7 +152,7 @@ def test_choices_are_listed_in_their_order_and_without_none(words, said, capsys)
 
 @pytest.mark.parametrize("command", [["render"], ["tradeoff", "train"]])
 def test_help_lists_no_choice_called_none(command, capsys):
-    from endotsr.cli import main
+    from endotsr.cli.main import main
 
     assert main([*command, "--help"]) == 0
     assert "None," not in capsys.readouterr().out

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from tiny import SEQUENCE, SETTINGS, assert_refused
 
-from endotsr.cli import main
-from endotsr.commands.evaluate import held_out_table
-from endotsr.commands.pictures import depth_bytes, depth_step
-from endotsr.commands.threads import use_threads
+from endotsr.cli.evaluate import held_out_table
+from endotsr.cli.main import main
+from endotsr.cli.parts.pictures import depth_bytes, depth_step
+from endotsr.kernels.threads import use_threads
 from endotsr.opencv import read_png
-from endotsr.runs import os_error_line, write_json
+from endotsr.runs.files import os_error_line, write_json
 
 
 def render(run, out, *words):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from tiny import assert_refused
 
-from endotsr import runs
-from endotsr.commands.sources import remembered_cameras, sequence_record
 from endotsr.config import PAPER
 from endotsr.errors import InputError
+from endotsr.runs import folder as runs
+from endotsr.runs.sources import remembered_cameras, sequence_record
 from endotsr.simulator.settings import CameraMotion, SimulatorSettings
 from endotsr.simulator.simulate import simulate
 

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from endotsr import __version__
-from endotsr.cli import COMMANDS, main
+from endotsr.cli.main import COMMANDS, main
 
 HEAVY = ("numpy", "numba", "cv2", "scipy", "matplotlib", "skimage", "tyro")
 
@@ -15,7 +15,7 @@ HEAVY = ("numpy", "numba", "cv2", "scipy", "matplotlib", "skimage", "tyro")
 @pytest.mark.parametrize("words", [["--help"], ["--version"], []])
 def test_overview_imports_nothing_heavy(words):
     code = (
-        f"import sys; from endotsr.cli import main; code = main({words!r}); "
+        f"import sys; from endotsr.cli.main import main; code = main({words!r}); "
         f"print([m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr); sys.exit(code)"
     )
     began = time.monotonic()

@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
 
-from endotsr import stopping
-from endotsr.cli import main
-from endotsr.commands import progress
+from endotsr.cli.main import main
+from endotsr.cli.parts import progress, stopping
 from endotsr.config import load_config
 from endotsr.fitting import trainer
-from endotsr.runs import RunFolder
+from endotsr.runs.folder import RunFolder
 
 LAST = 30
 EVERY = 7
@@ -52,7 +51,7 @@ def test_log_has_one_entry_an_iteration(finished_run):
     entries = [json.loads(line) for line in (finished_run / "log.jsonl").read_text().splitlines()]
     assert [entry["iteration"] for entry in entries] == list(range(1, LAST + 1))
     assert all(np.isfinite(entry["loss"]) and entry["gaussians"] > 0 and entry["seconds"] >= 0 for entry in entries)
-    assert "msp" in entries[-1] and "msp" not in entries[0]  # the residuals are born half-way
+    assert "matern_penalty" in entries[-1] and "matern_penalty" not in entries[0]  # the residuals are born half-way
 
 
 def test_pictures_have_the_names_of_the_peers(finished_run):
@@ -254,7 +253,7 @@ def test_weights_that_cannot_be_read_are_refused_before_the_training(tmp_path, c
 def test_a_reader_that_left_is_no_success(tmp_path):
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "endotsr.cli", *train_only(tmp_path / "run")]
+    command = [sys.executable, "-m", "endotsr.cli.main", *train_only(tmp_path / "run")]
     assert subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=300).returncode == 141
     os.close(writer)
     assert list(tmp_path.iterdir()) == []
@@ -264,7 +263,7 @@ def test_a_reader_that_left_is_no_success(tmp_path):
 @pytest.mark.parametrize("how", ["closed", "ascii"])
 def test_output_that_takes_no_text_does_not_stop_a_run(how, tmp_path):
     out = tmp_path / "größe"
-    words = [sys.executable, "-m", "endotsr.cli", *train_only(out, "--iterations", "2")]
+    words = [sys.executable, "-m", "endotsr.cli.main", *train_only(out, "--iterations", "2")]
     environment = os.environ | ({"PYTHONIOENCODING": "ascii"} if how == "ascii" else {})
     close = (lambda: os.close(1)) if how == "closed" else None
     done = subprocess.run(words, env=environment, preexec_fn=close, stderr=subprocess.PIPE, text=True, timeout=300)
@@ -312,7 +311,7 @@ def test_files_that_may_not_grow_leave_nothing_half_written(tmp_path):
     """The operating system itself refuses: files of at most 30 kB, so that the first checkpoint breaks off."""
     resource = pytest.importorskip("resource")
     done = subprocess.run(
-        [sys.executable, "-m", "endotsr.cli", *train_only(tmp_path / "run")],
+        [sys.executable, "-m", "endotsr.cli.main", *train_only(tmp_path / "run")],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000)),
         env=os.environ | {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", "")},
         capture_output=True,
@@ -347,7 +346,7 @@ def test_resume_of_a_finished_run_changes_nothing(finished_run, tmp_path, capsys
         (["--iterations", "40"], ["keeps the settings", "asked: training.iterations = 40 (run: 30)\n"]),
         (["--scale", "0.5", "--seed", "1"], ["asked: sequence.scale = 0.5 (run: 1.0), training.seed = 1 (run: 0)\n"]),
         (["--preset", "sharp"], ["asked: preset = 'sharp' (run: 'paper')\n"]),
-        (["--iterations", "30", "--schedule", "absolute"], ["loss.detail_from = 1000 (run: 5)"]),
+        (["--iterations", "30", "--schedule", "absolute"], ["loss.laplacian_from = 1000 (run: 5)"]),
         (["--seed", "1"], ["training.seed = 1"]),
         (["--simulator.seed", "1"], ["images differ", "sha256"]),
     ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.cli import main
+from endotsr.cli.main import main
 from endotsr.sequences.endonerf import write_endonerf
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
@@ -55,7 +55,7 @@ def written_folder(root: Path) -> Path:
 def start(words: list[str], cwd: Path) -> subprocess.Popen:
     """The command in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "endotsr.cli", *words],
+        [sys.executable, "-m", "endotsr.cli.main", *words],
         cwd=cwd,
         env=os.environ | {"MPLBACKEND": "Agg"},
         stdout=subprocess.PIPE,

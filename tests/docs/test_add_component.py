@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from endotsr.checking import check_pair, check_precision, one_thread, pair_stream
+from endotsr.gradcheck import check_pair, check_precision, one_thread, pair_stream
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)

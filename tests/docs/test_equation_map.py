@@ -6,7 +6,7 @@ import pytest
 from book_map import UNDIFFERENTIATED, Equation, equations, golden_cases, has_derivation, names_of_tests  # pyright: ignore[reportMissingImports]
 from package_names import NOTEBOOKS, ROOT, definitions, equation_pages, linkable  # pyright: ignore[reportMissingImports]
 
-from endotsr.checking import all_pairs
+from endotsr.gradcheck import all_pairs
 
 PAPER = ["1", "1b", *"234567"]
 ROWS = {row.label: row for row in equations()}

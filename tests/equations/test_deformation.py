@@ -4,8 +4,9 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.checking.pairs_deformation import PAIRS
-from endotsr.equations.deformation import BASES, PIECE, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import BASES, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
+from endotsr.gradcheck.pairs_deformation import PAIRS
 from oracle import deformation as oracle
 
 UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}

@@ -272,7 +272,7 @@ def test_kernels_equal_their_python_bodies(monkeypatch, rule):
 
 
 def test_float32_gradient_is_the_float64_gradient():
-    from endotsr.checking.pairs_equations import PAIRS, observed_image, tissue_mask
+    from endotsr.gradcheck.pairs_equations import PAIRS, observed_image, tissue_mask
 
     for pair in (p for p in PAIRS if p.equation == "5"):
         rendered = pair.inputs(np.random.default_rng(2))["rendered"].astype(np.float32)

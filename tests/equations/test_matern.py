@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.equations.fourier import frequencies
+from endotsr.equations.dictionary import frequencies
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
 from oracle import matern_oracle
 

@@ -106,7 +106,7 @@ def test_training_frames_stand_beside_the_held_out_ones(sequence):
         "training": 10,
         "held_out": [1, 9],
         "training_sample": [0, 4],
-        "tissue_share": pytest.approx(27 / 32),
+        "tissue_fraction": pytest.approx(27 / 32),
     }
 
 

@@ -5,9 +5,10 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.equations.deformation import BASES, PIECE, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import BASES, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
 from endotsr.fitting.adam import AdamState, adam_state, adam_step, adam_update, add_array
-from endotsr.fitting.deformation_step import NAMES, deformation_adam_step
+from endotsr.fitting.fused.deformation import NAMES, deformation_adam_step
 from oracle.adam import adam_scalar
 
 BETAS = (0.9, 0.999, 1e-15)
@@ -168,7 +169,10 @@ def _deformation(rng, dtype, bases, count):
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-@pytest.mark.parametrize(("bases", "count", "steps"), [(3, 7, 3), (1, PIECE + 6, 1), (2, 2 * PIECE, 1), (3, 1, 2)])
+@pytest.mark.parametrize(
+    ("bases", "count", "steps"),
+    [(3, 7, 3), (1, PIECE + 6, 1), (2, 2 * PIECE, 1), (3, 1, 2)],
+)
 def test_fused_deformation_step_equals_reverse_then_adam_bitwise(rng, basis, dtype, bases, count, steps):
     separate = _deformation(rng, dtype, bases, count)
     fused = {name: a.copy() for name, a in separate.items()}

@@ -77,7 +77,7 @@ def test_round_trip_is_bitwise_and_none_stays_none(tmp_path, dtype, fdm, count):
     found = load_checkpoint(tmp_path / "a.npz")
     assert_equal((gaussians, adam, empty_statistics(count)), (found.gaussians, found.adam, found.statistics))
     assert gaussians.position.tobytes() == found.gaussians.position.tobytes()
-    assert found.gaussians.colour_coefficients is None
+    assert found.gaussians.appearance_coefficients is None
     assert (found.gaussians.fdm_weight is None) == (not fdm)
     assert (found.iteration, found.header) == (7, {"note": "ü", "rate": 0.1 + 0.2})
     assert os.listdir(tmp_path) == ["a.npz"]

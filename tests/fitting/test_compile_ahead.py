@@ -8,12 +8,12 @@ import sys
 import msgspec
 import pytest
 
-from endotsr import compile_ahead
-from endotsr.commands.threads import len_cores
 from endotsr.config import DEMO, PAPER
+from endotsr.fitting import compile_ahead
+from endotsr.kernels.threads import len_cores
 
 COMPILE = """
-from endotsr import compile_ahead
+from endotsr.fitting import compile_ahead
 from endotsr.config import PAPER
 assert compile_ahead.compile_ahead(PAPER) and compile_ahead._helpers[0].wait() == 0
 assert not compile_ahead.compile_ahead(PAPER), "a second time there is nothing to do"
@@ -21,7 +21,7 @@ assert not compile_ahead.compile_ahead(PAPER), "a second time there is nothing t
 TRAIN = """
 import json, sys
 import msgspec
-from endotsr.bench import workload
+from endotsr.scene import workload
 from endotsr.bench.case import representative
 from endotsr.config import PAPER
 from endotsr.fitting.trainer import new_training, training_step, workshop

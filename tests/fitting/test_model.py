@@ -7,7 +7,7 @@ import pytest
 from endotsr.config import PAPER
 from endotsr.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.equations.deformation import deformation_forward
-from endotsr.equations.fourier import atom_statistics, dictionary_forward, frequencies, normalised_atoms
+from endotsr.equations.dictionary import atom_statistics, dictionary_forward, frequencies, normalised_atoms
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import motion_reverse
 from endotsr.fitting.model import (
@@ -44,7 +44,7 @@ def gaussians():
         fdm_weight=rng.normal(0, 0.2, (10, 4, N)),
         fdm_centre=rng.uniform(0, 1, (10, 4, N)),
         fdm_width=rng.uniform(0.2, 0.5, (10, 4, N)),
-        colour_coefficients=rng.normal(0, 0.3, (3, 6, N)),
+        appearance_coefficients=rng.normal(0, 0.3, (3, 6, N)),
         motion_coefficients=rng.normal(0, 0.05, (3, 6, N)),
     )
 
@@ -66,7 +66,7 @@ def test_every_component_is_added_where_it_belongs(gaussians):
     phi, _ = dictionary_forward(T, SPECTRAL.omega)
     translation = np.einsum("cki,k->ci", gaussians.motion_coefficients, phi)
     phi_bar = normalised_atoms(T, SPECTRAL.omega, SPECTRAL.statistics)
-    residual, _ = appearance_forward(gaussians.colour_coefficients, phi_bar, 0.4)
+    residual, _ = appearance_forward(gaussians.appearance_coefficients, phi_bar, 0.4)
     wanted = {
         "position": gaussians.position + offsets[:3] + translation,
         "quaternion": gaussians.quaternion + offsets[3:7],
@@ -94,7 +94,7 @@ def test_a_component_without_arrays_adds_nothing_and_gets_no_gradient(gaussians,
     assert np.array_equal(scene.position, gaussians.position) == (not motion and not deformation)
     assert np.array_equal(scene.quaternion, gaussians.quaternion) == (not deformation)
     back = scene_reverse(gradients(appearance), saved)
-    assert ("colour_coefficients" in back.by_field) == appearance
+    assert ("appearance_coefficients" in back.by_field) == appearance
     assert ("motion_coefficients" in back.by_field) == motion
     assert (back.offsets is not None) == deformation
 
@@ -131,7 +131,7 @@ def test_gradients_reach_every_raw_array(gaussians):
     back = scene_reverse(grads, saved)
     wanted = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
     wanted["harmonics"] = grads.harmonics
-    wanted["colour_coefficients"] = appearance_reverse(grads.residual, saved.appearance).colour_coefficients
+    wanted["appearance_coefficients"] = appearance_reverse(grads.residual, saved.appearance).appearance_coefficients
     wanted["motion_coefficients"] = motion_reverse(grads.position, saved.motion).motion_coefficients
     assert back.by_field.keys() == wanted.keys() == arrays(gaussians).keys() - {"fdm_weight", "fdm_centre", "fdm_width"}
     for name, array in wanted.items():
@@ -153,7 +153,7 @@ def test_settings_of_the_raster_that_are_set_replace_those_of_its_preset():
 def test_a_view_at_any_time_with_and_without_a_component(gaussians, left_out):
     chosen = gaussians
     if left_out == "appearance":
-        chosen = gaussians._replace(colour_coefficients=None)
+        chosen = gaussians._replace(appearance_coefficients=None)
     elif left_out:
         chosen = gaussians._replace(motion_coefficients=None)
     background = np.array([0.2, 0.5, 0.9])

@@ -10,8 +10,8 @@ from endotsr.equations.laplacian import LEVELS, laplacian_loss_forward, laplacia
 from endotsr.fitting import objective
 from endotsr.fitting.objective import LossWeights, calibrate_on, frame_targets, image_loss, photometric_loss
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.similarity import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.sequences.sequence import Frame
 from endotsr.splatting.camera import Camera

@@ -35,12 +35,12 @@ def test_rates_of_the_paper_preset():
 def test_residuals_start_after_the_activation_with_the_rates_of_the_paper():
     assert not schedules.residuals_active(3000, PAPER)
     assert schedules.residuals_active(3001, PAPER)
-    assert [i for i in range(2990, 3010) if schedules.residuals_born(i, PAPER)] == [3001]
+    assert [i for i in range(2990, 3010) if schedules.residuals_activate(i, PAPER)] == [3001]
     assert "motion_coefficients" not in schedules.learning_rates(3000, PAPER)
     decay = 0.01 ** (1 / 3000)
     rates = schedules.learning_rates(3001, PAPER)
     assert rates["motion_coefficients"] == pytest.approx(1.6e-4 * decay)
-    assert rates["colour_coefficients"] == pytest.approx(3.125e-3 * decay)
+    assert rates["appearance_coefficients"] == pytest.approx(3.125e-3 * decay)
     last = schedules.learning_rates(6000, PAPER)
     assert last["motion_coefficients"] == pytest.approx(1.6e-6)
 
@@ -55,7 +55,7 @@ def test_residual_schedule_not_restarted_continues_the_base_decay():
 def test_a_model_without_residuals_never_activates_them():
     config = Config(model=ModelConfig(appearance=False, spectral_motion=False))
     assert not schedules.residuals_active(5000, config)
-    assert not any(schedules.residuals_born(i, config) for i in (3000, 3001, 3002))
+    assert not any(schedules.residuals_activate(i, config) for i in (3000, 3001, 3002))
 
 
 @pytest.mark.parametrize("alone", ["appearance", "spectral_motion"])
@@ -67,17 +67,17 @@ def test_one_residual_is_enough_to_activate(alone):
 
 def test_residuals_from_the_first_iteration():
     config = changed("training", residual_activation=0)
-    assert schedules.residuals_born(1, config)
+    assert schedules.residuals_activate(1, config)
 
 
 def test_detail_ramp():
-    share = schedules.detail_share
+    share = schedules.laplacian_ramp
     assert share(1000, PAPER) == 0.0
     assert share(1001, PAPER) == pytest.approx(1 / 1500)
     assert share(1750, PAPER) == pytest.approx(0.5)
     assert share(2499, PAPER) < 1.0
     assert share(2500, PAPER) == share(6000, PAPER) == 1.0
-    step = Config(loss=LossConfig(detail_from=100, detail_full=100))
+    step = Config(loss=LossConfig(laplacian_from=100, laplacian_full=100))
     assert (share(100, step), share(101, step)) == (0.0, 1.0)
     assert share(6000, Config(model=ModelConfig(laplacian=False))) == 0.0
 
@@ -99,8 +99,8 @@ def test_densify_iterations():
 
 def test_stretched_run_keeps_its_shares():
     short = with_iterations(PAPER, 600)
-    assert schedules.residuals_born(301, short)
-    assert schedules.detail_share(250, short) == 1.0
+    assert schedules.residuals_activate(301, short)
+    assert schedules.laplacian_ramp(250, short) == 1.0
     assert schedules.learning_rates(600, short)["position"] == pytest.approx(1.6e-5)
 
 

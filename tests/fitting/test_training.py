@@ -23,8 +23,8 @@ from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
 from endotsr.fitting.checkpoint import load_checkpoint
+from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
-from endotsr.fitting.optimise import optimise
 from endotsr.fitting.schedules import densify_now
 from endotsr.fitting.trainer import (
     calibrated_weight,
@@ -41,12 +41,12 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
 BORN, LENGTH = 25, 60
-RESIDUALS = ("colour_coefficients", "motion_coefficients")
+RESIDUALS = ("appearance_coefficients", "motion_coefficients")
 FDM = ("fdm_weight", "fdm_centre", "fdm_width")
 
 
 def settings(iterations=LENGTH, optimiser=None, loss=None, training=None, **model):
-    loss = {"smoothness_from": 10, "detail_from": 15, "detail_full": 30} | (loss or {})
+    loss = {"smoothness_from": 10, "laplacian_from": 15, "laplacian_full": 30} | (loss or {})
     return Config(
         model=ModelConfig(**({"bases": 5, "frequencies": 3, "initial_width": 0.1} | model)),
         loss=LossConfig(**loss),
@@ -123,7 +123,7 @@ def test_loss_falls_and_every_part_takes_part(finished):
     assert all(np.isfinite(e["loss"]) for e in log)
     assert ["smoothness" in e for e in log] == [i >= 10 for i in range(1, LENGTH + 1)]
     assert ["laplacian" in e for e in log] == [i > 15 for i in range(1, LENGTH + 1)]
-    assert ["msp" in e for e in log] == [i > BORN for i in range(1, LENGTH + 1)]
+    assert ["matern_penalty" in e for e in log] == [i > BORN for i in range(1, LENGTH + 1)]
     counts = [e["gaussians"] for e in log]
     changes = [log[i]["iteration"] for i in range(LENGTH - 1) if counts[i + 1] != counts[i]]
     assert changes and set(changes) <= {20, 30, 40}
@@ -195,7 +195,7 @@ def test_residuals_are_born_without_changing_the_image(sequence, monkeypatch):
     plain, plain_entry, plain_image = stepped(state, sequence, without, monkeypatch)
     for one, two in zip(image, plain_image):
         np.testing.assert_array_equal(one, two)
-    assert entry["msp"] == 0 and {k: v for k, v in entry.items() if k != "msp"} == plain_entry
+    assert entry["matern_penalty"] == 0 and {k: v for k, v in entry.items() if k != "matern_penalty"} == plain_entry
     for name, array in arrays(plain.gaussians).items():
         np.testing.assert_array_equal(array, getattr(after.gaussians, name), err_msg=name)
     assert all(getattr(after.gaussians, name).any() for name in RESIDUALS)  # and they learn at once
@@ -209,7 +209,7 @@ OFF = {
     "appearance": (
         {"appearance": False},
         [(model_module, "appearance_forward"), (model_module, "normalised_atoms")],
-        ("colour_coefficients",),
+        ("appearance_coefficients",),
     ),
     "spectral_motion": (
         {"spectral_motion": False},
@@ -249,7 +249,7 @@ def test_a_component_that_is_off_allocates_and_calls_nothing(component, sequence
     for name in fields:
         assert getattr(state.gaussians, name) is None
         assert name not in state.adam.first and name not in state.adam.second and name not in state.adam.step
-    word = {"spectral_motion": "msp"}.get(component, component)
+    word = {"spectral_motion": "matern_penalty"}.get(component, component)
     assert all(word not in entry for entry in log)
 
 
@@ -287,7 +287,7 @@ def test_automatic_weight_is_deterministic_and_equals_the_same_number_given(sequ
 # --- offsets taken ahead ---
 
 
-@pytest.mark.parametrize("training", [{}, {"bridge_share": 0.5, "time_jitter": 0.3}])
+@pytest.mark.parametrize("training", [{}, {"bridge_fraction": 0.5, "time_jitter": 0.3}])
 def test_every_step_but_those_after_density_control_finds_its_offsets_taken(training, sequence, monkeypatch):
     """And a run without them has the same numbers."""
     config, calls, counts = settings(iterations=25, training=training), [], [0]
@@ -344,7 +344,7 @@ def test_a_loss_that_is_not_finite_stops_the_run_and_names_iteration_and_frame(s
     assert state.iteration == 5
 
 
-@pytest.mark.parametrize("name", ["position", "harmonics", "fdm_width", "colour_coefficients"])
+@pytest.mark.parametrize("name", ["position", "harmonics", "fdm_width", "appearance_coefficients"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_hard_P6_a_state_that_is_not_finite_is_refused_at_the_start(name, value, finished, sequence):
     state = copy.deepcopy(finished[2][30])
@@ -353,7 +353,7 @@ def test_hard_P6_a_state_that_is_not_finite_is_refused_at_the_start(name, value,
     place = ", ".join(["0"] * (array.ndim - 1) + ["3"])
     with pytest.raises(ValueError, match=rf"{name}\[{place}\] is {value}"):
         run(sequence, settings(), state)
-    if value == np.inf and name in ("fdm_width", "colour_coefficients"):
+    if value == np.inf and name in ("fdm_width", "appearance_coefficients"):
         return  # an infinite width or coefficient still gives a finite scene
     shop = workshop(sequence, settings())
     with pytest.raises(ValueError, match=r"position|harmonics|residual|log_scale|quaternion"):

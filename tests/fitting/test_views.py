@@ -34,7 +34,7 @@ def test_jitter_stays_within_half_a_frame_and_fills_it():
 
 
 def test_bridged_views_blend_the_two_training_neighbours_linearly():
-    index, t = _draws(20000, bridge_share=1.0)
+    index, t = _draws(20000, bridge_fraction=1.0)
     times = TRAIN / 8
     right = np.clip(np.searchsorted(times, t, side="right"), 1, 4)
     assert np.all((index == TRAIN[right]) | (index == TRAIN[right - 1]))  # a neighbour, never another frame

@@ -10,11 +10,11 @@ from made_up_scenes import Y00, run, screen_scene
 
 from endotsr.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.equations.calibration import calibrate
-from endotsr.equations.fourier import DEAD_RMS, atom_statistics, normalise_forward, normalise_reverse
+from endotsr.equations.dictionary import DEAD_RMS, atom_statistics, normalise_forward, normalise_reverse
 from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
 from endotsr.equations.matern import matern_weights
 from endotsr.losses.depth import FEWEST_VALID, depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward, covariance_reverse
@@ -310,7 +310,7 @@ def test_bounded_residual_has_no_kink_at_zero():
     one = lambda x: appearance_forward(np.full((3, 1, 1), x), np.ones(1), 0.3)
     (low, below), (high, above) = sides(lambda x: one(x)[0][0, 0], 0.0)
     assert low == pytest.approx(high, abs=1e-11) and below == pytest.approx(above, rel=1e-9)
-    slope = appearance_reverse(np.ones((3, 1)), one(0.0)[1]).colour_coefficients[0, 0, 0]
+    slope = appearance_reverse(np.ones((3, 1)), one(0.0)[1]).appearance_coefficients[0, 0, 0]
     assert slope == pytest.approx(0.3 / Y00, rel=1e-15) and below == pytest.approx(slope, rel=1e-6)
 
 

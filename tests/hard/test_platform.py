@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from made_up_scenes import as_dtype, assert_close_l2, plain_camera, random_scene, run, threads
 
-from endotsr.checking import all_pairs, pair_stream
-from endotsr.jit import jit
+from endotsr.gradcheck import all_pairs, pair_stream
+from endotsr.kernels.jit import jit
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 __all__ = ["threads"]

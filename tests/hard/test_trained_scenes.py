@@ -7,8 +7,8 @@ from made_up_scenes import Y00, as_dtype, assert_finite, run
 from data_folder import data_folder
 from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.similarity import masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import PRESETS

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 from _pytest.runner import runtestprotocol
 
-from endotsr.checking import Pair
-from endotsr.conformance.cases import all_operations
-from endotsr.conformance.compare import judged
-from endotsr.conformance.format import Case
-from endotsr.conformance.solve import reference, stored
-from endotsr.conformance.store import Golden
+from endotsr.golden.cases import all_operations
+from endotsr.golden.compare import judged
+from endotsr.golden.format import Case
+from endotsr.golden.solve import reference, stored
+from endotsr.golden.store import Golden
+from endotsr.gradcheck import Pair
 from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")

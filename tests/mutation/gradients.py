@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.checking import Pair, pair_stream
-from endotsr.checking.checker import judge
-from endotsr.checking.differences import Difference, plateau_difference
-from endotsr.checking.probes import Probe, block_probes, joint_probes, make_blocks
-from endotsr.checking.session import LINEAR, Session, norm
+from endotsr.gradcheck import Pair, pair_stream
+from endotsr.gradcheck.checker import judge
+from endotsr.gradcheck.differences import Difference, plateau_difference
+from endotsr.gradcheck.probes import Probe, block_probes, joint_probes, make_blocks
+from endotsr.gradcheck.session import LINEAR, Session, norm
 
 SEED = 0
 CHANGED = 1e-6  # a gradient that moves by more than this, relative, must be noticed

@@ -5,18 +5,17 @@ import importlib
 import inspect
 from collections.abc import Callable
 
-ROOMS = {
-    "equations": (
-        "fourier", "atom_sums", "appearance", "motion", "matern", "pyramid", "laplacian", "calibration", "deformation",
-    ),
-    "splatting": (
-        "camera", "covariance", "projection", "harmonics", "exponential", "records", "binning", "compositing",
-        "compositing_blocks", "compositing_tiles", "projection_kernels", "render",
-    ),
-    "losses": ("rows", "photometric", "similarity", "depth", "smoothness"),
-    "scene": ("density_control",),
-    "fitting": ("adam", "coefficients_step", "deformation_step", "model", "objective", "schedules"),
-}  # fmt: skip
+MODULES = (
+    "kernels.exponential",
+    *(f"equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
+    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation")),
+    *(f"splatting.{name}" for name in ("camera", "covariance", "projection", "projection_kernels", "harmonics")),
+    *(f"splatting.{name}" for name in ("records", "binning", "compositing", "fast.blocks", "fast.tiles", "render")),
+    *(f"losses.{name}" for name in ("rows", "masked_l1", "masked_ssim", "depth", "smoothness")),
+    "scene.density_control",
+    *(f"fitting.{name}" for name in ("adam", "fused.coefficients", "fused.deformation", "model", "objective")),
+    "fitting.schedules",
+)
 # functions in which only a named defect is planted
 MORE = ("fitting.trainer.workshop",)
 
@@ -24,13 +23,11 @@ MORE = ("fitting.trainer.workshop",)
 def kernels() -> dict[str, Callable]:
     """Plain Python functions by name, such as `losses.rows._row_total`."""
     found: dict[str, Callable] = {}
-    for room, modules in ROOMS.items():
-        for name in modules:
-            module = importlib.import_module(f"endotsr.{room}.{name}")
-            for node in ast.parse(inspect.getsource(module)).body:
-                if isinstance(node, ast.FunctionDef):
-                    if not _for_the_compiler(node):
-                        found[f"{room}.{name}.{node.name}"] = _plain(getattr(module, node.name))
+    for name in MODULES:
+        module = importlib.import_module(f"endotsr.{name}")
+        for node in ast.parse(inspect.getsource(module)).body:
+            if isinstance(node, ast.FunctionDef) and not _for_the_compiler(node):
+                found[f"{name}.{node.name}"] = _plain(getattr(module, node.name))
     return found
 
 
@@ -53,8 +50,7 @@ def _for_the_compiler(node: ast.FunctionDef) -> bool:
 
 def clear_caches() -> None:
     """Forget what unchanged functions have computed."""
-    for room, modules in ROOMS.items():
-        for name in modules:
-            for value in vars(importlib.import_module(f"endotsr.{room}.{name}")).values():
-                if hasattr(value, "cache_clear"):
-                    value.cache_clear()
+    for name in MODULES:
+        for value in vars(importlib.import_module(f"endotsr.{name}")).values():
+            if hasattr(value, "cache_clear"):
+                value.cache_clear()

@@ -30,7 +30,7 @@ def _rotation_transposed() -> tuple[tuple[str, str], ...]:
 D_Z = "inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))"
 PROJECT, PROJECT_REVERSE = "splatting.projection_kernels._project", "splatting.projection_kernels._project_reverse"
 COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
-BLOCK_REVERSE = "splatting.compositing_blocks._blend_block_reverse"
+BLOCK_REVERSE = "splatting.fast.blocks._blend_block_reverse"
 
 DEFECTS: tuple[Defect, ...] = (
     Defect(
@@ -147,12 +147,12 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "L1 averaged over all pixels",
-        "losses.photometric.masked_l1_forward",
+        "losses.masked_l1.masked_l1_forward",
         (("rendered.shape[0] * int(np.count_nonzero(mask))", "rendered.size"),),
     ),
     Defect(
         "SSIM averaged over all pixels",
-        "losses.similarity.ssim_target",
+        "losses.masked_ssim.ssim_target",
         (("observed.shape[0] * int(np.count_nonzero(mask))", "observed.size"),),
     ),
     Defect(
@@ -162,7 +162,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "sum depends on the ranges of the threads",
-        "losses.photometric._absolute_difference",
+        "losses.masked_l1._absolute_difference",
         (
             ("for index in range(first, stop):", "totals[first:stop] = 0\n    for index in range(first, stop):"),
             ("totals[index] = row_total(line)", "totals[first] += row_total(line)"),

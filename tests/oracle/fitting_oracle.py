@@ -27,13 +27,13 @@ def schedule(i, c):
         "harmonics_base": o["harmonics_base"], "harmonics_rest": o["harmonics_rest"],
         "fdm_weight_position": base * o["deformation_position_factor"], "fdm_weight_other": base,
         "fdm_centre": base, "fdm_width": base,
-        "colour_coefficients": residual * o["colour_residual_factor"],
-        "motion_coefficients": residual * o["motion_residual_factor"],
+        "appearance_coefficients": residual * o["appearance_factor"],
+        "motion_coefficients": residual * o["spectral_motion_factor"],
     }  # fmt: skip
-    first, full = c["loss"]["detail_from"], c["loss"]["detail_full"]
+    first, full = c["loss"]["laplacian_from"], c["loss"]["laplacian_full"]
     d = c["density"]
     return {f"rate_{name}": value for name, value in rates.items()} | {
-        "detail_weight": c["loss"]["lambda_lap"] * min(1.0, max(0.0, (i - first) / (full - first))),
+        "laplacian_weight": c["loss"]["lambda_lap"] * min(1.0, max(0.0, (i - first) / (full - first))),
         "degree": min(c["model"]["harmonics_degree"], i // t["harmonics_interval"]),
         "residuals": i > born,
         "smoothness": i >= c["loss"]["smoothness_from"],

@@ -63,7 +63,7 @@ def test_image_depth_and_every_gradient_equal_torch_autograd(name, degree, path)
     scene = scene_for(name, degree, camera)
     rng = np.random.default_rng(degree)
     d_colour, d_depth = rng.normal(0, 1, (3, 29, 33)), rng.normal(0, 0.1, (29, 33))
-    out, saved = render_forward(scene, camera, settings, degree=degree, background=BACKGROUND, path=path)
+    out, saved = render_forward(scene, camera, settings, degree=degree, background=BACKGROUND, compositor=path)
     ours = render_reverse(d_colour, d_depth, None, saved)
     peer = peer_gsplat.render_with_gradients(
         scene, camera, settings, d_colour, d_depth, degree=degree, background=BACKGROUND

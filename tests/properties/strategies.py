@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import strategies as st
 
+from endotsr.kernels.constants import Y00
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
@@ -11,7 +12,6 @@ DTYPES = st.sampled_from([np.float32, np.float64])
 SEEDS = st.integers(0, 2**32 - 1)
 RASTER = st.sampled_from([("definition", EXACT), ("definition", PAPER), ("blocks", PAPER), ("definition", LEGACY)])
 CAMERA = Camera(np.eye(3), np.zeros(3), 9.0, 10.0, 4.8, 3.1, 9, 7)
-Y00 = 0.28209479177387814
 
 
 def logit(alpha: float) -> float:

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from endotsr.equations.appearance import Y00, appearance_forward, appearance_reverse
+from endotsr.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.equations.calibration import calibrate
 from endotsr.equations.deformation import deformation_forward, deformation_reverse
-from endotsr.equations.fourier import atom_statistics, dictionary_forward, frequencies, normalised_atoms
+from endotsr.equations.dictionary import atom_statistics, dictionary_forward, frequencies, normalised_atoms
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
 from endotsr.equations.motion import motion_forward, motion_reverse
+from endotsr.kernels.constants import Y00
 from properties.strategies import DTYPES, SEEDS
 
 COUNTS = st.integers(1, 9)
@@ -93,7 +94,7 @@ def test_the_colour_residual_is_bounded_odd_and_finite(seed, count, n, dtype, si
     assert np.array_equal(appearance_forward(-a, atoms, beta)[0], -residual)
     back = appearance_reverse(np.ones((3, n), dtype), saved)
     assert all(np.isfinite(g).all() for g in back)
-    assert (back.colour_coefficients >= 0).all()  # monotone in every coefficient of a positive atom
+    assert (back.appearance_coefficients >= 0).all()  # monotone in every coefficient of a positive atom
 
 
 @given(SEEDS, COUNTS, DTYPES, st.permutations(range(3)))

@@ -40,7 +40,7 @@ def make(rng, count, dtype=np.float64, residuals=True) -> tuple[Gaussians, AdamS
         fdm_weight=normal(10, 2, count),
         fdm_centre=normal(10, 2, count),
         fdm_width=normal(10, 2, count),
-        colour_coefficients=normal(3, 4, count) if residuals else None,
+        appearance_coefficients=normal(3, 4, count) if residuals else None,
         motion_coefficients=normal(3, 4, count) if residuals else None,
     )
     adam = adam_state(arrays(gaussians))
@@ -133,8 +133,8 @@ def test_same_seed_same_bits(scene):
 def test_components_that_are_off_stay_off(rng):
     gaussians, adam = make(rng, 3, residuals=False)
     result = run(gaussians, adam, steep(3, 0))
-    assert result.gaussians.colour_coefficients is None
-    assert "colour_coefficients" not in result.adam.first
+    assert result.gaussians.appearance_coefficients is None
+    assert "appearance_coefficients" not in result.adam.first
 
 
 def test_threshold_and_size_rule_are_closed_on_the_stated_side(rng):

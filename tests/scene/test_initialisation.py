@@ -78,7 +78,7 @@ def test_fields_at_the_start():
     assert not gaussians.fdm_weight.any()
     np.testing.assert_array_equal(gaussians.fdm_centre[3, :, 7], np.linspace(0, 1, 5, dtype=np.float32))
     assert (gaussians.fdm_width == np.float32(0.01)).all()
-    assert gaussians.colour_coefficients is None and gaussians.motion_coefficients is None
+    assert gaussians.appearance_coefficients is None and gaussians.motion_coefficients is None
     rigid = initialise(sequence, config, ModelConfig(deformation=False), np.random.default_rng(0), np.float64)
     assert rigid.fdm_weight is None and rigid.position.dtype == np.float64
 
@@ -184,10 +184,10 @@ def test_hard_I1_depth_that_is_not_a_number_is_no_depth():
 def test_activation_allocates_zeros_for_what_is_on():
     gaussians = gaussians_at(np.eye(3), np.zeros((3, 3)), MODEL, np.float32)
     both = activate_residuals(gaussians, 8, True, True)
-    assert both.colour_coefficients.shape == both.motion_coefficients.shape == (3, 16, 3)
-    assert both.colour_coefficients.dtype == np.float32 and not both.colour_coefficients.any()
+    assert both.appearance_coefficients.shape == both.motion_coefficients.shape == (3, 16, 3)
+    assert both.appearance_coefficients.dtype == np.float32 and not both.appearance_coefficients.any()
     one = activate_residuals(gaussians, 8, False, True)
-    assert one.colour_coefficients is None and one.motion_coefficients is not None
+    assert one.appearance_coefficients is None and one.motion_coefficients is not None
     both.motion_coefficients[:] = 1.0
     assert activate_residuals(both, 8, True, True).motion_coefficients is both.motion_coefficients
 

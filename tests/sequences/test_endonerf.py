@@ -143,13 +143,13 @@ def test_hard_E1_wrong_polarity_is_recognised(tmp_path, mask_folder, depth_behin
     """By missing depth, and where the tool has depth too, by colour."""
     write_synthetic_folder(tmp_path, mask_folder=mask_folder, depth_behind_tool=depth_behind_tool)
     wrong = SequenceConfig(masks=mask_folder, excluded_value="black")
-    toml = r'\(TOML: \[sequence\] excluded_value = "white"\).* --sequence.allow-mask-share'
+    toml = r'\(TOML: \[sequence\] excluded_value = "white"\).* --sequence.allow-tissue-fraction'
     with pytest.raises(
         InputError, match=rf"{mask_folder}: .*other polarity: set --sequence.excluded-value white {toml}"
     ):
         read_endonerf(tmp_path, wrong)
-    forced = SequenceConfig(masks=mask_folder, excluded_value="black", allow_mask_share=True)
-    assert read_endonerf(tmp_path, forced).tissue_share < 0.5
+    forced = SequenceConfig(masks=mask_folder, excluded_value="black", allow_tissue_fraction=True)
+    assert read_endonerf(tmp_path, forced).tissue_fraction < 0.5
 
 
 def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
@@ -159,11 +159,11 @@ def test_hard_E1_implausible_tissue_share_is_refused_unless_allowed(tmp_path):
             cv2.imwrite(str(file), np.full((24, 32), value, np.uint8))
         with pytest.raises(
             InputError,
-            match=rf"masks: {share} of the pixels count as tissue; .*--sequence.allow-mask-share .*allow_mask_share",
+            match=rf"masks: {share} of the pixels count as tissue; .*--sequence.allow-tissue-fraction .*_fraction",
         ):
             read_endonerf(tmp_path, SequenceConfig())
-        sequence = read_endonerf(tmp_path, SequenceConfig(allow_mask_share=True))
-        assert sequence.tissue_share == (value == 0)
+        sequence = read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True))
+        assert sequence.tissue_fraction == (value == 0)
 
 
 def test_hard_E2_soft_masks_are_thresholded_and_noted_or_refused(tmp_path):
@@ -446,7 +446,7 @@ def test_real_sequence(masks, share):
     assert time.process_time() - start < 3.0
     assert sequence.images.shape == (63, 3, 512, 640)
     assert (len(sequence.train_index), len(sequence.test_index)) == (55, 8)
-    assert sequence.tissue_share == pytest.approx(share, abs=1e-4)
+    assert sequence.tissue_fraction == pytest.approx(share, abs=1e-4)
     assert sequence.static_camera and sequence.cameras[0].fx == pytest.approx(569.468, abs=1e-3)
     assert (sequence.cameras[0].cx, sequence.cameras[0].cy) == (320, 256)
     assert len(sequence.notes) == 2

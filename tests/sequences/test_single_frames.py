@@ -24,9 +24,9 @@ def test_hard_E5_an_inverted_mask_among_right_ones_is_named(tmp_path, inverted, 
     for frame in inverted:
         _write_mask(tmp_path, frame, ~written.tissue[frame])
     name = f"masks/frame-{inverted[0]:06d}.mask.png: "
-    with pytest.raises(InputError, match=rf"{name}.* set --sequence.allow-mask-share \(TOML: \[sequence\] allow_"):
+    with pytest.raises(InputError, match=rf"{name}.* set --sequence.allow-tissue-fraction \(TOML: \[sequence\] allow_"):
         read_endonerf(tmp_path, SequenceConfig())
-    allowed = read_endonerf(tmp_path, SequenceConfig(allow_mask_share=True))
+    allowed = read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True))
     assert any(name in note for note in allowed.notes)
 
 
@@ -35,7 +35,7 @@ def test_hard_E5_a_mask_with_hardly_any_tissue_is_named(tmp_path):
     _write_mask(tmp_path, 6, written.tissue[6] & (np.arange(24) == 23)[:, None])
     with pytest.raises(InputError, match=r"masks/frame-000006.mask.png: 4.2% of the pixels count as tissue, .* 78.1%"):
         read_endonerf(tmp_path, SequenceConfig())
-    assert read_endonerf(tmp_path, SequenceConfig(allow_mask_share=True)).masks[6].mean() < 0.05
+    assert read_endonerf(tmp_path, SequenceConfig(allow_tissue_fraction=True)).masks[6].mean() < 0.05
 
 
 def test_hard_E5_masks_of_one_side_only_are_noted(tmp_path):

@@ -8,13 +8,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from endotsr.kernels.constants import Y00
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut, Scene, render_forward, render_reverse
 from endotsr.splatting.settings import LegacyDeviations, RasterSettings
 
 U64 = 2.0**-53
 U32 = 2.0**-24
-Y00 = 0.28209479177387814
 IMAGES = ("colour", "depth", "opacity")
 FIELDS = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual")
 
@@ -103,7 +103,7 @@ def run(
 ) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
     """Images and all gradients, by name, for random (or `given`) gradients of the images."""
     degree = int(np.sqrt(scene.harmonics.shape[0])) - 1 if degree is None else degree
-    out, saved = render_forward(scene, camera, settings, degree=degree, background=background, path=path)
+    out, saved = render_forward(scene, camera, settings, degree=degree, background=background, compositor=path)
     given = cotangents(out, seed) if given is None else given
     grads = render_reverse(*given, saved, background_gradient=True, pose_gradient=True)
     named = {name: getattr(grads, name) for name in (*FIELDS, "mean2d", "background")}

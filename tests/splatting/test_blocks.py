@@ -23,12 +23,15 @@ from made_up_scenes import (
     turned_camera,
 )
 
-from endotsr.splatting import compositing, compositing_blocks, compositing_tiles
+from endotsr.kernels.exponential import LOG2_E
+from endotsr.kernels.vectors import lanes
+from endotsr.splatting import compositing
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, camera_centre
-from endotsr.splatting.compositing_tiles import TILE_HEIGHT, TILE_WIDTH, place
 from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.exponential import LOG2_E
+from endotsr.splatting.fast import blocks as compositing_blocks
+from endotsr.splatting.fast import tiles as compositing_tiles
+from endotsr.splatting.fast.tiles import TILE_HEIGHT, TILE_WIDTH, place
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
 from endotsr.splatting.records import (
@@ -47,9 +50,8 @@ from endotsr.splatting.records import (
     log_opacity,
     pack_records,
 )
-from endotsr.splatting.render import Scene, choose_path
+from endotsr.splatting.render import Scene, choose_compositor
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
-from endotsr.vectors import lanes
 
 BACKGROUND = np.array([0.9, 0.1, 0.4])
 PATHS = {
@@ -239,13 +241,13 @@ def test_stacks_cost_at_most_a_hundred_roundings():
 
 
 def test_auto_takes_the_fast_path_exactly_where_it_computes_the_settings():
-    assert choose_path(PAPER, "auto") == "blocks"
+    assert choose_compositor(PAPER, "auto") == "blocks"
     others = (EXACT, LEGACY, PAPER._replace(alpha_cutoff=0.0), PAPER._replace(alpha_max=1.0))
     for settings in (*others, PAPER._replace(support="everywhere")):
-        assert choose_path(settings, "auto") == "definition"
+        assert choose_compositor(settings, "auto") == "definition"
         with pytest.raises(ValueError, match="definition"):
-            choose_path(settings, "blocks")
-    assert choose_path(PAPER, "definition") == "definition"
+            choose_compositor(settings, "blocks")
+    assert choose_compositor(PAPER, "definition") == "definition"
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

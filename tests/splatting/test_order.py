@@ -14,9 +14,9 @@ from made_up_scenes import (
     select,
 )
 
+from endotsr.kernels.exponential import LOG2_E
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.projection import Projected, projection_forward
 from endotsr.splatting.records import INVERSE_C, LOG2_OPACITY, PRECISION, log_opacity, pack_records
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER

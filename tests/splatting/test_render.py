@@ -118,7 +118,7 @@ def test_gradients_that_nobody_asks_for_are_not_made():
 @pytest.mark.parametrize("preset, path", CASES)
 def test_visible_is_who_reaches_a_pixel_box(preset, path):
     scene = random_scene(5, 120, CAMERA)
-    out, saved = render_forward(scene, CAMERA, PRESETS[preset], path=path)
+    out, saved = render_forward(scene, CAMERA, PRESETS[preset], compositor=path)
     grads = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), None, saved)
     hidden = ~grads.visible
     assert hidden.any() and grads.visible.any()
@@ -158,7 +158,7 @@ def test_zero_coefficients_leave_image_and_base_gradients_bitwise_unchanged(dtyp
     base = Gaussians(*raw[:5], *curves)
     zeros = np.zeros((3, 2 * model.frequencies, n), dtype)
     results = []
-    for gaussians in (base, base._replace(colour_coefficients=zeros, motion_coefficients=zeros)):
+    for gaussians in (base, base._replace(appearance_coefficients=zeros, motion_coefficients=zeros)):
         scene, _ = scene_at(gaussians, spectral, model, 0.37)
         results.append(run(scene, CAMERA, PAPER, background=BACKGROUND))
     (images, gradients), (same, more) = results

@@ -3,9 +3,9 @@
 import msgspec
 import numpy as np
 
-from endotsr.bench import workload
 from endotsr.config import PAPER, ModelConfig
 from endotsr.fitting.model import spectral_from
+from endotsr.scene import workload
 from endotsr.tradeoff.scenes import StudyScene
 
 

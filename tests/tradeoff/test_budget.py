@@ -3,8 +3,8 @@
 import pytest
 from made_up import moving_scene
 
-from endotsr.commands.options import base_settings, parse
-from endotsr.commands.train import TrainOptions
+from endotsr.cli.parts.options import base_settings, parse
+from endotsr.cli.train import TrainOptions
 from endotsr.errors import InputError
 from endotsr.fitting.model import raster_settings
 from endotsr.tradeoff.budget import frame_advice, parse_budget, settings_words, training_advice

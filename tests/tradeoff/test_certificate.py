@@ -46,7 +46,7 @@ def test_digits_take_every_part_of_the_scene_in(scene, exact):
     """Leave out what the certificate must see: residual, harmonics of degree 3, low-pass."""
     raster = reference_setting(scene).raster
     for changed in (
-        scene.gaussians._replace(colour_coefficients=None),
+        scene.gaussians._replace(appearance_coefficients=None),
         scene.gaussians._replace(harmonics=np.ascontiguousarray(scene.gaussians.harmonics[:9])),
     ):
         other = type(scene)(**(scene.__dict__ | {"gaussians": changed}))

@@ -63,28 +63,28 @@ def test_errors_rise_and_visits_fall_with_the_dial(field, values):
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_tiles_change_no_bit_of_the_image(scene, precision):
-    base = with_raster(alpha_cutoff=1 / 255)._replace(path="definition", precision=precision)
+    base = with_raster(alpha_cutoff=1 / 255)._replace(compositor="definition", precision=precision)
     images = [frame(prepare(scene, base._replace(tile=side)))[0].colour for side in (None, *dials.TILES)]
     assert all(np.array_equal(image, images[0]) for image in images)
 
 
 def test_tiles_change_gradients_by_rounding_only(scene):
     """Sums over a Gaussian's pixels are grouped by tile: another grouping, another last digit."""
-    base = with_raster(alpha_cutoff=1 / 255)._replace(path="definition")
+    base = with_raster(alpha_cutoff=1 / 255)._replace(compositor="definition")
     one, other = (frame(prepare(scene, base._replace(tile=side)))[0] for side in (8, 32))
     assert errors(one, other).gradient < 1e-13
 
 
 @pytest.mark.parametrize("path", ["blocks", "definition"])
 def test_threads_change_no_bit(scene, path):
-    base = with_raster(alpha_cutoff=1 / 255)._replace(path=path)
+    base = with_raster(alpha_cutoff=1 / 255)._replace(compositor=path)
     one, two = (frame(prepare(scene, base._replace(threads=threads)))[0] for threads in (1, 2))
     assert np.array_equal(one.colour, two.colour)
     assert all(np.array_equal(one.gradients[name], two.gradients[name]) for name in one.gradients)
 
 
 def test_the_ellipse_loses_nothing_against_every_pixel(scene):
-    base = with_raster(alpha_cutoff=1 / 255)._replace(path="definition")
+    base = with_raster(alpha_cutoff=1 / 255)._replace(compositor="definition")
     everywhere = base._replace(raster=base.raster._replace(support="everywhere"))
     (one, few), (other, many) = frame(prepare(scene, base)), frame(prepare(scene, everywhere))
     assert np.array_equal(one.colour, other.colour)

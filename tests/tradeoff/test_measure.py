@@ -8,7 +8,8 @@ from made_up import moving_scene
 
 from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import scene_at
-from endotsr.splatting import compositing, compositing_blocks
+from endotsr.splatting import compositing
+from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.splatting.projection import footprint
 from endotsr.splatting.render import render_forward
 from endotsr.splatting.settings import PRESETS
@@ -115,7 +116,7 @@ def test_visits_are_counted_right_on_both_paths(preset, path):
     scene = moving_scene(count=60, width=20)
     scene.gaussians.opacity_logit[:] += 2  # some pixels finish early
     view, _ = scene_at(scene.gaussians, scene.spectral, scene.model, scene.time)
-    _, saved = render_forward(view, scene.camera, PRESETS[preset], path=path)
+    _, saved = render_forward(view, scene.camera, PRESETS[preset], compositor=path)
     by_hand = visits_by_hand(saved, PRESETS[preset], scene.camera.width, scene.camera.height)
     assert count_pairs(saved).visited == by_hand
     unstopped = visits_by_hand(saved, PRESETS[preset]._replace(transmittance_stop=0.0), 20, 16)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.splatting.harmonics import Y00
+from endotsr.kernels.constants import Y00
 from endotsr.splatting.render import Scene, render_forward
 from endotsr.splatting.settings import PAPER
 from endotsr.tradeoff.splat_file import read_splats, splat_scene

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from test_splat_file import write_npz
 
-from endotsr.cli import main
+from endotsr.cli.main import main
 from endotsr.tradeoff.results import Measurement, Trainings, read_result
 
 

@@ -6,12 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from endotsr.commands.options import base_settings, parse
-from endotsr.commands.sources import load_sequence
-from endotsr.commands.train import TrainOptions
+from endotsr.cli.parts.options import base_settings, parse
+from endotsr.cli.train import TrainOptions
 from endotsr.config import DEMO, InitialisationConfig, with_iterations
 from endotsr.errors import InputError
 from endotsr.fitting.trainer import new_training, train
+from endotsr.runs.sources import load_sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.tradeoff import training
 from endotsr.tradeoff.training import changed, configurations, measured, run_training_study

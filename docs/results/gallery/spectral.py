@@ -5,11 +5,11 @@ import numpy as np
 
 from endotsr.equations.appearance import Y00, appearance_forward
 from endotsr.equations.calibration import calibrate
-from endotsr.equations.fourier import dictionary_forward, frequencies
+from endotsr.equations.dictionary import dictionary_forward, frequencies
 from endotsr.equations.laplacian import laplacian_levels, laplacian_loss_forward, support_masks
 from endotsr.equations.matern import matern_weights
-from endotsr.losses.photometric import masked_l1_forward
-from endotsr.losses.similarity import masked_ssim_forward, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward
+from endotsr.losses.masked_ssim import masked_ssim_forward, ssim_target
 from gallery.registry import case
 
 

@@ -75,7 +75,7 @@ real *scratch(Request *request, long count);
 typedef void Operation(Request *request);
 Operation reading, generator;                                                        /* reading.c */
 Operation frequencies, dictionary, atoms, appearance, motion, matern, deformation;   /* time.c */
-Operation laplacian, calibration;                                                    /* detail.c */
+Operation laplacian, calibration;                                                    /* laplacian.c */
 Operation covariance, projection;                                                    /* projection.c */
 Operation harmonics;                                                                 /* harmonics.c */
 Operation composite;                                                                 /* composite.c */

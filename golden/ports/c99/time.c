@@ -118,7 +118,7 @@ static void weighted_reverse(const real *d_out, const real *coefficients, const 
 
 void appearance(Request *request)
 {
-    const real *coefficients = in_real(request, "colour_coefficients"), *phi_bar = in_real(request, "phi_bar");
+    const real *coefficients = in_real(request, "appearance_coefficients"), *phi_bar = in_real(request, "phi_bar");
     const real *d_residual = in_real(request, "d_residual");
     long terms = in_size(request, "phi_bar", 0), count = in_size(request, "d_residual", 1);
     real scale = (real)(setting(request, "beta") / Y00);
@@ -130,7 +130,7 @@ void appearance(Request *request)
         residual[k] = scale * tanh(x[k]);
         d_x[k] = scale * 4 * e / ((1 + e) * (1 + e)) * d_residual[k];
     }
-    weighted_reverse(d_x, coefficients, phi_bar, terms, count, out_real(request, "d_colour_coefficients", 3 * terms * count),
+    weighted_reverse(d_x, coefficients, phi_bar, terms, count, out_real(request, "d_appearance_coefficients", 3 * terms * count),
                      out_real(request, "d_phi_bar", terms));
 }
 

@@ -15,9 +15,9 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from endotsr.bench import workload
 from endotsr.bench.timing import spread
 from endotsr.config import PAPER, Config
+from endotsr.scene import workload
 
 Precision = Literal["float32", "float64"]
 
@@ -68,7 +68,7 @@ def measure(case: Case) -> dict[str, Any]:
 
     from endotsr.bench.clock import SPLAT, StageClock
     from endotsr.fitting.trainer import training_step
-    from endotsr.runs import peak_memory_bytes
+    from endotsr.runs.machine import peak_memory_bytes
     from endotsr.scene.gaussians import arrays
 
     numba.set_num_threads(min(case.threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
@@ -116,7 +116,7 @@ def prepare(case: Case, config: Config) -> tuple[Any, Any]:
 def representative(config: Config) -> int:
     """An iteration after which everything runs: residuals, detail loss and statistics, but no densification."""
     t, loss = config.training, config.loss
-    start = max(t.residual_activation + 1, loss.detail_full, loss.smoothness_from)
+    start = max(t.residual_activation + 1, loss.laplacian_full, loss.smoothness_from)
     return start + config.density.interval // 2
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.bench.clock import REST, STAGES
-from endotsr.evaluation.curves import UNSIGNED
+from endotsr.report.curves import UNSIGNED
 
 INK, FAINT = "#24303a", "#c9d1d8"
 # Stages of one kind share a hue: time bases blue, splatting orange to red, losses green, optimiser violet.

@@ -7,11 +7,11 @@ warm-up; compilation is timed apart. Medians and quartiles, because a shared mac
 import time
 from typing import Any
 
-from endotsr.bench import workload
 from endotsr.bench.case import WARM_UP, representative
 from endotsr.bench.timing import spread
 from endotsr.config import PAPER, Config
-from endotsr.runs import peak_memory_bytes
+from endotsr.runs.machine import peak_memory_bytes
+from endotsr.scene import workload
 
 
 class StageTimer:
@@ -41,7 +41,7 @@ def benchmark_iteration(
 ) -> dict[str, Any]:
     """Milliseconds of the stages and of the whole iteration.
 
-    gaussians, width, height   size of the workload (see `endotsr.bench.workload`)
+    gaussians, width, height   size of the workload (see `endotsr.scene.workload`)
     returns                    JSON-able: "stages" {name: {"median_ms", "quartiles_ms"}}, "iteration" the same for the
                                sum, "first_iteration_s" (compilation or loading of compiled code included), sizes
     """

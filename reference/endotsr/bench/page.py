@@ -13,7 +13,7 @@ from typing import Any
 from endotsr.bench import page_parts
 from endotsr.bench.suite import PEERS_FILE, SCALING_FILE, STAGES_FILE, START_FILE
 from endotsr.errors import InputError
-from endotsr.runs import replace_file
+from endotsr.runs.files import replace_file
 
 FILES = {"stages": STAGES_FILE, "scaling": SCALING_FILE, "peers": PEERS_FILE, "start": START_FILE}
 

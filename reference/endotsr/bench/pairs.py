@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
-from endotsr.splatting import compositing, compositing_blocks
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
+from endotsr.splatting import compositing
 from endotsr.splatting.compositing import _alpha_kernel
+from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.splatting.render import RenderSaved
 
 
@@ -60,7 +61,7 @@ def count_pairs(saved: RenderSaved) -> PairCount:
     module = compositing_blocks if isinstance(composite, compositing_blocks.BlocksSaved) else compositing
     ellipse = saved.settings.support == "ellipse" and saved.settings.alpha_cutoff > 0
     counts: NDArray[np.int64] = np.zeros((composite.lists.starts.size - 1, 2), np.int64)
-    share(
+    parallel_for(
         _count_kernel, counts.shape[0],
         composite.records, composite.lists.starts, composite.lists.ranks, composite.limits, ellipse,
         camera.width, camera.height, (module.TILE_WIDTH, module.TILE_HEIGHT), counts,

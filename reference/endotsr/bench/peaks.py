@@ -10,8 +10,8 @@ import numba
 import numpy as np
 
 from endotsr.bench.timing import repeated
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 STEPS = 16  # multiply-adds of one chain, each waiting for the one before
 CHAINS = 8  # of one number, independent: enough to hide the latency of an FMA
@@ -70,7 +70,7 @@ def fma_peak(precision: str, repeats: int = 7) -> float:
     real = np.dtype(precision).type
     tasks = 64 * numba.get_num_threads()
     values = np.ones((tasks, BLOCK), real)
-    work = lambda: share(_multiply_add_kernel, tasks, values, real(0.5))
+    work = lambda: parallel_for(_multiply_add_kernel, tasks, values, real(0.5))
     return 2.0 * STEPS * CHAINS * values.size / min(repeated(work, repeats, warm_up=2))
 
 
@@ -83,7 +83,7 @@ def bandwidths(repeats: int = 7, array_bytes: int = TRIAD_BYTES) -> dict[str, fl
     out, left, right = (np.ones(array_bytes // 4, np.float32) for _ in range(3))
     tasks, factor = -(-out.size // PIECE), np.float32(0.5)
     seconds = {
-        name: min(repeated(lambda k=kernel: share(k, tasks, out, left, right, factor), repeats))
+        name: min(repeated(lambda k=kernel: parallel_for(k, tasks, out, left, right, factor), repeats))
         for name, kernel in (("triad", _triad_kernel), ("update", _update_kernel))
     }
     return {name: 3.0 * out.nbytes / best for name, best in seconds.items()}

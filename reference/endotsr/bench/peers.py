@@ -15,10 +15,10 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.bench import workload
 from endotsr.bench.case import Case, Precision, apart
 from endotsr.bench.timing import repeated, spread
 from endotsr.errors import InputError
+from endotsr.scene import workload
 
 FloatArray = NDArray[np.floating]
 

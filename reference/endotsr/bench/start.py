@@ -47,11 +47,11 @@ def fresh_process(cache: str) -> dict[str, float]:
 
 def _first_iterations() -> None:
     """Say each moment as it is reached; the parent takes the time."""
-    from endotsr.bench import workload
     from endotsr.bench.case import representative
-    from endotsr.compile_ahead import compile_ahead
     from endotsr.config import PAPER
+    from endotsr.fitting.compile_ahead import compile_ahead
     from endotsr.fitting.trainer import new_training, training_step, workshop
+    from endotsr.scene import workload
 
     say = lambda moment: print(json.dumps(moment), flush=True)
     say(MOMENTS[0])

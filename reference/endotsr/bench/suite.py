@@ -9,7 +9,8 @@ from endotsr.bench.case import Case, Precision
 from endotsr.bench.stages import Say
 from endotsr.bench.trained import read_arrays
 from endotsr.errors import InputError
-from endotsr.runs import machine, now, versions, write_json
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine, now, versions
 
 STAGES_FILE, SCALING_FILE, PEERS_FILE, START_FILE = (
     "bench_stages.json", "scaling.json", "bench_peers.json", "bench_start.json",

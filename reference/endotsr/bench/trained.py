@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.bench import workload
 from endotsr.config import Config
-from endotsr.equations.appearance import Y00
 from endotsr.errors import InputError
+from endotsr.kernels.constants import Y00
+from endotsr.scene import workload
 from endotsr.scene.gaussians import Gaussians
 
 ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}

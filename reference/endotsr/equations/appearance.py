@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import combine, spread
-from endotsr.jit import jit
-from endotsr.sharing import share
-from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
+from endotsr.kernels.constants import Y00
+from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 
-Y00 = 0.28209479177387814  # 1 / (2 sqrt(pi)), the constant spherical harmonic
 
 LN2_HIGH = 355.0 / 512.0  # ln 2 in nine bits: k * LN2_HIGH is exact for every exponent k of either precision
 LN2_LOW = -2.1219444005469058e-4  # ln 2 - LN2_HIGH
@@ -28,7 +28,7 @@ SATURATED = 1e4  # exp(-1e4) is 0 in either precision
 class AppearanceSaved(NamedTuple):
     """References to the inputs and the derivative of the squashing."""
 
-    colour_coefficients: FloatArray  # (3, 2F, N)
+    appearance_coefficients: FloatArray  # (3, 2F, N)
     phi_bar: FloatArray  # (2F,)
     slope: FloatArray  # (3, N)  beta tanh'(A phi_bar) / Y00
 
@@ -36,7 +36,7 @@ class AppearanceSaved(NamedTuple):
 class AppearanceGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
-    colour_coefficients: FloatArray  # (3, 2F, N)
+    appearance_coefficients: FloatArray  # (3, 2F, N)
     phi_bar: FloatArray | None  # (2F,), None when not asked for
 
 
@@ -92,11 +92,11 @@ _squash_kernel = jit(_squash)
 
 
 def appearance_forward(
-    colour_coefficients: FloatArray, phi_bar: FloatArray, beta: float
+    appearance_coefficients: FloatArray, phi_bar: FloatArray, beta: float
 ) -> tuple[FloatArray, AppearanceSaved]:
     """Equation (2): residual = beta tanh(A phi_bar(t)) / Y00.
 
-    colour_coefficients  (3, 2F, N)  A, dimensionless; [colour channel, atom, Gaussian]
+    appearance_coefficients  (3, 2F, N)  A, dimensionless; [colour channel, atom, Gaussian]
     phi_bar              (2F,)       normalised atoms of equation (1b) at this time
     beta                 ()          bound of the residual, display units [0, 1], > 0
     returns              (3, N) residual in units of the degree-0 harmonic coefficient, |residual| <= beta / Y00,
@@ -109,11 +109,11 @@ def appearance_forward(
     """
     if not (math.isfinite(beta) and beta > 0):
         raise ValueError(f"beta {beta}; allowed: finite, > 0")
-    argument = combine(colour_coefficients, phi_bar)
+    argument = combine(appearance_coefficients, phi_bar)
     residual, slope = np.empty_like(argument), np.empty_like(argument)
     x, value, derivative = argument.reshape(-1), residual.reshape(-1), slope.reshape(-1)
-    share(_squash_kernel, x.size, x, argument.dtype.type(beta / Y00), value, derivative)
-    return residual, AppearanceSaved(colour_coefficients, phi_bar, slope)
+    parallel_for(_squash_kernel, x.size, x, argument.dtype.type(beta / Y00), value, derivative)
+    return residual, AppearanceSaved(appearance_coefficients, phi_bar, slope)
 
 
 def appearance_reverse(
@@ -126,7 +126,9 @@ def appearance_reverse(
     Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
     """
     d_argument = argument_gradient(d_residual, saved)
-    return AppearanceGrads(*spread(d_argument, saved.colour_coefficients, saved.phi_bar, atom_gradient=atom_gradient))
+    return AppearanceGrads(
+        *spread(d_argument, saved.appearance_coefficients, saved.phi_bar, atom_gradient=atom_gradient)
+    )
 
 
 def argument_gradient(d_residual: FloatArray, saved: AppearanceSaved) -> FloatArray:

@@ -8,12 +8,12 @@ float64, block by block.
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 
-BLOCK = 1024  # Gaussians a task; a few rows of a block stay in the first-level cache
+GAUSSIANS_PER_TASK = 1024  # Gaussians a task; a few rows of a block stay in the first-level cache
 LANES = 64  # partial sums side by side: enough to fill the vector units
 
 
@@ -21,8 +21,8 @@ def _combine(first, last, coefficients, atoms, out):
     axes, count, n = coefficients.shape
     zero = coefficients.dtype.type(0.0)
     for block in range(first, last):
-        start = block * BLOCK
-        stop = min(n, start + BLOCK)
+        start = block * GAUSSIANS_PER_TASK
+        stop = min(n, start + GAUSSIANS_PER_TASK)
         for c in range(axes):
             total = out[c, start:stop]
             for k in range(total.size):
@@ -37,8 +37,8 @@ def _combine(first, last, coefficients, atoms, out):
 def _spread(first, last, d_out, atoms, d_coefficients):
     axes, count, n = d_coefficients.shape
     for block in range(first, last):
-        start = block * BLOCK
-        stop = min(n, start + BLOCK)
+        start = block * GAUSSIANS_PER_TASK
+        stop = min(n, start + GAUSSIANS_PER_TASK)
         for c in range(axes):
             upstream = d_out[c, start:stop]
             for a in range(count):
@@ -52,8 +52,8 @@ def _atom_totals(first, last, d_out, coefficients, partial):
     axes, count, n = coefficients.shape
     lanes = np.empty(LANES)
     for block in range(first, last):
-        start = block * BLOCK
-        stop = min(n, start + BLOCK)
+        start = block * GAUSSIANS_PER_TASK
+        stop = min(n, start + GAUSSIANS_PER_TASK)
         strips = (stop - start) // LANES
         for a in range(count):
             for k in range(LANES):
@@ -73,7 +73,7 @@ def _atom_totals(first, last, d_out, coefficients, partial):
 
 
 def _blocks(n: int) -> int:
-    return (n + BLOCK - 1) // BLOCK
+    return (n + GAUSSIANS_PER_TASK - 1) // GAUSSIANS_PER_TASK
 
 
 _combine_kernel = jit(_combine)
@@ -88,7 +88,7 @@ def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
     coefficients = np.ascontiguousarray(coefficients)
     out = np.empty((coefficients.shape[0], coefficients.shape[2]), coefficients.dtype)
     atoms = np.ascontiguousarray(atoms, coefficients.dtype)
-    share(_combine_kernel, _blocks(out.shape[1]), coefficients, atoms, out)
+    parallel_for(_combine_kernel, _blocks(out.shape[1]), coefficients, atoms, out)
     return out
 
 
@@ -101,9 +101,9 @@ def spread(
         raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")
     d_out = np.ascontiguousarray(d_out, dtype)
     d_coefficients, tasks = np.empty(coefficients.shape, dtype), _blocks(coefficients.shape[2])
-    share(_spread_kernel, tasks, d_out, np.ascontiguousarray(atoms, dtype), d_coefficients)
+    parallel_for(_spread_kernel, tasks, d_out, np.ascontiguousarray(atoms, dtype), d_coefficients)
     if not atom_gradient:
         return d_coefficients, None
     partial = np.zeros((tasks, coefficients.shape[1]))
-    share(_atom_totals_kernel, tasks, d_out, np.ascontiguousarray(coefficients), partial)
+    parallel_for(_atom_totals_kernel, tasks, d_out, np.ascontiguousarray(coefficients), partial)
     return d_coefficients, partial.sum(axis=0).astype(dtype)

@@ -17,9 +17,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
-from endotsr.splatting.exponential import LOG2_E, exp2_nonpositive
+from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 Basis = Literal["quartic", "gaussian"]
@@ -29,7 +29,7 @@ CHANNELS = 10
 WIDTH_FLOOR = 1e-4  # added to width^2; keeps u finite at width 0
 SMALLEST_EXPONENT = -60.0  # a basis value below 2^-60 (below float64 rounding of 1) is exactly 0: no subnormal numbers
 LARGEST_U = 128.0  # above it the basis value is 0 for either basis; keeps u^2 finite far from the centre
-PIECE = 4096  # Gaussians in one piece of a row: long enough for the memory to be read ahead
+GAUSSIANS_PER_PIECE = 4096  # Gaussians in one piece of a row: long enough for the memory to be read ahead
 
 
 class DeformationSaved(NamedTuple):
@@ -70,8 +70,8 @@ def deformation_forward(
     """
     _check(fdm_weight, fdm_centre, fdm_width, basis)
     offsets = np.empty((CHANNELS, fdm_weight.shape[2]), fdm_weight.dtype)
-    tasks = CHANNELS * ((fdm_weight.shape[2] + PIECE - 1) // PIECE)
-    share(_forward_kernel, tasks, fdm_weight, fdm_centre, fdm_width, float(t), basis == "quartic", offsets)
+    tasks = CHANNELS * ((fdm_weight.shape[2] + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE)
+    parallel_for(_forward_kernel, tasks, fdm_weight, fdm_centre, fdm_width, float(t), basis == "quartic", offsets)
     return offsets, DeformationSaved(fdm_weight, fdm_centre, fdm_width, float(t), basis)
 
 
@@ -93,7 +93,7 @@ def deformation_reverse(d_offsets: FloatArray, saved: DeformationSaved) -> Defor
     d_weight, d_centre, d_width = np.empty_like(weight), np.empty_like(weight), np.empty_like(weight)
     row_sums = np.empty(weight.shape[:2], np.float64)
     inputs, outputs = (weight, centre, width, t, basis == "quartic", d_offsets), (d_weight, d_centre, d_width)
-    share(_reverse_kernel, row_sums.size, *inputs, *outputs, row_sums)
+    parallel_for(_reverse_kernel, row_sums.size, *inputs, *outputs, row_sums)
     return DeformationGrads(d_weight, d_centre, d_width, -float(row_sums.sum()))
 
 
@@ -161,11 +161,11 @@ reverse_row = jit(_reverse_row)
 def _forward(first, last, weight, centre, width, t, quartic, offsets):
     """Each task owns one piece of one channel, so no cell is written twice."""
     bases, count = weight.shape[1:]
-    pieces = (count + PIECE - 1) // PIECE
+    pieces = (count + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE
     time = weight.dtype.type(t)
     for task in range(first, last):
-        c, start = task // pieces, (task % pieces) * PIECE
-        stop = min(count, start + PIECE)
+        c, start = task // pieces, (task % pieces) * GAUSSIANS_PER_PIECE
+        stop = min(count, start + GAUSSIANS_PER_PIECE)
         out = offsets[c, start:stop]
         for i in range(out.size):
             out[i] = weight.dtype.type(0)
@@ -181,8 +181,8 @@ def _reverse(first, last, weight, centre, width, t, quartic, d_offsets, d_weight
     for row in range(first, last):
         c, j = row // bases, row % bases
         total = 0.0
-        for start in range(0, count, PIECE):
-            stop = min(count, start + PIECE)
+        for start in range(0, count, GAUSSIANS_PER_PIECE):
+            stop = min(count, start + GAUSSIANS_PER_PIECE)
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
             d_w, d_m, d_s = d_weight[c, j, start:stop], d_centre[c, j, start:stop], d_width[c, j, start:stop]
             reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)

@@ -32,8 +32,8 @@ from endotsr.equations.pyramid import (
     reduce_row_adjoint,
     reflect_indices,
 )
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 MaskArray = NDArray[np.bool_]
@@ -232,13 +232,13 @@ def laplacian_loss_forward(
     fine = np.empty_like(rendered, order="C")
     observed = np.ascontiguousarray(observed, dtype)
     rows = channels * rendered.shape[1]
-    share(_difference_kernel, rows, np.ascontiguousarray(rendered), observed, masks.image, fine)
+    parallel_for(_difference_kernel, rows, np.ascontiguousarray(rendered), observed, masks.image, fine)
     loss, signs, weights = 0.0, [], []
     for valid, count in zip(masks.bands, masks.counts):
         coarse = reduce_image(fine)
         sign = np.empty(fine.shape, np.int8)
         sums = np.empty(channels * ((fine.shape[1] + ROWS - 1) // ROWS))
-        share(_band_signs_kernel, sums.size, fine, coarse, even, odd, valid, sign, sums)
+        parallel_for(_band_signs_kernel, sums.size, fine, coarse, even, odd, valid, sign, sums)
         weight = 1.0 / (len(masks.bands) * channels * count) if count else 0.0
         loss += weight * float(sums.sum())
         signs.append(sign)
@@ -273,7 +273,7 @@ def pull_back(
         out = np.empty((channels, coarse_length(h), coarse_length(w)), dtype)
         table = expand_adjoint_table(h, upsampling)
         rows = channels * out.shape[1]
-        share(_expand_adjoint_kernel, rows, fields[level], real(-scales[level]), *table, even, odd, out)
+        parallel_for(_expand_adjoint_kernel, rows, fields[level], real(-scales[level]), *table, even, odd, out)
         return out
 
     last = len(fields) - 1
@@ -285,6 +285,6 @@ def pull_back(
         gate = np.ones(field.shape[1:], np.bool_) if inner else mask
         table = reduce_adjoint_table(field.shape[1])
         rows, scale = field.shape[0] * field.shape[1], real(scales[level])
-        share(_reduce_adjoint_kernel, rows, d_coarse, *table, field, scale, inner, gate, out)
+        parallel_for(_reduce_adjoint_kernel, rows, d_coarse, *table, field, scale, inner, gate, out)
         d_coarse = out
     return d_coarse

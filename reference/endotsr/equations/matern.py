@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import LANES
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 
@@ -109,7 +109,7 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
         return 0.0, saved
     sums = np.empty(axes * atoms)
     rows = np.ascontiguousarray(motion_coefficients).reshape(axes * atoms, n)
-    share(_row_square_sums_kernel, sums.size, rows, sums)
+    parallel_for(_row_square_sums_kernel, sums.size, rows, sums)
     energy = sums.reshape(axes, 2, count).sum(axis=(0, 1))
     return math.fsum(rho.astype(np.float64) * energy) / (6.0 * n * count), saved
 
@@ -129,5 +129,5 @@ def matern_penalty_reverse(d_penalty: float, saved: MaternSaved) -> FloatArray:
         return out
     factors = np.tile(penalty_factors(d_penalty, rho, n, coefficients.dtype), axes)
     rows = np.ascontiguousarray(coefficients).reshape(axes * atoms, n)
-    share(_scale_rows_kernel, axes * atoms, rows, factors, out.reshape(axes * atoms, n))
+    parallel_for(_scale_rows_kernel, axes * atoms, rows, factors, out.reshape(axes * atoms, n))
     return out

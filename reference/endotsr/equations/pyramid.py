@@ -19,8 +19,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 Upsampling = Literal["co_sited", "half_pixel"]
@@ -241,7 +241,7 @@ def reduce_image(fine: FloatArray) -> FloatArray:
     """Binomial filter and even samples: (C, h, w) -> (C, ceil(h/2), ceil(w/2)), same dtype."""
     channels, h, w = fine.shape
     out = np.empty((channels, coarse_length(h), coarse_length(w)), fine.dtype)
-    share(_reduce_kernel, channels * out.shape[1], np.ascontiguousarray(fine), out)
+    parallel_for(_reduce_kernel, channels * out.shape[1], np.ascontiguousarray(fine), out)
     return out
 
 

@@ -126,7 +126,7 @@ def evaluate_model(
             "training": len(sequence.train_index),
             "held_out": [int(i) for i in sequence.test_index],
             "training_sample": chosen,
-            "tissue_share": float(np.mean(sequence.masks)),
+            "tissue_fraction": float(np.mean(sequence.masks)),
         },
         "held_out": held_out.as_dict(),
         "training": inside.as_dict(),

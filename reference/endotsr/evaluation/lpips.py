@@ -31,7 +31,7 @@ PADDINGS = (2, 2, 1, 1, 1)
 POOL_BEFORE = (False, True, True, False, False)  # 3 x 3 maximum, stride 2
 POOL, POOL_STRIDE = 3, 2
 TINY = 1e-10  # added to the channel norm
-SMALLEST = 31  # pixels of an image side that leave one feature in the fifth map
+SMALLEST_SIDE = 31  # pixels of an image side that leave one feature in the fifth map
 
 
 class LpipsWeights(NamedTuple):
@@ -68,8 +68,10 @@ def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str
     """Why LPIPS of height x width images is not computed; None = it can be."""
     if weights is None:
         return f"no LPIPS weights: no file was given, {ENVIRONMENT} is not set, {default_weights_path()} does not exist"
-    if min(height, width) < SMALLEST:
-        return f"images of {width} x {height} are too small for LPIPS: at least {SMALLEST} x {SMALLEST} pixels"
+    if min(height, width) < SMALLEST_SIDE:
+        return (
+            f"images of {width} x {height} are too small for LPIPS: at least {SMALLEST_SIDE} x {SMALLEST_SIDE} pixels"
+        )
     return None
 
 

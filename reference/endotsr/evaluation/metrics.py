@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.losses.masked_ssim import masked_ssim_forward, ssim_target
 from endotsr.losses.rows import BoolArray, FloatArray, check_image
-from endotsr.losses.similarity import masked_ssim_forward, ssim_target
 
 LEVELS = 255  # of an 8-bit image
 

@@ -17,14 +17,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 Rate = float | tuple[tuple[slice, float], ...]
 """One learning rate, or one per part of the leading axis: ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))."""
 
-PIECE = 4096  # numbers in one task
+NUMBERS_PER_TASK = 4096  # numbers in one task
 SMALLEST_MOMENT = (
     1.1754943508222875e-38  # smallest normal float32; a smaller first moment becomes 0, in both precisions
 )
@@ -109,8 +109,8 @@ def adam_step(
     check_layout(parameter, {"parameter": parameter, "gradient": gradient, "first": first, "second": second})
     rate, root = step_factors(step, learning_rate, beta1, beta2)
     p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous
-    tasks = (p.size + PIECE - 1) // PIECE
-    share(_adam_kernel, tasks, p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
+    tasks = (p.size + NUMBERS_PER_TASK - 1) // NUMBERS_PER_TASK
+    parallel_for(_adam_kernel, tasks, p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
 
 
 def check_layout(like: FloatArray, arrays: Mapping[str, FloatArray]) -> None:
@@ -153,7 +153,7 @@ adam_row = jit(_adam_row)
 
 
 def _adam(first_task, last_task, parameter, gradient, first, second, rate, root, beta1, beta2, epsilon):
-    start, stop = first_task * PIECE, min(parameter.size, last_task * PIECE)
+    start, stop = first_task * NUMBERS_PER_TASK, min(parameter.size, last_task * NUMBERS_PER_TASK)
     p, g, m, v = parameter[start:stop], gradient[start:stop], first[start:stop], second[start:stop]
     adam_row(p, g, m, v, rate, root, beta1, beta2, epsilon)
 

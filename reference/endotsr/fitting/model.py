@@ -15,11 +15,17 @@ from numpy.typing import NDArray
 from endotsr.config import Config, ModelConfig
 from endotsr.equations.appearance import AppearanceSaved, appearance_forward, appearance_reverse
 from endotsr.equations.deformation import DeformationSaved, deformation_forward
-from endotsr.equations.fourier import AtomStatistics, atom_statistics, dictionary_forward, frequencies, normalised_atoms
+from endotsr.equations.dictionary import (
+    AtomStatistics,
+    atom_statistics,
+    dictionary_forward,
+    frequencies,
+    normalised_atoms,
+)
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.kernels.threads import parallel_calls
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
-from endotsr.sharing import together
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
@@ -86,7 +92,7 @@ def scene_at(
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
-    ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = together(
+    ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(
         lambda: _deformed(gaussians, model, t, ahead),
         lambda: _translation(gaussians, spectral, t),
         lambda: _residual(gaussians, spectral, model, t),
@@ -127,7 +133,7 @@ def _residual(
     gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float
 ) -> tuple[FloatArray | None, AppearanceSaved | None]:
     """The bounded colour residual, if there is one."""
-    coefficients = gaussians.colour_coefficients
+    coefficients = gaussians.appearance_coefficients
     if coefficients is None:
         return None, None
     phi_bar = normalised_atoms(t, spectral.omega, spectral.statistics)
@@ -144,7 +150,7 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
     if saved.appearance is not None and coefficients:
         assert grads.residual is not None
         appearance = appearance_reverse(grads.residual, saved.appearance, atom_gradient=False)
-        by_field["colour_coefficients"] = appearance.colour_coefficients
+        by_field["appearance_coefficients"] = appearance.appearance_coefficients
     if saved.motion is not None and coefficients:
         motion = motion_reverse(grads.position, saved.motion, atom_gradient=False)
         by_field["motion_coefficients"] = motion.motion_coefficients
@@ -157,7 +163,7 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:
     """The same Gaussians with the named spectral components taken out."""
     if not appearance:
-        gaussians = gaussians._replace(colour_coefficients=None)
+        gaussians = gaussians._replace(appearance_coefficients=None)
     return gaussians if spectral_motion else gaussians._replace(motion_coefficients=None)
 
 

@@ -22,14 +22,14 @@ from endotsr.equations.laplacian import (
 )
 from endotsr.equations.pyramid import Upsampling
 from endotsr.fitting.model import Spectral, render_at
+from endotsr.kernels.threads import parallel_calls
 from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.photometric import masked_l1_forward, masked_l1_reverse
-from endotsr.losses.similarity import SsimTarget, masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
 from endotsr.sequences.sequence import Frame, Sequence
-from endotsr.sharing import together
 from endotsr.splatting.render import RenderOut
 
 FloatArray = NDArray[np.floating]
@@ -133,7 +133,7 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
         calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
     if weights.laplacian > 0 and supports is not None:
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
-    photometric, *others = together(lambda: photometric_loss(colour, targets, weights.ssim), *calls.values())
+    photometric, *others = parallel_calls(lambda: photometric_loss(colour, targets, weights.ssim), *calls.values())
     loss, terms, d_colour, _ = photometric
     d_depth = np.zeros_like(rendered.depth)
     for name, term in zip(calls, others, strict=True):

@@ -23,7 +23,7 @@ def residuals_active(iteration: int, config: Config) -> bool:
     return has_any and iteration > config.training.residual_activation
 
 
-def residuals_born(iteration: int, config: Config) -> bool:
+def residuals_activate(iteration: int, config: Config) -> bool:
     """Whether this is the first iteration with residuals: their arrays and fresh moments are made before it."""
     return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
 
@@ -63,18 +63,18 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     }
     if residuals_active(iteration, config):
         residual = o.deformation * residual_decay(iteration, config)
-        rates["colour_coefficients"] = residual * o.colour_residual_factor
-        rates["motion_coefficients"] = residual * o.motion_residual_factor
+        rates["appearance_coefficients"] = residual * o.appearance_factor
+        rates["motion_coefficients"] = residual * o.spectral_motion_factor
     return rates
 
 
-def detail_share(iteration: int, config: Config) -> float:
-    """Share of lambda_lap in force: 0 up to `detail_from`, linear, 1 from `detail_full` on; 0 without component L."""
-    if not config.model.laplacian or iteration <= config.loss.detail_from:
+def laplacian_ramp(iteration: int, config: Config) -> float:
+    """Fraction of lambda_lap in force: 0 up to `laplacian_from`, 1 from `laplacian_full` on; 0 without component L."""
+    if not config.model.laplacian or iteration <= config.loss.laplacian_from:
         return 0.0
-    if iteration >= config.loss.detail_full:
+    if iteration >= config.loss.laplacian_full:
         return 1.0
-    return (iteration - config.loss.detail_from) / (config.loss.detail_full - config.loss.detail_from)
+    return (iteration - config.loss.laplacian_from) / (config.loss.laplacian_full - config.loss.laplacian_from)
 
 
 def smoothness_active(iteration: int, config: Config) -> bool:

@@ -21,19 +21,20 @@ from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import AdamState, adam_state, add_array
 from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
+from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import OffsetsAhead, Spectral, raster_settings, scene_at, scene_reverse, spectral_from
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
-from endotsr.fitting.optimise import optimise
 from endotsr.fitting.schedules import (
     active_degree,
     densify_now,
-    detail_share,
+    laplacian_ramp,
     learning_rates,
-    residuals_born,
+    residuals_activate,
     smoothness_active,
     statistics_active,
 )
-from endotsr.memory import keep_freed_memory
+from endotsr.kernels.memory import keep_freed_memory
+from endotsr.kernels.threads import parallel_calls
 from endotsr.scene.density_control import (
     DensityStatistics,
     densify,
@@ -44,7 +45,6 @@ from endotsr.scene.density_control import (
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals, initialise
 from endotsr.sequences.sequence import Sequence
-from endotsr.sharing import together
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, check_finite, render_forward, render_reverse
 
@@ -192,8 +192,8 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
 def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
     """One iteration; returns its log entry."""
     config, iteration = shop.config, state.iteration + 1
-    if residuals_born(iteration, config):
-        _give_birth(state, config)
+    if residuals_activate(iteration, config):
+        _activate_residuals(state, config)
     index, t = _draw_view(state.rng, shop)
     targets = shop.targets_of(index)
     camera = shop.sequence.cameras[index]
@@ -207,7 +207,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     timer.mark("losses")
     grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved)
     timer.mark("render reverse")
-    back, penalty, _ = together(
+    back, penalty, _ = parallel_calls(
         lambda: scene_reverse(grads, scene_saved, coefficients=False),
         lambda: _spectral_penalty(state.gaussians, shop),
         lambda: _watch_density(state, grads, camera, statistics_active(iteration, config)),
@@ -232,7 +232,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
 def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
     """A training frame, uniform with replacement, and its time (jittered or bridged when asked for)."""
     training = shop.config.training
-    if training.bridge_share > 0 and rng.random() < training.bridge_share:
+    if training.bridge_fraction > 0 and rng.random() < training.bridge_fraction:
         return _draw_bridge(rng, shop)
     index = int(shop.sequence.train_index[rng.integers(len(shop.sequence.train_index))])
     t = float(shop.sequence.times[index])
@@ -260,17 +260,17 @@ def _draw_bridge(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
 
 
 def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
-    share = detail_share(iteration, config)
+    share = laplacian_ramp(iteration, config)
     smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
     full = state.lambda_lap or 0.0
     return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, share * full)
 
 
-def _give_birth(state: TrainingState, config: Config) -> None:
+def _activate_residuals(state: TrainingState, config: Config) -> None:
     """The spectral residuals begin: zero coefficients, fresh moments, step 0."""
     model = config.model
     state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
-    for name in ("colour_coefficients", "motion_coefficients"):
+    for name in ("appearance_coefficients", "motion_coefficients"):
         array = getattr(state.gaussians, name)
         if array is not None:
             add_array(state.adam, name, array)
@@ -314,7 +314,7 @@ def _log_entry(
     terms = {name: float(value) for name, value in loss.terms.items()}
     entry: dict[str, Any] = {"iteration": iteration, "frame": index, "loss": total, **terms}
     if penalty is not None:
-        entry["msp"] = penalty
+        entry["matern_penalty"] = penalty
     if iteration % PSNR_EVERY == 0 or iteration == 1:
         entry["psnr"] = tissue_psnr(rendered.colour, targets)
     entry["gaussians"] = state.gaussians.count

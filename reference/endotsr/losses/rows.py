@@ -7,7 +7,7 @@ number of threads, and the row totals are added by one thread, so a loss is bitw
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
+from endotsr.kernels.jit import jit
 
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]

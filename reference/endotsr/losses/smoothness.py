@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.jit import jit
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 from endotsr.losses.rows import BoolArray, FloatArray, check_image, check_plane, row_total
-from endotsr.sharing import share
 
 FEW_PIXELS = 1e-6  # keeps S finite without valid pixels
 
@@ -79,7 +79,7 @@ def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads
         d_variation = float(d_loss) * factor
         for image, d_image in ((depth[None], d_depth[None]), (rendered, d_rendered)):
             weight = image.dtype.type(d_variation / image.size)
-            share(_variation_reverse_kernel, image.shape[0] * image.shape[1], image, saved.mask, weight, d_image)
+            parallel_for(_variation_reverse_kernel, image.shape[0] * image.shape[1], image, saved.mask, weight, d_image)
     twice = depth.dtype.type(2 * float(d_loss) * _smooth_weight(saved.smooth))
     _squared_steps_reverse_kernel(depth, saved.smooth, twice, d_depth)
     return SmoothnessGrads(rendered=d_rendered, rendered_depth=d_depth)
@@ -92,7 +92,7 @@ def _smooth_weight(smooth: BoolArray) -> float:
 def _total_variation(image: FloatArray, mask: BoolArray) -> float:
     """TV((1 - M) image), dimension of the image."""
     totals = np.empty(image.shape[0] * image.shape[1])
-    share(_variation_kernel, totals.size, image, mask, totals)
+    parallel_for(_variation_kernel, totals.size, image, mask, totals)
     return float(totals.sum()) / image.size
 
 

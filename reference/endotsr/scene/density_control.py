@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState
-from endotsr.jit import jit
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.sharing import share
 from endotsr.splatting.camera import Camera, camera_centre
 
 FloatArray = NDArray[np.floating]
@@ -192,7 +192,7 @@ def _take(array: FloatArray, index: IndexArray, old: int) -> FloatArray:
     if out.size:
         rows = array.size // array.shape[-1]
         source = np.ascontiguousarray(array).reshape(rows, -1)
-        share(_take_kernel, rows, source, index, old, out.reshape(rows, -1))
+        parallel_for(_take_kernel, rows, source, index, old, out.reshape(rows, -1))
     return out
 
 

@@ -28,7 +28,7 @@ class Gaussians(NamedTuple):
     fdm_weight: FloatArray | None = None  # (10, B, N)  w of the flexible deformation model
     fdm_centre: FloatArray | None = None  # (10, B, N)  theta, normalised time
     fdm_width: FloatArray | None = None  # (10, B, N)  sigma, normalised time
-    colour_coefficients: FloatArray | None = None  # (3, 2F, N)  A of equation (2)
+    appearance_coefficients: FloatArray | None = None  # (3, 2F, N)  A of equation (2)
     motion_coefficients: FloatArray | None = None  # (3, 2F, N)  C of equation (3), scene units
 
     @property

@@ -15,13 +15,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.errors import InputError
+from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import backproject
 
 FloatArray = NDArray[np.floating]
 
-Y00 = 0.28209479177387814  # degree-0 harmonic, 1 / sqrt(4 pi)
 START_OPACITY = 0.1
 SQUARED_DISTANCE_FLOOR = 1e-7  # scene units squared; duplicates and single points get this
 NEIGHBOURS = 3
@@ -137,9 +137,9 @@ def activate_residuals(gaussians: Gaussians, frequencies: int, appearance: bool,
     """
     shape = (3, 2 * frequencies, gaussians.count)
     dtype = gaussians.position.dtype
-    colour, motion = gaussians.colour_coefficients, gaussians.motion_coefficients
+    colour, motion = gaussians.appearance_coefficients, gaussians.motion_coefficients
     if appearance and colour is None:
         colour = np.zeros(shape, dtype)
     if spectral_motion and motion is None:
         motion = np.zeros(shape, dtype)
-    return gaussians._replace(colour_coefficients=colour, motion_coefficients=motion)
+    return gaussians._replace(appearance_coefficients=colour, motion_coefficients=motion)

@@ -89,14 +89,14 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     images, white, depth = _read_pictures(files, config, notes)
     masks = ~white if config.excluded_value == "white" else white
     where = str(Path(folder) / config.masks)
-    share = check_tissue_share(masks, where, config.excluded_value, config.allow_mask_share)
-    evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_mask_share)
+    share = check_tissue_share(masks, where, config.excluded_value, config.allow_tissue_fraction)
+    evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_tissue_fraction)
     notes += [
         f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
         _depth_note(depth, near, files.depth),
     ]
     mask_names = [str(file) for file in files.masks]
-    notes += check_single_masks(masks, depth, images, mask_names, config.allow_mask_share)
+    notes += check_single_masks(masks, depth, images, mask_names, config.allow_tissue_fraction)
     height, width = images.shape[2:]
     cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
     if config.scale != 1.0:
@@ -105,7 +105,9 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
         cameras = [scaled[id(camera)] for camera in cameras]
         notes.append(f"scaled to {width}x{height}; tissue share {masks.mean():.4f}")
-        check_tissue_share(masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_mask_share)
+        check_tissue_share(
+            masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_tissue_fraction
+        )
     if min(width, height) < LEAST_SIDE:
         raise InputError(f"{folder}: images of {width}x{height} pixels: no side may be under {LEAST_SIDE}")
     train, test = split_frames(len(images), config.split, config.block_length)

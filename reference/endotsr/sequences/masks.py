@@ -29,7 +29,7 @@ MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
 SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN for one frame, where less evidence must weigh more
 OPPOSITE_SHARE = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
-ALLOW = "--sequence.allow-mask-share (TOML: [sequence] allow_mask_share = true)"
+ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fraction = true)"
 
 
 def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> NDArray[np.bool_]:

@@ -77,7 +77,7 @@ class Sequence:
         return self.images.shape[3]
 
     @property
-    def tissue_share(self) -> float:
+    def tissue_fraction(self) -> float:
         """Share of all pixels of all frames that are tissue."""
         return float(self.masks.mean())
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.projection import Projected
 from endotsr.splatting.settings import RasterSettings
 
@@ -190,7 +190,7 @@ def screen_boxes(
     box = np.zeros((projected.depth.size, 4), np.int32)
     visible = projected.visible.copy()
     log_cutoff = projected.depth.dtype.type(math.log(settings.alpha_cutoff) if settings.alpha_cutoff > 0 else 0.0)
-    share(
+    parallel_for(
         _boxes_kernel, visible.size,
         projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, visible,
         _SUPPORT_CODE[support], log_cutoff, width, height, box,
@@ -214,9 +214,9 @@ def tile_lists(
     n = order.size
     counts, pair_starts = np.zeros((CHUNKS, tiles_x * tiles_y), np.int64), np.zeros(n + 1, np.int64)
     tile_box = np.empty((n, 4), np.int32)  # first and last tile column and row, in depth order
-    share(_count_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, tile_box, counts, pair_starts)
+    parallel_for(_count_kernel, CHUNKS, box, order, tile_width, tile_height, tiles_x, tile_box, counts, pair_starts)
     starts = np.empty(tiles_x * tiles_y + 1, np.int64)
     _starts_kernel(counts, starts, pair_starts)
     ranks, slots = np.empty(starts[-1], np.int32), np.empty(starts[-1], np.int32)
-    share(_fill_kernel, CHUNKS, tile_box, tiles_x, counts, pair_starts, ranks, slots)
+    parallel_for(_fill_kernel, CHUNKS, tile_box, tiles_x, counts, pair_starts, ranks, slots)
     return TileLists(starts, ranks, pair_starts, slots)

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.records import (
     BLUE,
@@ -221,7 +221,7 @@ def composite_forward(
     dtype = records.dtype
     out = empty_composite(width, height, dtype)
     limits = composite_limits(settings, dtype)
-    share(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
+    parallel_for(_composite_kernel, lists.starts.size - 1, records, lists.starts, lists.ranks, limits, background, *out)
     return out, CompositeSaved(records, lists, limits, background, settings.deviations.pass_clamped_alpha, out)
 
 
@@ -230,7 +230,7 @@ def composite_reverse(
 ) -> FloatArray:
     """Pair gradients (pairs, 10) from dL/dcolour (3, H, W), dL/ddepth (H, W), dL/dopacity (H, W)."""
     pair_gradients = np.empty((saved.lists.ranks.size, GRADIENT), saved.records.dtype)
-    share(
+    parallel_for(
         _composite_reverse_kernel, saved.lists.starts.size - 1,
         saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.background,
         saved.pass_clamped_alpha, d_colour, d_depth, d_opacity, pair_gradients,

@@ -10,16 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
-from endotsr.vectors import GROUP, local_array, write_group
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
+from endotsr.kernels.vectors import GROUP, local_array, write_group
 
 FloatArray = NDArray[np.floating]
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
 ROTATION = 9 * GROUP  # numbers that the results of a group take: the matrix
 GRADIENTS = 7 * GROUP  # and by quaternion and log-scale
-SHORTEST = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
+SHORTEST_QUATERNION = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
 
 
 _U64 = np.uint64  # no index may count from the end
@@ -62,7 +62,7 @@ def _unit_quaternion(w, x, y, z):
     y /= largest
     z /= largest
     n = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / n, x / n, y / n, z / n, (one / n) / max(largest, type(zero)(SHORTEST))
+    return w / n, x / n, y / n, z / n, (one / n) / max(largest, type(zero)(SHORTEST_QUATERNION))
 
 
 unit_quaternion = jit(_unit_quaternion)
@@ -144,7 +144,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
     n = quaternion.shape[1]
     rotation = np.empty((9, n), quaternion.dtype)
     scale = np.empty((3, n), quaternion.dtype)
-    share(_forward_kernel, n, quaternion, log_scale, rotation, scale)
+    parallel_for(_forward_kernel, n, quaternion, log_scale, rotation, scale)
     return Shape(rotation.reshape(3, 3, n), scale), CovarianceSaved(quaternion, log_scale, scale)
 
 
@@ -152,7 +152,7 @@ def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrad
     """Gradients by quaternion and log-scale from those by rotation (all nine entries independent) and scale."""
     n = saved.quaternion.shape[1]
     d_out = np.empty((7, n), saved.quaternion.dtype)
-    share(_reverse_kernel, n, *saved, d_shape.rotation, d_shape.scale, d_out)
+    parallel_for(_reverse_kernel, n, *saved, d_shape.rotation, d_shape.scale, d_out)
     return CovarianceGrads(d_out[:4], d_out[4:])
 
 

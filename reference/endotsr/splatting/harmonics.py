@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.constants import Y00
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
 
 FloatArray = NDArray[np.floating]
 
-BLOCK = 512
+CHUNK = 512  # Gaussians handled at a time
 
-Y00 = 0.28209479177387814  # 1 / sqrt(4 pi), the degree-0 harmonic
 C1 = 0.4886025119029199
 C2A, C2B, C2C = 1.0925484305920792, 0.31539156525252005, 0.5462742152960396
 C3A, C3B, C3C = 0.5900435899266435, 2.890611442640554, 0.4570457994644658
@@ -44,7 +44,7 @@ class HarmonicsGrads(NamedTuple):
     centre: FloatArray  # (3,) camera centre
 
 
-# What a block works on stands in one flat array, plane k at k * BLOCK, and is indexed with unsigned integers: no alias
+# What a block works on stands in one flat array, plane k at k * CHUNK, and is indexed with unsigned integers: no alias
 # or wrap-around checks, so the loops become vector code. Planes: direction, 1 / distance, Y_1 ... Y_15, their weights.
 _INVERSE, _BASIS, _WEIGHT, _PLANES = 3, 3, 18, 34  # Y_k at _BASIS + k, its weight at _WEIGHT + k, k = 1 ... 15
 _U64 = np.uint64
@@ -61,8 +61,12 @@ def _directions(position, centre, planes):
         dx, dy, dz = px[i] - x, py[i] - y, pz[i] - z
         r = math.sqrt(dx * dx + dy * dy + dz * dz)
         inverse = one / r if r > zero else zero
-        planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)] = dx * inverse, dy * inverse, dz * inverse
-        planes[i + _U64(_INVERSE * BLOCK)] = inverse
+        planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)] = (
+            dx * inverse,
+            dy * inverse,
+            dz * inverse,
+        )
+        planes[i + _U64(_INVERSE * CHUNK)] = inverse
 
 
 def _basis(degree, planes, count):
@@ -73,30 +77,30 @@ def _basis(degree, planes, count):
     two, three, four = real(2), real(3), real(4)
     for k in range(count):
         i = _U64(k)
-        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
-        planes[i + _U64((_BASIS + 1) * BLOCK)] = -c1 * b
-        planes[i + _U64((_BASIS + 2) * BLOCK)] = c1 * c
-        planes[i + _U64((_BASIS + 3) * BLOCK)] = -c1 * a
+        a, b, c = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
+        planes[i + _U64((_BASIS + 1) * CHUNK)] = -c1 * b
+        planes[i + _U64((_BASIS + 2) * CHUNK)] = c1 * c
+        planes[i + _U64((_BASIS + 3) * CHUNK)] = -c1 * a
     for k in range(count if degree > 1 else 0):
         i = _U64(k)
-        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        a, b, c = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
         aa, bb, cc = a * a, b * b, c * c
-        planes[i + _U64((_BASIS + 4) * BLOCK)] = c2a * a * b
-        planes[i + _U64((_BASIS + 5) * BLOCK)] = -c2a * b * c
-        planes[i + _U64((_BASIS + 6) * BLOCK)] = c2b * (two * cc - aa - bb)
-        planes[i + _U64((_BASIS + 7) * BLOCK)] = -c2a * a * c
-        planes[i + _U64((_BASIS + 8) * BLOCK)] = c2c * (aa - bb)
+        planes[i + _U64((_BASIS + 4) * CHUNK)] = c2a * a * b
+        planes[i + _U64((_BASIS + 5) * CHUNK)] = -c2a * b * c
+        planes[i + _U64((_BASIS + 6) * CHUNK)] = c2b * (two * cc - aa - bb)
+        planes[i + _U64((_BASIS + 7) * CHUNK)] = -c2a * a * c
+        planes[i + _U64((_BASIS + 8) * CHUNK)] = c2c * (aa - bb)
     for k in range(count if degree > 2 else 0):
         i = _U64(k)
-        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        a, b, c = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
         aa, bb, cc = a * a, b * b, c * c
-        planes[i + _U64((_BASIS + 9) * BLOCK)] = -c3a * b * (three * aa - bb)
-        planes[i + _U64((_BASIS + 10) * BLOCK)] = c3b * a * b * c
-        planes[i + _U64((_BASIS + 11) * BLOCK)] = -c3c * b * (four * cc - aa - bb)
-        planes[i + _U64((_BASIS + 12) * BLOCK)] = c3d * c * (two * cc - three * aa - three * bb)
-        planes[i + _U64((_BASIS + 13) * BLOCK)] = -c3c * a * (four * cc - aa - bb)
-        planes[i + _U64((_BASIS + 14) * BLOCK)] = c3e * c * (aa - bb)
-        planes[i + _U64((_BASIS + 15) * BLOCK)] = -c3a * a * (aa - three * bb)
+        planes[i + _U64((_BASIS + 9) * CHUNK)] = -c3a * b * (three * aa - bb)
+        planes[i + _U64((_BASIS + 10) * CHUNK)] = c3b * a * b * c
+        planes[i + _U64((_BASIS + 11) * CHUNK)] = -c3c * b * (four * cc - aa - bb)
+        planes[i + _U64((_BASIS + 12) * CHUNK)] = c3d * c * (two * cc - three * aa - three * bb)
+        planes[i + _U64((_BASIS + 13) * CHUNK)] = -c3c * a * (four * cc - aa - bb)
+        planes[i + _U64((_BASIS + 14) * CHUNK)] = c3e * c * (aa - bb)
+        planes[i + _U64((_BASIS + 15) * CHUNK)] = -c3a * a * (aa - three * bb)
 
 
 def _basis_gradient(degree, planes, gx, gy, gz):
@@ -107,26 +111,44 @@ def _basis_gradient(degree, planes, gx, gy, gz):
     two, three, four, six, eight = real(2), real(3), real(4), real(6), real(8)
     for k in range(gx.size):
         i = _U64(k)
-        w1, w2 = planes[i + _U64((_WEIGHT + 1) * BLOCK)], planes[i + _U64((_WEIGHT + 2) * BLOCK)]
-        w3 = planes[i + _U64((_WEIGHT + 3) * BLOCK)]
+        w1, w2 = (
+            planes[i + _U64((_WEIGHT + 1) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 2) * CHUNK)],
+        )
+        w3 = planes[i + _U64((_WEIGHT + 3) * CHUNK)]
         gx[i], gy[i], gz[i] = -c1 * w3, -c1 * w1, c1 * w2
     for k in range(gx.size if degree > 1 else 0):
         i = _U64(k)
-        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
-        w4, w5 = planes[i + _U64((_WEIGHT + 4) * BLOCK)], planes[i + _U64((_WEIGHT + 5) * BLOCK)]
-        w6, w7 = planes[i + _U64((_WEIGHT + 6) * BLOCK)], planes[i + _U64((_WEIGHT + 7) * BLOCK)]
-        w8 = planes[i + _U64((_WEIGHT + 8) * BLOCK)]
+        a, b, c = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
+        w4, w5 = (
+            planes[i + _U64((_WEIGHT + 4) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 5) * CHUNK)],
+        )
+        w6, w7 = (
+            planes[i + _U64((_WEIGHT + 6) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 7) * CHUNK)],
+        )
+        w8 = planes[i + _U64((_WEIGHT + 8) * CHUNK)]
         gx[i] += c2a * (b * w4 - c * w7) - two * c2b * a * w6 + two * c2c * a * w8
         gy[i] += c2a * (a * w4 - c * w5) - two * c2b * b * w6 - two * c2c * b * w8
         gz[i] += -c2a * (b * w5 + a * w7) + four * c2b * c * w6
     for k in range(gx.size if degree > 2 else 0):
         i = _U64(k)
-        a, b, c = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
+        a, b, c = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
         aa, bb, cc = a * a, b * b, c * c
-        w9, w10 = planes[i + _U64((_WEIGHT + 9) * BLOCK)], planes[i + _U64((_WEIGHT + 10) * BLOCK)]
-        w11, w12 = planes[i + _U64((_WEIGHT + 11) * BLOCK)], planes[i + _U64((_WEIGHT + 12) * BLOCK)]
-        w13, w14 = planes[i + _U64((_WEIGHT + 13) * BLOCK)], planes[i + _U64((_WEIGHT + 14) * BLOCK)]
-        w15 = planes[i + _U64((_WEIGHT + 15) * BLOCK)]
+        w9, w10 = (
+            planes[i + _U64((_WEIGHT + 9) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 10) * CHUNK)],
+        )
+        w11, w12 = (
+            planes[i + _U64((_WEIGHT + 11) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 12) * CHUNK)],
+        )
+        w13, w14 = (
+            planes[i + _U64((_WEIGHT + 13) * CHUNK)],
+            planes[i + _U64((_WEIGHT + 14) * CHUNK)],
+        )
+        w15 = planes[i + _U64((_WEIGHT + 15) * CHUNK)]
         u = -c3a * six * a * b * w9 + c3b * b * c * w10 + c3c * two * a * b * w11 - c3d * six * a * c * w12
         u += -c3c * (four * cc - three * aa - bb) * w13 + c3e * two * a * c * w14 - c3a * three * (aa - bb) * w15
         v = -c3a * three * (aa - bb) * w9 + c3b * a * c * w10 - c3c * (four * cc - aa - three * bb) * w11
@@ -157,8 +179,8 @@ def _direction_to_position_block(degree, planes, d_position, d_centre):
     _basis_gradient_kernel(degree, planes, gx, gy, gz)
     for k in range(gx.size):
         i = _U64(k)
-        x, y, z = planes[i], planes[i + _U64(BLOCK)], planes[i + _U64(2 * BLOCK)]
-        inverse = planes[i + _U64(_INVERSE * BLOCK)]
+        x, y, z = planes[i], planes[i + _U64(CHUNK)], planes[i + _U64(2 * CHUNK)]
+        inverse = planes[i + _U64(_INVERSE * CHUNK)]
         along = gx[i] * x + gy[i] * y + gz[i] * z
         gx[i] = (gx[i] - along * x) * inverse
         gy[i] = (gy[i] - along * y) * inverse
@@ -179,7 +201,7 @@ def _colour_block(harmonics, residual, position, centre, degree, colour, clamped
     real = position.dtype.type
     y00, half, zero = real(Y00), real(0.5), real(0)
     bands = (degree + 1) * (degree + 1)
-    planes = np.empty(_PLANES * BLOCK, position.dtype)
+    planes = np.empty(_PLANES * CHUNK, position.dtype)
     if degree > 0:
         _directions_kernel(position[:, a:e], centre, planes)
         _basis_kernel(degree, planes, e - a)
@@ -193,7 +215,7 @@ def _colour_block(harmonics, residual, position, centre, degree, colour, clamped
             for i in range(out.size):
                 out[i] = half + y00 * base[i]
         for k in range(1, bands):
-            y, h = planes[(_BASIS + k) * BLOCK :], harmonics[k, channel, a:e]
+            y, h = planes[(_BASIS + k) * CHUNK :], harmonics[k, channel, a:e]
             for i in range(out.size):
                 out[i] += y[i] * h[i]
         for i in range(out.size):
@@ -209,7 +231,7 @@ def _colour_reverse_block(
     y00, zero = real(Y00), real(0)
     bands = (degree + 1) * (degree + 1)
     gc = np.empty(e - a, position.dtype)
-    planes = np.zeros(_PLANES * BLOCK, position.dtype)  # weight of Y_k: sum over channels of g h_k
+    planes = np.zeros(_PLANES * CHUNK, position.dtype)  # weight of Y_k: sum over channels of g h_k
     if degree > 0:
         _directions_kernel(position[:, a:e], centre, planes)
         _basis_kernel(degree, planes, e - a)
@@ -228,8 +250,8 @@ def _colour_reverse_block(
                 for i in range(out.size):
                     out[i] = zero
                 continue
-            y, h = planes[(_BASIS + k) * BLOCK :], harmonics[k, channel, a:e]
-            w = planes[(_WEIGHT + k) * BLOCK :]
+            y, h = planes[(_BASIS + k) * CHUNK :], harmonics[k, channel, a:e]
+            w = planes[(_WEIGHT + k) * CHUNK :]
             for i in range(out.size):
                 out[i] = y[i] * gc[i]
                 w[i] += gc[i] * h[i]
@@ -243,7 +265,7 @@ _colour_reverse_kernel = jit(_colour_reverse_block)
 def _colour_blocks(first, last, harmonics, residual, position, centre, degree, colour, clamped):
     n = position.shape[1]
     for block in range(first, last):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        a, e = block * CHUNK, min(n, block * CHUNK + CHUNK)
         _colour_kernel(harmonics, residual, position, centre, degree, colour, clamped, a, e)
 
 
@@ -252,7 +274,7 @@ def _colour_reverse_blocks(
 ):
     n = position.shape[1]
     for block in range(first, last):
-        a, e = block * BLOCK, min(n, block * BLOCK + BLOCK)
+        a, e = block * CHUNK, min(n, block * CHUNK + CHUNK)
         _colour_reverse_kernel(
             harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_base, d_position,
             d_centres[block], a, e,
@@ -286,8 +308,8 @@ def harmonics_forward(
     colour = np.empty((3, position.shape[1]), dtype)
     clamped = np.empty(colour.shape, np.bool_)
     extra = np.empty((3, 0), dtype) if residual is None else residual
-    blocks = (position.shape[1] + BLOCK - 1) // BLOCK
-    share(_colour_blocks_kernel, blocks, harmonics, extra, position, centre, degree, colour, clamped)
+    blocks = (position.shape[1] + CHUNK - 1) // CHUNK
+    parallel_for(_colour_blocks_kernel, blocks, harmonics, extra, position, centre, degree, colour, clamped)
     return colour, HarmonicsSaved(harmonics, residual, position, centre, degree, clamped)
 
 
@@ -298,8 +320,8 @@ def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsG
     d_harmonics = np.empty_like(saved.harmonics)
     d_residual = np.empty((3, 0 if saved.residual is None else n), dtype)
     d_position = np.empty((3, n), dtype)
-    d_centres = np.zeros(((n + BLOCK - 1) // BLOCK, 3), dtype)
-    share(
+    d_centres = np.zeros(((n + CHUNK - 1) // CHUNK, 3), dtype)
+    parallel_for(
         _colour_reverse_blocks_kernel, d_centres.shape[0],
         saved.harmonics, saved.position, saved.centre, saved.degree, saved.clamped,
         d_colour, d_harmonics, d_residual, d_position, d_centres,

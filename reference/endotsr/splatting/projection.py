@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.sharing import share
+from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.covariance import Shape
 from endotsr.splatting.projection_kernels import (
     AXES,
-    BLOCK,
+    POSES_PER_SUM,
     WITH_POSE,
     WITHOUT_POSE,
     pose_reverse_kernel,
@@ -112,7 +112,7 @@ def projection_forward(
     constants = _constants(camera, settings, dtype)
     pose = np.ascontiguousarray(np.concatenate([camera.rotation, camera.translation[:, None]], axis=1), dtype)
     results, visible = np.empty((7, n), dtype), np.empty(n, np.bool_)
-    share(project_kernel, n, position, shape.rotation, shape.scale, constants, pose, results, visible)
+    parallel_for(project_kernel, n, position, shape.rotation, shape.scale, constants, pose, results, visible)
     out = Projected(results[:2], results[2:5], results[5], results[6], visible)
     return out, ProjectionSaved(position, shape, camera, constants, pose, out)
 
@@ -155,15 +155,15 @@ def projection_reverse_footprint(
     """
     n, dtype = saved.position.shape[1], saved.position.dtype
     d_out = np.empty((WITH_POSE if pose_gradient else WITHOUT_POSE, n), dtype)
-    share(
+    parallel_for(
         project_reverse_kernel, n,
         saved.position, saved.shape.rotation, saved.shape.scale, saved.constants, saved.pose,
         saved.projected.visible, saved.projected.determinant, d_mean2d, d_footprint, d_depth, d_out,
     )  # fmt: skip
     camera = None
     if pose_gradient:
-        d_poses = np.zeros(((n + BLOCK - 1) // BLOCK, AXES, 4), dtype)
-        share(pose_reverse_kernel, d_poses.shape[0], saved.position, saved.projected.visible, d_out, d_poses)
+        d_poses = np.zeros(((n + POSES_PER_SUM - 1) // POSES_PER_SUM, AXES, 4), dtype)
+        parallel_for(pose_reverse_kernel, d_poses.shape[0], saved.position, saved.projected.visible, d_out, d_poses)
         d_pose = d_poses.sum(axis=0)
         camera = CameraGrads(d_pose[:, :3].copy(), d_pose[:, 3].copy())
     d_rotation = d_out[6:WITHOUT_POSE].reshape(AXES, AXES, n)

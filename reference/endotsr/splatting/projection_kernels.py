@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from endotsr.jit import jit, jit_inline
-from endotsr.vectors import GROUP, local_array, write_group
+from endotsr.kernels.jit import jit, jit_inline
+from endotsr.kernels.vectors import GROUP, local_array, write_group
 
 AXES = 3
-BLOCK = 256  # Gaussians whose pose gradients are added up together
+POSES_PER_SUM = 256  # Gaussians whose pose gradients are added up together
 # Where the columns of a group's results begin. Forward: mean, covariance, determinant, depth, whether it is drawn.
 U, V, A, B, C, DET, Z, DRAWN = 0, GROUP, 2 * GROUP, 3 * GROUP, 4 * GROUP, 5 * GROUP, 6 * GROUP, 7 * GROUP
 PROJECTED = 8 * GROUP
@@ -196,7 +196,7 @@ def _pose_reverse(first, last, position, visible, d_out, d_poses):
     """One (3, 4) sum per block of the visible Gaussians, in their order; the caller adds up the blocks."""
     for block in range(first, last):
         d_pose = d_poses[block]
-        for i in range(block * BLOCK, min(position.shape[1], (block + 1) * BLOCK)):
+        for i in range(block * POSES_PER_SUM, min(position.shape[1], (block + 1) * POSES_PER_SUM)):
             if not visible[i]:
                 continue
             d_jw0, d_jw1 = d_out[JW:, i], d_out[JW + AXES :, i]

@@ -10,12 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.jit import jit
-from endotsr.sharing import share
+from endotsr.kernels.exponential import LOG2_E
+from endotsr.kernels.jit import jit
+from endotsr.kernels.threads import parallel_for
+from endotsr.kernels.vectors import prefetch
 from endotsr.splatting.binning import TileLists
-from endotsr.splatting.exponential import LOG2_E
 from endotsr.splatting.projection import Projected
-from endotsr.vectors import prefetch
 
 FloatArray = NDArray[np.floating]
 
@@ -27,7 +27,7 @@ RECORD = 11
 SUM_S, SUM_SE, SUM_SY, SUM_SEE, SUM_SEY, SUM_SYY, SUM_RED, SUM_GREEN, SUM_BLUE, SUM_DEPTH = range(10)
 GRADIENT = 10
 
-AHEAD = 16  # pairs between asking for a gradient record and adding it
+GRADIENTS_AHEAD = 16  # pairs between asking for a gradient record and adding it
 
 
 def _log_sigmoid(first, stop, logit, out):
@@ -45,7 +45,7 @@ _log_sigmoid_kernel = jit(_log_sigmoid)
 def log_opacity(opacity_logit: FloatArray) -> FloatArray:
     """Natural log of the opacity sigmoid(logit), (N,), finite for every finite logit."""
     out = np.empty_like(opacity_logit)
-    share(_log_sigmoid_kernel, out.size, opacity_logit, out)
+    parallel_for(_log_sigmoid_kernel, out.size, opacity_logit, out)
     return out
 
 
@@ -76,7 +76,7 @@ def pack_records(
     """Records (n, 11) of the Gaussians named by `order`, nearest first; n <= N."""
     dtype = projected.depth.dtype
     out = np.empty((order.size, RECORD), dtype)
-    share(
+    parallel_for(
         _pack_kernel, order.size,
         order, projected.mean2d, projected.covariance2d, projected.determinant, log_opacity, colour,
         projected.depth, out,
@@ -97,8 +97,8 @@ def _gather(
         for j in range(GRADIENT):
             total[j] = zero
         for p in range(pair_starts[k], pair_starts[k + 1]):
-            if p + AHEAD < slots.size:  # tile order is random order here, and each row would be waited for
-                prefetch(pair_gradients, slots[p + AHEAD])
+            if p + GRADIENTS_AHEAD < slots.size:  # tile order is random order here, and each row would be waited for
+                prefetch(pair_gradients, slots[p + GRADIENTS_AHEAD])
             row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
                 total[j] += row[j]
@@ -138,7 +138,7 @@ def gather_footprint_gradients(
         np.zeros((2, n), dtype), np.zeros((3, n), dtype), np.zeros(n, dtype), np.zeros((3, n), dtype),
         np.zeros(n, dtype),
     )  # fmt: skip
-    share(
+    parallel_for(
         _gather_kernel, order.size,
         order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
         dtype.type(conic_epsilon), keep_depth, *out,

@@ -10,10 +10,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.splatting import compositing, compositing_blocks
+from endotsr.splatting import compositing
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
 from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
+from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
 from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse_footprint
 from endotsr.splatting.records import gather_footprint_gradients, log_opacity, pack_records
@@ -23,7 +24,7 @@ FloatArray = NDArray[np.floating]
 
 CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
 
-Path = Literal["auto", "definition", "blocks"]
+Compositor = Literal["auto", "definition", "blocks"]
 
 
 class Scene(NamedTuple):
@@ -89,13 +90,15 @@ def check_scene(scene: Scene) -> None:
     check_finite(scene._asdict())
 
 
-def choose_path(settings: RasterSettings, path: Path) -> Path:
+def choose_compositor(settings: RasterSettings, compositor: Compositor) -> Compositor:
     """`auto` takes the fast path wherever it computes the settings."""
-    if path == "auto":
+    if compositor == "auto":
         return "blocks" if compositing_blocks.supports(settings) else "definition"
-    if path == "blocks" and not compositing_blocks.supports(settings):
-        raise ValueError("path 'blocks' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'")
-    return path
+    if compositor == "blocks" and not compositing_blocks.supports(settings):
+        raise ValueError(
+            "compositor 'blocks' needs support 'ellipse', alpha_cutoff > 0, alpha_max < 1; use 'definition'"
+        )
+    return compositor
 
 
 def render_forward(
@@ -105,7 +108,7 @@ def render_forward(
     *,
     degree: int = 3,
     background: FloatArray | None = None,
-    path: Path = "auto",
+    compositor: Compositor = "auto",
 ) -> tuple[RenderOut, RenderSaved]:
     """Render one view (specification B2-B5).
 
@@ -130,7 +133,7 @@ def render_forward(
     box, visible = screen_boxes(projected, log_alpha, settings, width, height)
     order = depth_order(projected.depth, visible)
     records = pack_records(order, projected, log_alpha, colour)
-    if choose_path(settings, path) == "blocks":
+    if choose_compositor(settings, compositor) == "blocks":
         lists = tile_lists(box, order, compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT, width, height)
         out, saved = compositing_blocks.composite_blocks_forward(records, lists, settings, back, width, height)
     else:

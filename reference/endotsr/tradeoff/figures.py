@@ -8,8 +8,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from endotsr.evaluation.curves import UNSIGNED
-from endotsr.runs import replace_file
+from endotsr.report.curves import UNSIGNED
+from endotsr.runs.files import replace_file
 from endotsr.tradeoff.labels import Label, place_labels
 from endotsr.tradeoff.measure import LEVELS
 from endotsr.tradeoff.page import small

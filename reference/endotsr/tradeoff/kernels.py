@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
-from endotsr.jit import jit, jit_inline
-from endotsr.splatting import compositing, compositing_blocks
+from endotsr.kernels.jit import jit, jit_inline
+from endotsr.splatting import compositing
+from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.tradeoff.settings import Setting
 
 COEFFICIENTS = (1.0,)  # stands for the coefficients of a variant, highest power first

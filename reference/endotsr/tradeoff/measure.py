@@ -92,7 +92,7 @@ def _reduced(scene: StudyScene, setting: Setting) -> tuple[Gaussians, Any]:
     if setting.frequencies is not None and scene.frequencies:
         low = np.arange(setting.frequencies)
         atoms = np.concatenate([low, low + scene.frequencies])
-        for name in ("colour_coefficients", "motion_coefficients"):
+        for name in ("appearance_coefficients", "motion_coefficients"):
             array = getattr(g, name)
             if array is not None:
                 g = g._replace(**{name: np.ascontiguousarray(array[:, atoms]) if setting.frequencies else None})
@@ -116,7 +116,7 @@ def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
     """One frame: the scene at its time, then the picture."""
     p, setting = prepared, prepared.setting
     scene, scene_saved = scene_at(p.gaussians, p.spectral, p.scene.model, p.scene.time)
-    out, saved = render_forward(scene, p.camera, setting.raster, degree=setting.degree, path=setting.path)
+    out, saved = render_forward(scene, p.camera, setting.raster, degree=setting.degree, compositor=setting.compositor)
     return out, saved, scene_saved
 
 
@@ -159,7 +159,7 @@ def errors(found: Frame, reference: Frame) -> Errors:
 def terms(prepared: Prepared) -> int:
     """Basis terms evaluated a frame: 10 B of the FDM and 2F for each channel of the Fourier residuals, by Gaussian."""
     g = prepared.gaussians
-    present = (g.fdm_weight, g.colour_coefficients, g.motion_coefficients)
+    present = (g.fdm_weight, g.appearance_coefficients, g.motion_coefficients)
     return sum(a.size for a in present if a is not None)
 
 

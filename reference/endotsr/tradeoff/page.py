@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from endotsr.evaluation import report_parts as parts
-from endotsr.evaluation.figures import data_uri
-from endotsr.runs import replace_file
+from endotsr.report import parts as parts
+from endotsr.report.figures import data_uri
+from endotsr.runs.files import replace_file
 from endotsr.tradeoff.measure import LEVELS
 
 PICTURES = {

@@ -48,7 +48,7 @@ class StudyScene:
     @property
     def frequencies(self) -> int:
         """F, or 0 without Fourier components."""
-        for a in (self.gaussians.colour_coefficients, self.gaussians.motion_coefficients):
+        for a in (self.gaussians.appearance_coefficients, self.gaussians.motion_coefficients):
             if a is not None:
                 return a.shape[1] // 2
         return 0
@@ -94,10 +94,10 @@ def simulated_scene(
 
 def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run that has none."""
-    from endotsr.commands.sources import load_run_sequence, remembered_cameras
-    from endotsr.commands.state import load_model
     from endotsr.errors import InputError
-    from endotsr.runs import open_run
+    from endotsr.runs.folder import open_run
+    from endotsr.runs.model import load_model
+    from endotsr.runs.sources import load_run_sequence, remembered_cameras
 
     folder = open_run(path)
     model, record = load_model(folder), folder.sequence_record("names", "test_index", "cameras", "static_camera")

@@ -7,7 +7,7 @@ matter together.
 import itertools
 from typing import Literal, NamedTuple
 
-from endotsr.splatting.render import Path
+from endotsr.splatting.render import Compositor
 from endotsr.splatting.settings import EXACT, PRESETS, RasterSettings
 
 Precision = Literal["float32", "float64"]
@@ -22,7 +22,7 @@ class Setting(NamedTuple):
     scale: float = 1.0  # of the picture that is rendered; it is then up-sampled
     bases: int | None = None  # time bases of the FDM that are kept; None = all
     frequencies: int | None = None  # Fourier frequencies that are kept, lowest first; None = all
-    path: Path = "auto"
+    compositor: Compositor = "auto"
     exponential: int | None = None  # degree of the polynomial for 2^x; None = that of the path
     tile: int | None = None  # side of the tiles of the path `definition`; None = 16
     threads: int | None = None  # None = those of the run
@@ -52,7 +52,7 @@ OMITTED = {
     "off-axis clamp of the Jacobian": "part of the presets; it acts on Gaussians outside the picture only",
     "culling": "exact in every setting: a Gaussian that reaches no pixel is never visited",
     "reuse of the depth order between frames": "not offered: the order is exact in every frame",
-    "T stored or replayed in the reverse pass": "fixed by the path: `definition` keeps T, the fast path replays it",
+    "T stored or replayed in the reverse pass": "fixed by the compositor: `definition` keeps T, `blocks` replays it",
     "tile size of the fast path": "64x16 pixels, a constant that its vector code is compiled for; "
     "the dial turns the tiles of `definition`",
     "fast-math": "not offered: sums keep their order, so that results repeat bit for bit",
@@ -86,7 +86,7 @@ def dials(degree: int, bases: int, frequencies: int, near: float) -> list[Dial]:
     if frequencies:
         values = {str(f): base._replace(frequencies=f) for f in _fewer(frequencies)}
         found.append(Dial("frequencies", "frequencies F", "terms", values))
-    slow = base._replace(raster=paper, path="definition")
+    slow = base._replace(raster=paper, compositor="definition")
     tiles = {f"{t}x{t}": slow._replace(tile=t) for t in TILES}
     found.append(Dial("tile", "tile size (definition)", "visits", tiles, lossless=True))
     found.append(
@@ -124,14 +124,15 @@ def _supports(base: Setting, paper: RasterSettings) -> dict[str, Setting]:
     """The rules at one cutoff on the path `definition`; the first again on the fast path."""
     names = {"everywhere": "everywhere", "ellipse": "ellipse", "three_sigma_tiles": "3 sigma tiles"}
     slow = {
-        label: base._replace(raster=paper._replace(support=name), path="definition") for name, label in names.items()
+        label: base._replace(raster=paper._replace(support=name), compositor="definition")
+        for name, label in names.items()
     }
     return slow | {"ellipse, fast path": base._replace(raster=paper)}
 
 
 def _exponentials(base: Setting) -> dict[str, Setting]:
     """The library's exponential (path `definition`), then polynomials of falling degree (fast path)."""
-    found = {"library": base._replace(path="definition"), "degree 11": base}
+    found = {"library": base._replace(compositor="definition"), "degree 11": base}
     return found | {f"degree {d}": base._replace(exponential=d) for d in sorted(EXPONENTIALS, reverse=True)}
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from endotsr.config import ModelConfig
 from endotsr.errors import InputError
+from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
-from endotsr.splatting.harmonics import Y00
 from endotsr.tradeoff.scenes import StudyScene
 
 FloatArray = NDArray[np.floating]

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.runs import machine, now, versions
+from endotsr.runs.machine import machine, now, versions
 from endotsr.tradeoff.certificate import certify
 from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
 from endotsr.tradeoff.measure import LEVELS, Frame, Prepared, errors, frame, prepare, seconds, terms

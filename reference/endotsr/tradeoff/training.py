@@ -15,14 +15,15 @@ import msgspec
 import numba
 import numpy as np
 
-from endotsr.compile_ahead import rehearse
 from endotsr.config import Config, config_from_dict, config_to_toml, with_iterations
 from endotsr.errors import InputError
 from endotsr.evaluation.evaluate import evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.fitting.compile_ahead import rehearse
 from endotsr.fitting.model import render_at, spectral_from
 from endotsr.fitting.trainer import TrainingState, new_training, train, training_step, workshop
-from endotsr.runs import machine, now, versions, write_json
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine, now, versions
 from endotsr.sequences.sequence import Sequence
 from endotsr.tradeoff.results import FORMAT, read_result
 

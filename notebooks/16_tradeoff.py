@@ -1,0 +1,189 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 16. Accuracy against time
+#
+# A Gaussian never ends, and light behind an opaque stack never quite dies out. A renderer that wants to be fast cuts both off. This
+# notebook measures what that costs and what it gains, on a scene small enough to render exactly.
+#
+# Equation {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/accuracy_against_time` shows the same for every dial.
+
+# %%
+import os
+
+import matplotlib.pyplot as plt
+import msgspec
+import numpy as np
+
+from endotsr.config import PAPER as RUN
+from endotsr.config import ModelConfig
+from endotsr.fitting.model import scene_at, spectral_from
+from endotsr.scene import workload
+from endotsr.splatting.render import render_forward
+from endotsr.tradeoff.front import Ranked, non_dominated
+from endotsr.tradeoff.measure import errors, frame, prepare, seconds
+from endotsr.tradeoff.scenes import StudyScene
+from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
+from endotsr.tradeoff.study import reference_setting
+
+SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
+N, WIDTH = (60, 40) if SMALL else (600, 128)
+model = ModelConfig(bases=5, frequencies=3, initial_width=0.2)
+training = msgspec.structs.replace(RUN.training, precision="float64")
+gaussians = workload.gaussians(N, msgspec.structs.replace(RUN, model=model, training=training))
+camera, time = workload.camera(WIDTH, WIDTH * 3 // 4), 0.4
+study = StudyScene(
+    "notebook", "", gaussians, spectral_from(model, np.arange(12) / 12), model, time, camera, near=0.2, noise=0.01
+)
+reference = frame(prepare(study, reference_setting(study)))[0]
+
+# %% [markdown]
+# ## What is cut off
+#
+# The blend of a pixel, front to back:
+#
+# $$
+# \begin{aligned}
+# T_0&=1,\qquad T_{k+1}=T_k(1-\alpha_k),\\
+# \hat I&=\sum_{k<n}\alpha_kT_k\,rgb_k+T_n\,\mathbf{bg},\\
+# \hat D&=\sum_{k<n}\alpha_kT_k\,z_k,\qquad
+# \hat O=\sum_{k<n}\alpha_kT_k .
+# \end{aligned}
+# $$
+#
+# Exactly, every Gaussian contributes. A renderer skips $\alpha_k<\alpha_{\mathrm{cut}}$, and ends the pixel before $T_{k+1}$ falls
+# below $T_{\mathrm{stop}}$. Here both are written out, with a count of the pairs whose $\alpha$ had to be known: the **visits**.
+
+# %%
+scene, _ = scene_at(gaussians, study.spectral, model, time)
+_, saved = render_forward(scene, camera, CLOSE)
+u, v = saved.projected.mean2d
+a, b, c = saved.projected.covariance2d
+o = 1 / (1 + np.exp(-scene.opacity_logit))
+order = [i for i in np.argsort(saved.projected.depth, kind="stable") if saved.visible[i]]
+rgb = saved.composite.records[:, 6:9].T  # in depth order
+
+
+# %% tags=["transcription"]
+def pixel_text(column, row, alpha_cut, T_stop):
+    """Colour of a pixel on black, and its visits."""
+    T, I, visits = 1.0, np.zeros(3), 0
+    for k, i in enumerate(order):
+        d_x, d_y = column + 1 / 2 - u[i], row + 1 / 2 - v[i]
+        m, r, A = b[i] / c[i], 1 / c[i], c[i] / (a[i] * c[i] - b[i] ** 2)
+        q = r * d_y**2 + A * (d_x - m * d_y) ** 2
+        alpha = o[i] * np.exp(-q / 2)
+        if alpha < alpha_cut:
+            continue
+        visits += 1
+        if T * (1 - alpha) < T_stop:
+            break
+        I, T = I + alpha * T * rgb[:, k], T * (1 - alpha)
+    return I, visits
+
+
+def image_text(alpha_cut, T_stop):
+    pixels = [[pixel_text(x, y, alpha_cut, T_stop) for x in range(camera.width)] for y in range(camera.height)]
+    image = np.array([[I for I, _ in row] for row in pixels]).transpose(2, 0, 1)
+    return image, sum(visits for row in pixels for _, visits in row)
+
+
+# %%
+for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255, 1e-2),):
+    raster = CLOSE._replace(alpha_cutoff=alpha_cut, transmittance_stop=T_stop)
+    found, visits = frame(prepare(study, ACCURATE._replace(raster=raster)))
+    image, by_hand = image_text(alpha_cut, T_stop)
+    np.testing.assert_allclose(found.colour, image, rtol=1e-9, atol=1e-12)
+    assert visits == by_hand
+
+# %% [markdown]
+# ## How large the error can be, and how the work grows
+#
+# At a pixel, what is skipped are many Gaussians, each with $\alpha<\alpha_{\mathrm{cut}}$. In front of an opaque scene only a few of them
+# lie on the rim of their ellipse at one pixel, so the sum stays within a few times $\alpha_{\mathrm{cut}}$: five, on a surface. Where hundreds
+# of faint Gaussians overlap it is more.
+#
+# $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels: the visits
+# grow with the **logarithm** of the accuracy. A thousand times the accuracy costs the same number of visits again and again.
+
+# %%
+cutoffs = 10.0 ** -np.arange(2, 11)
+measured = [frame(prepare(study, ACCURATE._replace(raster=CLOSE._replace(alpha_cutoff=cut)))) for cut in cutoffs]
+largest = np.array([errors(found, reference).max for found, _ in measured])
+visits = np.array([count for _, count in measured])
+assert (largest <= 5 * cutoffs).all()
+assert (np.diff(largest) < 0).all() and (np.diff(visits) > 0).all()
+inside = saved.visible
+predicted = [2 * np.pi * (np.sqrt(saved.projected.determinant) * np.log(o / cut))[inside].sum() for cut in cutoffs]
+
+# %% tags=["hide-input"]
+figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
+axes[0].loglog(cutoffs, largest, "o-", color="#0072B2")
+axes[0].loglog(cutoffs, 5 * cutoffs, "--", color="0.5")
+axes[0].annotate("five times the cutoff", (cutoffs[4], 5 * cutoffs[4]), xytext=(-8, 8), ha="right", color="0.4",
+                 textcoords="offset points")  # fmt: skip
+axes[0].set(xlabel="cutoff", ylabel="largest error", title="The error follows the cutoff")
+axes[1].semilogx(cutoffs, visits, "o-", color="#0072B2")
+axes[1].semilogx(cutoffs, predicted, "--", color="0.5")
+axes[1].annotate("area of the ellipses, parts outside\nthe picture included", (cutoffs[6], predicted[6]), xytext=(8, 0),
+                 textcoords="offset points", color="0.4", va="bottom", fontsize=8)  # fmt: skip
+axes[1].set(xlabel="cutoff", ylabel="visits", title="The work follows its logarithm")
+plt.show()
+
+# %% [markdown]
+# ## Which settings are worth having
+#
+# Cutoff, stop and precision together. A setting is **dominated** if another costs no more and errs no more, and is not its equal. What
+# nothing dominates is the front: whoever knows a budget finds the setting there.
+
+# %%
+sweep = {
+    (precision, cut, stop): Setting(precision, CLOSE._replace(alpha_cutoff=cut, transmittance_stop=stop))
+    for precision in ("float32", "float64")
+    for cut in (1 / 64, 1 / 255, 1e-4, 1e-6, 1e-8)
+    for stop in (1e-2, 1e-4, 1e-6)
+}
+points = []
+for key, setting in sweep.items():
+    ready = prepare(study, setting)
+    found, _ = frame(ready)
+    points.append(
+        Ranked(str(key), float(np.median([seconds(ready)[0] for _ in range(7)])), (errors(found, reference).max,))
+    )
+front = non_dominated(points)
+assert all(not (p.cost <= f.cost and p.errors < f.errors) for f in front for p in points)
+
+# %% tags=["hide-input"]
+figure, axis = plt.subplots(figsize=(7, 3.8), layout="constrained")
+axis.loglog([p.cost * 1e3 for p in points], [p.errors[0] * 255 for p in points], "o", color="0.75", ms=4)
+axis.loglog([p.cost * 1e3 for p in front], [p.errors[0] * 255 for p in front], "o-", color="#0072B2")
+axis.axhline(0.5, color="0.5", ls="--", lw=1)
+axis.annotate(
+    "half a step of 8 bit", (1, 0.5), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.4"
+)
+axis.set(xlabel="milliseconds a frame", ylabel="largest error, 1/255", title="Grey: dominated. Blue: the front")
+plt.show()
+
+# %% [markdown]
+# ## Exercise
+#
+# You know the visits at the cutoffs $10^{-3}$ and $10^{-5}$. How many do you expect at $10^{-7}$, and why is the answer a little too large?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The visits are a straight line in ln(1 / cutoff): as many more as between the first two. It is a little too large because an ellipse
+# that reaches the border of the picture grows outside of it, where there are no pixels.
+at = {int(-np.log10(cut)): count for cut, count in zip(cutoffs, visits, strict=True)}
+expected = 2 * at[5] - at[3]
+assert at[7] <= expected
+assert expected < 1.6 * at[7]
+print(f"expected {expected}, measured {at[7]}")

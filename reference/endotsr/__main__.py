@@ -1,0 +1,7 @@
+"""`python -m endotsr` is the command `endotsr`."""
+
+import sys
+
+from endotsr.cli.main import main
+
+sys.exit(main())

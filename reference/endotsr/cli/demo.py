@@ -1,0 +1,42 @@
+"""`endotsr demo`: the whole method on a simulated sequence."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from endotsr.cli.parts.options import parse
+from endotsr.errors import InputError
+from endotsr.runs.sources import SIMULATED
+
+
+@dataclass
+class DemoOptions:
+    """Simulate a sequence, train on it with the stretched schedule, evaluate, and write a report.
+
+    The same as `endotsr train simulated --preset demo`; every option of `endotsr train` is understood.
+    """
+
+    out: Annotated[Path, tyro.conf.arg(metavar="RUN")]
+    """run folder to create"""
+    iterations: Annotated[int, tyro.conf.arg(metavar="N")] = 600
+    """length of the run; stretches the schedule"""
+    scale: float = 1.0
+    """size of the simulated pictures; 1 = 160x128"""
+    seed: int = 0
+    """seed of every random draw"""
+    threads: int = 0
+    """threads, 0 = all cores"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    from endotsr.cli import train
+
+    if {"-h", "--help"} & set(words):
+        parse(DemoOptions, words, "demo")
+    words = [SIMULATED, "--preset", "demo", *words]
+    if parse(train.TrainOptions, words, "demo").out is None:
+        raise InputError("demo: --out RUN is missing: the run folder to create")
+    return train.run(words)

@@ -1,0 +1,203 @@
+"""`endotsr golden`: the conformance target of ports: judge outputs, run a port, check or rewrite the vectors."""
+
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from endotsr.cli.parts.options import parse
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable
+
+Outdir = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUTDIR")]
+Level = Literal[0, 1, 2, 3, 4, 5]
+
+
+@dataclass
+class _Reported:
+    precision: Literal["float32", "float64"] = "float32"
+    """precision that the port claims"""
+    level: Level = 5
+    """highest level that is asked for; exit code 0 if it is complete"""
+    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """also write the report as JSON"""
+    html: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """also write the report as one HTML page with difference images"""
+
+
+@dataclass
+class JudgeOptions(_Reported):
+    """Judge a folder of outputs OUTDIR/<family>/<case>/<name>.npy; exit code 1 if the level is not complete."""
+
+    outdir: Outdir = Path()
+    again: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """outputs of a second run: level 5 asks for the same bits"""
+
+
+@dataclass
+class RunOptions(_Reported):
+    """Hand all requests to a port's command, then judge what it wrote."""
+
+    port: str = ""
+    """the command, with {requests} and {outputs} where the folders go; called without a shell"""
+    timeout: float = 600.0
+    """seconds allowed for one call"""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """keep requests and outputs in this folder, in place of those of an earlier run"""
+
+
+@dataclass
+class GenerateOptions:
+    """Compute all cases anew and compare with the folder; exit code 1 if anything differs."""
+
+    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """folder of the golden cases"""
+    within_tolerance: bool = False
+    """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
+    write: bool = False
+    """replace the vectors, print which expected values moved, and still end with exit code 1"""
+
+
+@dataclass
+class ReferenceOptions:
+    """Write the reference's own outputs; with --requests, as a port that sees the requests alone."""
+
+    outdir: Outdir
+    precision: Literal["float32", "float64"] = "float32"
+    """precision of the arithmetic; with --requests, what the requests say"""
+    requests: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """answer this folder of requests"""
+    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """folder of the golden cases"""
+
+
+@dataclass
+class NegativeOptions:
+    """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[FLAG]")] = ""
+    outdir: Outdir = Path()
+    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """folder of the golden cases"""
+
+
+DOORS = {
+    "judge": "judge a folder of outputs",
+    "run": "call a port's command and judge what it wrote",
+    "reference": "the reference's own outputs, through the same door",
+    "negative": "the outputs of a deliberately wrong port",
+    "generate": "check the vectors against a fresh computation; --write replaces them",
+}
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    if not words or words[0] in ("-h", "--help"):
+        width = max(map(len, DOORS))
+        print("usage: endotsr golden SUBCOMMAND [OPTIONS]\n")
+        print("\n".join(f"  {name:<{width}}  {text}" for name, text in DOORS.items()))
+        return 0
+    if words[0] not in DOORS:
+        raise InputError(f"unknown subcommand golden {words[0]!r}; allowed: {', '.join(DOORS)}")
+    return globals()[f"_{words[0]}"](words[1:])
+
+
+def _judge(words: list[str]) -> int:
+    from endotsr.golden.judge import judge
+    from endotsr.golden.store import golden_folder, read_golden
+
+    options = parse(JudgeOptions, words, "golden judge")
+    if options.outdir == Path():
+        raise InputError("golden judge: OUTDIR is missing")
+    for folder in filter(None, (options.outdir, options.again)):
+        if not folder.is_dir():
+            raise InputError(f"{folder}: not a folder")
+    refuse_unwritable(options.json, options.html)
+    golden = read_golden(golden_folder(options.golden))
+    report = judge(golden, options.outdir, options.precision, level=options.level, again=options.again)
+    return _tell(report, golden, options.outdir, options)
+
+
+def _run(words: list[str]) -> int:
+    from endotsr.golden.judge import judge, without_claim
+    from endotsr.golden.port import KEPT, clear_kept, refuse_command, run_port, write_requests
+    from endotsr.golden.store import golden_folder, read_golden
+
+    options = parse(RunOptions, words, "golden run")
+    refuse_command(options.port)
+    refuse_unwritable(options.json, options.html)
+    golden = read_golden(golden_folder(options.golden))
+    with tempfile.TemporaryDirectory() as scratch:
+        root = options.keep or Path(scratch)
+        requests, *folders = (root / name for name in KEPT)
+        clear_kept(root)
+        write_requests(golden, requests, options.precision, options.level)
+        calls = folders if options.level >= 5 else folders[:1]
+        notes = [run_port(options.port, requests, folder, options.timeout) for folder in calls]
+        again = folders[1] if options.level >= 5 else None
+        report = judge(golden, folders[0], options.precision, level=options.level, again=again)
+        if any(notes):
+            without_claim(report, list(filter(None, notes)))
+        return _tell(report, golden, folders[0], options)
+
+
+def _tell(report, golden, outdir: Path, options: _Reported) -> int:
+    from endotsr.golden.report import as_html, as_json, as_table
+
+    print(as_table(report))
+    if options.json:
+        options.json.write_bytes(as_json(report))
+    if options.html:
+        options.html.write_text(as_html(report, golden, outdir), encoding="utf-8")
+    return 0 if report.passed else 1
+
+
+def _generate(words: list[str]) -> int:
+    from endotsr.golden.generate import check, write
+    from endotsr.golden.store import golden_folder
+
+    options = parse(GenerateOptions, words, "golden generate")
+    folder = golden_folder(options.golden)
+    if options.write:
+        lines = write(folder)
+        print("\n".join(lines) or "no expected value moved")
+        print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
+        return 1
+    lines, summary = check(folder, bitwise=not options.within_tolerance)
+    print("\n".join([*lines, f"golden: {summary}, {len(lines)} differ"]))
+    return 1 if lines else 0
+
+
+def _reference(words: list[str]) -> int:
+    from endotsr.golden.port import answer_all, answer_requests
+    from endotsr.golden.store import golden_folder, read_golden
+
+    options = parse(ReferenceOptions, words, "golden reference")
+    if options.requests is not None:
+        count = answer_requests(options.requests, options.outdir)
+    else:
+        count = answer_all(read_golden(golden_folder(options.golden)), options.outdir, options.precision)
+    print(f"golden: {count} cases answered in {options.outdir}")
+    return 0
+
+
+def _negative(words: list[str]) -> int:
+    from endotsr.golden.negative import all_negatives
+    from endotsr.golden.port import answer_wrongly
+    from endotsr.golden.store import golden_folder, read_golden
+
+    options = parse(NegativeOptions, words, "golden negative")
+    known = all_negatives()
+    if not options.name:
+        print("\n".join(f"{n.name}: {n.title} ({n.wrong})" for n in known.values()))
+        return 0
+    if options.name not in known or options.outdir == Path():
+        raise InputError("golden negative: give the FLAG of a mistake (without arguments: a list) and OUTDIR")
+    count = answer_wrongly(read_golden(golden_folder(options.golden)), options.outdir, known[options.name])
+    print(f"golden: {count} cases answered wrongly in {options.outdir}")
+    return 0

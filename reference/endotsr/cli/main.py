@@ -1,0 +1,99 @@
+"""The command `endotsr`: finds the subcommand, imports it alone, and turns a person's mistakes into one line.
+
+Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit codes: 0 done, 1 a check or
+comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM), 141 stopped because
+the reader of its output left (128 + SIGPIPE, as other programs).
+"""
+
+import importlib
+import io
+import os
+import sys
+
+from endotsr import __version__
+from endotsr.cli.parts.stopping import signals_stop
+from endotsr.errors import CalibrationError, InputError
+
+COMMANDS = {
+    "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
+    "train": "train on an EndoNeRF folder, or on a simulated sequence",
+    "calibrate": "the detail weight of equation (7), computed on the checkpoint of a run",
+    "render": "colour, depth and opacity at any time in [0, 1]",
+    "evaluate": "held-out metrics beside honest baselines, renders, and one self-contained report",
+    "gradcheck": "check every reverse pass against finite differences",
+    "bench": "where the time goes: stages beside their limits, growth, a peer, cold start",
+    "tradeoff": "what accuracy costs in time: errors beside seconds, and what a budget buys",
+    "golden": "the conformance target of ports: judge outputs, run a port, check the vectors",
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; `argv` without the program name. Returns the exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal without the letters of a file name
+    if not argv or argv[0] in ("-h", "--help"):
+        print(_overview())
+        return 0
+    if argv[0] == "--version":
+        print(f"endotsr {__version__}")
+        return 0
+    try:
+        with signals_stop():
+            return _command(argv[0])(argv[1:])
+    except CalibrationError as error:
+        line, _, table = str(error).partition("\n")
+        print(table)
+        return _fail(line)
+    except InputError as error:
+        return _fail(str(error))
+    except SystemExit as leaving:  # `--help` of a command
+        return leaving.code if isinstance(leaving.code, int) else 0
+    except KeyboardInterrupt as interrupt:
+        print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of our output left (`endotsr ... | head`)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        from endotsr.runs.files import os_error_line
+
+        return _fail(os_error_line(error))
+    except FloatingPointError as error:
+        _fail(f"the training left the numbers: {error}; a smaller learning rate may help")
+        return 1
+    except MemoryError:
+        return _fail("not enough memory; a smaller --scale or fewer --frames needs less")
+
+
+def _command(name: str):
+    if name not in COMMANDS:
+        raise InputError(f"unknown command {name!r}; allowed: {', '.join(COMMANDS)}")
+    return importlib.import_module(f"endotsr.cli.{name}").run
+
+
+def _fail(message: str) -> int:
+    print(f"endotsr: error: {' '.join(message.split())}", file=sys.stderr)
+    return 2
+
+
+def _overview() -> str:
+    width = max(map(len, COMMANDS))
+    return "\n".join(
+        [
+            "usage: endotsr COMMAND [OPTIONS]",
+            "",
+            "Reconstructs moving tissue from endoscopic video, on the CPU: the reference implementation of Endo-TSR.",
+            "",
+            "commands:",
+            *(f"  {name:<{width}}  {summary}" for name, summary in COMMANDS.items()),
+            "",
+            "options:",
+            "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
+            "  --version    the version",
+        ]
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

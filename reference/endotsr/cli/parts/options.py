@@ -1,0 +1,142 @@
+"""From words on the command line to typed options and settings; a mistake is one line that names what is allowed.
+
+Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option.
+"""
+
+import contextlib
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from endotsr.cli.parts.mistakes import mistake_line, setting_type
+from endotsr.config import (
+    MILESTONES,
+    Config,
+    config_from_dict,
+    read_toml,
+    with_iterations,
+)
+from endotsr.errors import InputError
+
+T = TypeVar("T")
+
+# Options that are a setting under a shorter name.
+SHORT_NAMES = {
+    "scale": "sequence.scale",
+    "frames": "sequence.frames",
+    "masks": "sequence.masks",
+    "seed": "training.seed",
+    "threads": "training.threads",
+}
+
+
+@dataclass
+class Sources:
+    """Where the settings of a run start from."""
+
+    preset: Literal["paper", "sharp", "demo"] | None = None
+    config: Path | None = None
+    iterations: int | None = None
+    schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
+
+
+def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
+    """The options of one command. `--help` prints them and leaves with SystemExit(0); a mistake is an InputError."""
+    return _tyro(options, _plain_booleans(words), command, **({"default": default} if default else {}))
+
+
+def base_settings(words: list[str]) -> tuple[Config, str]:
+    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is)."""
+    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    data = read_toml(sources.config) if sources.config else {}
+    if sources.preset:
+        data = data | {"preset": sources.preset}
+    config = config_from_dict(data, str(sources.config or "configuration"))
+    if sources.iterations is None:
+        return config, ""
+    if sources.iterations < 1:
+        raise InputError(f"--iterations {sources.iterations} is not allowed; allowed: an integer >= 1")
+    before = config.training.iterations
+    if sources.schedule == "absolute":
+        training = msgspec.structs.replace(config.training, iterations=sources.iterations)
+        note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
+        return msgspec.structs.replace(config, training=training), note
+    note = (
+        f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its share "
+        "(--schedule absolute leaves them in place)"
+    )
+    return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
+
+
+def asked_settings(words: list[str], kept: Config) -> Config:
+    """The settings `kept` of a run, with what TOML file, `--iterations` and `--schedule` of the command line ask for.
+
+    Every other setting stays as the run has it, so that only what was asked for can differ from the run.
+    """
+    base, _ = base_settings(words)
+    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    asked = read_toml(sources.config) if sources.config else {}
+    named = {(section, key) for section, values in asked.items() if isinstance(values, dict) for key in values}
+    if sources.iterations is not None:
+        named.add(("training", "iterations"))
+        if sources.schedule is not None:
+            named |= {(section, key) for section, keys in MILESTONES.items() for key in keys}
+    data, wanted = msgspec.to_builtins(kept), msgspec.to_builtins(base)
+    for section, key in named:
+        data[section][key] = wanted[section][key]
+    if sources.preset or "preset" in asked:
+        data["preset"] = wanted["preset"]
+    return config_from_dict(data, str(sources.config or "command line"))
+
+
+def with_short_names(config: Config, given: dict[str, Any]) -> Config:
+    """The settings with the short options that were given (not None), checked."""
+    data = msgspec.to_builtins(config)
+    for name, value in given.items():
+        if value is not None:
+            section, key = SHORT_NAMES[name].split(".")
+            data[section][key] = value
+    return config_from_dict(data, "command line")
+
+
+def differences(config: Config, other: Config, name: str) -> list[str]:
+    """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
+    ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
+    preset = [f"preset = {config.preset!r} ({name}: {other.preset!r})"] if config.preset != other.preset else []
+    return preset + [
+        f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
+        for section, values in ours.items()
+        if isinstance(values, dict)
+        for key, value in values.items()
+        if value != theirs[section][key]
+    ]
+
+
+def _tyro(options: Any, words: list[str], command: str, **settings: Any) -> Any:
+    import tyro
+
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(options, args=words, prog=f"endotsr {command}", **settings)
+    except SystemExit as leaving:
+        if not leaving.code:
+            raise
+        looked_through = [] if settings.get("return_unknown_args") else words
+        raise InputError(mistake_line(options, looked_through, said.getvalue(), command)) from None
+
+
+def _plain_booleans(words: list[str]) -> list[str]:
+    """`--model.appearance false` as `--model.no-appearance`, so that a switch reads as it does in a TOML file."""
+    out: list[str] = []
+    for word in [part for w in words for part in (w.split("=", 1) if re.match(r"--[\w.-]+\.[\w-]+=", w) else [w])]:
+        if out and word.lower() in ("true", "false") and setting_type(out[-1]) is bool:
+            section, key = out[-1].rsplit(".", 1)
+            out[-1] = f"{section}.{'' if word.lower() == 'true' else 'no-'}{key}"
+        else:
+            out.append(word)
+    return out

@@ -1,0 +1,170 @@
+"""`endotsr tradeoff`: what accuracy costs in time, and what a budget buys."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from endotsr.cli.parts.options import parse
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_folder, write_json
+
+if TYPE_CHECKING:
+    from endotsr.tradeoff.budget import Budget
+    from endotsr.tradeoff.scenes import StudyScene
+
+RESULT, TRAINING = "tradeoff.json", "training.json"
+LEAST_REPEATS = 7
+
+
+@dataclass
+class TradeoffOptions:
+    """Measure error against time for every setting of the renderer: JSON, pictures and a page in --out.
+
+    The scene is a simulated one, a trained --run, or a file of --splats. `endotsr tradeoff train` does the same for
+    training; see its --help. With --budget, the answer comes from the measurement in --out, which is made if missing.
+    """
+
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("tradeoff")
+    """folder of the measurement"""
+    run: Annotated[Path | None, tyro.conf.arg(metavar="RUN")] = None
+    """run folder to take the scene from"""
+    splats: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """file of trained Gaussians: .ply, or .npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
+    scale: float = 1.0
+    """size of the picture, relative to that of the scene"""
+    budget: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
+    """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
+    ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
+    images: bool = False
+    """also keep image and gradients of every setting in DIR/images"""
+    repeats: int = LEAST_REPEATS
+    """timed frames of every setting"""
+    threads: int = 2
+    """threads, 0 = all cores"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    if words[:1] == ["train"]:
+        from endotsr.cli.tradeoff_train import run as run_training
+
+        return run_training(words[1:])
+    options = parse(TradeoffOptions, words, "tradeoff")
+    _refuse(options)
+    budget = None
+    if options.budget is not None:
+        from endotsr.tradeoff.budget import parse_budget
+
+        budget = parse_budget(options.budget)
+        if budget.kind == "training":
+            return _say_training(options.out, budget)
+    from endotsr.tradeoff.results import Measurement, read_result
+
+    file = options.out / RESULT
+    if budget is None and file.exists():
+        raise InputError(f"{options.out}: holds a measurement already; choose another --out, or ask it with --budget")
+    result = read_result(file, Measurement) if file.exists() else _measure(options)
+    if budget is not None:
+        from endotsr.tradeoff.budget import frame_advice
+
+        print("\n".join(frame_advice(result, budget).lines))
+    return 0
+
+
+def _refuse(options: TradeoffOptions) -> None:
+    if options.run is not None and options.splats is not None:
+        raise InputError("tradeoff: give one of --run and --splats")
+    if options.repeats < LEAST_REPEATS:
+        raise InputError(
+            f"tradeoff: --repeats {options.repeats} is not allowed; allowed: an integer >= {LEAST_REPEATS}"
+        )
+    if not 0 < options.scale <= 8:
+        raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
+
+
+def _measure(options: TradeoffOptions) -> dict[str, Any]:
+    from endotsr.kernels.threads import use_threads
+    from endotsr.tradeoff.figures import draw
+    from endotsr.tradeoff.page import advice, certificate_line, made, write_page
+    from endotsr.tradeoff.study import described, run_study
+
+    use_threads(options.threads)
+    out = options.out
+    refuse_folder(out)
+    scene = chosen_scene(options)
+    (out / "images" if options.images else out).mkdir(parents=True, exist_ok=True)
+    with StepBar("settings") as bar:
+        found = run_study(
+            scene,
+            repeats=options.repeats,
+            images=out / "images" if options.images else None,
+            begin=bar.begin,
+            step=bar.step,
+        )
+    result = described(found)
+    write_json(out / RESULT, result)
+    draw(result, out)
+    page = write_page(result, out)
+    print(made(result), certificate_line(result), *advice(result), f"page: {page}", sep="\n")
+    return result
+
+
+def chosen_scene(options: TradeoffOptions) -> "StudyScene":
+    """The scene that the options ask for."""
+    from endotsr.tradeoff import scenes
+
+    if options.splats is not None:
+        from endotsr.tradeoff.splat_file import SIDE, splat_scene
+
+        return splat_scene(options.splats, max(1, round(SIDE * options.scale)))
+    if options.run is not None:
+        return scenes.run_scene(options.run, options.scale)
+    with StepBar("simulated scene") as bar:
+        bar.begin(scenes.ITERATIONS)
+        width = max(16, round(scenes.SIMULATED_WIDTH * options.scale))
+        return scenes.simulated_scene(width=width, step=bar.step)
+
+
+def _say_training(out: Path, budget: "Budget") -> int:
+    from endotsr.tradeoff.budget import training_advice
+    from endotsr.tradeoff.results import Trainings, read_result
+
+    file = out / TRAINING
+    if not file.exists():
+        raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
+    print("\n".join(training_advice(read_result(file, Trainings), budget).lines))
+    return 0
+
+
+class StepBar:
+    """A progress bar on a terminal; one line at the beginning elsewhere."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._bar: Any = None
+
+    def __enter__(self) -> "StepBar":
+        return self
+
+    def begin(self, steps: int) -> None:
+        """The number of steps is known."""
+        from tqdm import tqdm
+
+        self._bar = tqdm(total=steps, desc=self._name, disable=None, dynamic_ncols=True)
+        if self._bar.disable:
+            print(f"{self._name}: {steps} steps", flush=True)
+
+    def step(self, count: int = 1) -> None:
+        """So many more are done."""
+        self._bar.update(count)
+
+    def say(self, message: str) -> None:
+        """A line that does not disturb the bar."""
+        self._bar.clear()
+        print(message, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()

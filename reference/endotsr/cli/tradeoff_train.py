@@ -1,0 +1,78 @@
+"""`endotsr tradeoff train`: which minute of training buys how many decibels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import tyro
+
+from endotsr.cli.parts.options import parse
+from endotsr.cli.tradeoff import TRAINING, StepBar
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_folder
+from endotsr.runs.sources import SIMULATED
+
+
+@dataclass
+class TradeoffTrainOptions:
+    """Train the same sequence with one setting changed at a time, and measure held-out frames on the way.
+
+    DIR/training.json is written after every training; the same command goes on where an interrupted one stopped.
+    """
+
+    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[SEQUENCE]")] = SIMULATED
+    """EndoNeRF folder, or `simulated`"""
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("tradeoff")
+    """folder of the measurement"""
+    minutes: float = 8.0
+    """length of the whole study: it sets the iterations of each training, and none begins that would exceed it"""
+    iterations: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """iterations of each training instead"""
+    preset: Annotated[Literal["paper", "sharp", "demo"] | None, tyro.conf.arg(metavar="{paper,sharp,demo}")] = None
+    """settings of the base training (default: demo for `simulated`, paper for a folder)"""
+    scale: float = 1.0
+    """image scale of the base training"""
+    lpips: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """AlexNet LPIPS weights"""
+    threads: int = 2
+    """threads, 0 = all cores"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    options = parse(TradeoffTrainOptions, words, "tradeoff train")
+    if not options.minutes > 0:
+        raise InputError(f"tradeoff train: --minutes {options.minutes:g} is not allowed; allowed: a number > 0")
+    if options.iterations is not None and options.iterations < 1:
+        raise InputError(f"tradeoff train: --iterations {options.iterations} is not allowed; allowed: an integer >= 1")
+
+    from endotsr.config import PRESETS, config_from_dict
+    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.kernels.threads import use_threads
+    from endotsr.runs.sources import load_sequence
+    from endotsr.simulator.settings import SimulatorSettings
+    from endotsr.tradeoff.training import run_training_study
+    from endotsr.tradeoff.training_page import draw_training, training_lines
+
+    use_threads(options.threads)
+    preset = options.preset or ("demo" if options.sequence == SIMULATED else "paper")
+    data = msgspec.to_builtins(PRESETS[preset])
+    data["sequence"]["scale"] = options.scale
+    refuse_folder(options.out)
+    with StepBar("iterations") as bar:
+        result = run_training_study(
+            options.out / TRAINING,
+            config_from_dict(data, "command line"),
+            lambda config: load_sequence(options.sequence, config, SimulatorSettings()),
+            options.sequence if options.sequence == SIMULATED else Path(options.sequence).resolve().name,
+            minutes=options.minutes,
+            iterations=options.iterations,
+            weights=load_lpips_weights(options.lpips),
+            begin=bar.begin,
+            step=bar.step,
+            say=bar.say,
+        )
+    draw_training(result, options.out, "training")
+    print("\n".join(training_lines(result)))
+    return 0

@@ -1,0 +1,201 @@
+"""A cold start on two cores: what a training compiles is compiled by two processes at once.
+
+Compilation holds one lock for the whole process, so threads cannot share it. While this process compiles the way to
+the picture and back, a second one compiles losses and optimiser; both put their code into the folder of kernels,
+where the other finds it. The second process then goes on with what the schedule switches on later. No result depends
+on any of this: whatever is missing when it is called is compiled then.
+
+As a module (`python -m endotsr.fitting.compile_ahead`) this is the second process; settings come as JSON on its input.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from endotsr.config import Config
+from endotsr.kernels.threads import len_cores
+
+READY = "ready for the first iteration"
+_helpers: list[subprocess.Popen] = []  # referred to until this process ends: nobody waits for their last kernels
+
+
+def compile_ahead(config: Config, say: Callable[[str], None] = lambda line: None) -> bool:
+    """Compile what a training with these settings calls, on two cores, if the folder of kernels does not hold it yet.
+
+    say      takes a line for the user when something is compiled
+    returns  whether anything had to be done. Nothing is with one core, or when the JIT is off.
+    """
+    import numba
+
+    if numba.config.DISABLE_JIT or len_cores() < 2 or done_before(config).exists():  # type: ignore[attr-defined]
+        return False
+    say("compiling for this machine, once; this takes about half a minute")
+    helper = _second(config)
+    rehearse_picture(*_small(config))
+    if helper is not None and helper.stdout is not None:
+        helper.stdout.readline()  # READY, or the end of a process that failed
+    return True
+
+
+def _second(config: Config) -> subprocess.Popen | None:
+    """The second process at work; None if the system refuses one. What fails there fails here where it is called."""
+    import numba
+
+    environment = os.environ | {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}  # type: ignore[attr-defined]
+    try:
+        helper = subprocess.Popen(
+            [sys.executable, "-m", __spec__.name],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        _helpers.append(helper)
+        assert helper.stdin is not None
+        with helper.stdin as settings:
+            settings.write(msgspec.json.encode(config))
+    except OSError:
+        return None
+    return helper
+
+
+def done_before(config: Config) -> Path:
+    """The file whose presence says that all kernels of this source and these components exist for this processor."""
+    import numba
+    from llvmlite.binding import get_host_cpu_name
+
+    from endotsr.kernels.jit import kernel_source_hash
+
+    model = config.model
+    parts = [name for name in ("deformation", "appearance", "spectral_motion", "laplacian") if getattr(model, name)]
+    words = (kernel_source_hash(), config.training.precision, *parts, config.raster.preset, get_host_cpu_name())
+    return Path(numba.config.CACHE_DIR) / f"compiled-{'-'.join(words)}"  # type: ignore[attr-defined]
+
+
+def rehearse(config: Config) -> None:
+    """Compile, or load, everything that a training with these settings calls, in this process: for fair timing."""
+    shop, state = _small(config)
+    rehearse_picture(shop, state)
+    rehearse_losses(shop, everything=True)
+    rehearse_optimiser(shop, state)
+    rehearse_residuals(shop, state)
+    rehearse_densification(shop, state)
+
+
+def _small(config: Config) -> tuple[Any, Any]:
+    """Workshop and state of a few Gaussians and pixels: types and layouts as in any training, and nothing else."""
+    from endotsr.fitting.trainer import bench_state, workshop
+    from endotsr.scene import workload
+
+    shop = workshop(workload.sequence(64, 48, frames=3), config)
+    return shop, bench_state(workload.gaussians(64, config), config, 0)
+
+
+def rehearse_picture(shop: Any, state: Any) -> None:
+    """Deformation, splatting and its reverse pass, density statistics."""
+    from endotsr.fitting.model import raster_settings, scene_at, scene_reverse, without
+    from endotsr.scene.density_control import gather_statistics
+    from endotsr.splatting.render import render_forward, render_reverse
+
+    config, camera = shop.config, shop.sequence.cameras[0]
+    base = without(state.gaussians, appearance=False, spectral_motion=False)
+    scene, saved = scene_at(base, shop.spectral, config.model, 0.5)
+    out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
+    grads = render_reverse(out.colour, out.depth, None, render_saved)
+    gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
+    scene_reverse(grads, saved, coefficients=False)
+
+
+def rehearse_losses(shop: Any, everything: bool) -> None:
+    """Targets, losses and optimiser; with `everything` also the terms that the schedule switches on later."""
+    from endotsr.fitting.objective import LossWeights, frame_targets, image_loss
+    from endotsr.splatting.render import RenderOut
+
+    config, loss = shop.config, shop.config.loss
+    frame = shop.sequence.frame(0, config.training.precision)
+    later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
+    weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
+    seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no term is at its end: all kernels run
+    image_loss(seen, frame_targets(frame, config), weights, config.loss)
+
+
+def rehearse_optimiser(shop: Any, state: Any) -> None:
+    """Adam, fused with the reverse pass of the deformation."""
+    import numpy as np
+
+    from endotsr.equations.deformation import CHANNELS, DeformationSaved
+    from endotsr.fitting.adam import adam_update
+    from endotsr.fitting.fused.deformation import NAMES, deformation_adam_step
+    from endotsr.fitting.schedules import learning_rates
+    from endotsr.scene.gaussians import arrays
+
+    config, rates, o = shop.config, learning_rates(1, shop.config), shop.config.optimiser
+    given = {name: array for name, array in arrays(state.gaussians).items() if name in rates and name not in NAMES}
+    adam_update(state.adam, given, given, rates, o.beta1, o.beta2, o.epsilon)
+    weight, centre, width = (getattr(state.gaussians, name) for name in NAMES)
+    if weight is not None:
+        saved = DeformationSaved(weight, centre, width, 0.5, config.model.basis)
+        d_offsets = np.zeros((CHANNELS, weight.shape[2]), weight.dtype)
+        fdm_rates = {name: rates[name] for name in NAMES}
+        deformation_adam_step(d_offsets, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
+
+
+def rehearse_residuals(shop: Any, state: Any) -> None:
+    """Both Fourier residuals, the penalty, and their reverse passes fused with Adam."""
+    import numpy as np
+
+    from endotsr.equations.appearance import appearance_forward
+    from endotsr.equations.matern import matern_penalty_forward, penalty_factors
+    from endotsr.equations.motion import motion_forward
+    from endotsr.fitting.fused.coefficients import coefficients_adam_step
+    from endotsr.fitting.schedules import learning_rates
+
+    born = shop.config.training.residual_activation + 1
+    rates, o, rho = learning_rates(born, shop.config), shop.config.optimiser, shop.spectral.rho
+    colour, motion = state.gaussians.appearance_coefficients, state.gaussians.motion_coefficients
+    for name, coefficients in (("appearance_coefficients", colour), ("motion_coefficients", motion)):
+        if coefficients is None:
+            continue
+        atoms, shrink = np.zeros(coefficients.shape[1], coefficients.dtype), None
+        if coefficients is colour:
+            sums, _ = appearance_forward(coefficients, atoms, shop.config.model.beta)
+        else:
+            sums, _ = motion_forward(coefficients, atoms)
+            matern_penalty_forward(coefficients, rho)
+            shrink = penalty_factors(1.0, rho, state.gaussians.count, coefficients.dtype)
+        settings = (o.beta1, o.beta2, o.epsilon)
+        coefficients_adam_step(sums, atoms, shrink, coefficients, state.adam, name, rates, *settings)
+
+
+def rehearse_densification(shop: Any, state: Any) -> None:
+    """The gather of every array."""
+    from endotsr.scene.density_control import densify
+
+    state.statistics.gradient_sum[:] = 1.0
+    state.statistics.visits[:] = 1
+    densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
+
+
+def _second_process() -> None:
+    """Everything but the picture; says when the first iteration has what it needs."""
+    from endotsr.kernels.threads import use_threads
+
+    config = msgspec.json.decode(sys.stdin.buffer.read(), type=Config)
+    use_threads(1)
+    shop, state = _small(config)
+    rehearse_losses(shop, everything=False)
+    rehearse_optimiser(shop, state)
+    print(READY, flush=True)
+    rehearse_residuals(shop, state)
+    rehearse_losses(shop, everything=True)
+    rehearse_densification(shop, state)
+    done_before(config).touch()
+
+
+if __name__ == "__main__":
+    _second_process()

@@ -1,0 +1,76 @@
+"""One Adam step of everything that is trained, from the gradients by the deformed scene.
+
+Where the gradient of an array is much larger than what it is made of (time bases, Fourier coefficients), the reverse
+pass and the step are one sweep, and the gradient is never stored. The sweep over the time bases takes the curves of
+the next iteration as well.
+"""
+
+from endotsr.config import Config
+from endotsr.equations.appearance import argument_gradient
+from endotsr.equations.matern import penalty_factors
+from endotsr.fitting.adam import AdamState, Rate, adam_update
+from endotsr.fitting.fused.coefficients import coefficients_adam_step
+from endotsr.fitting.fused.deformation import NAMES as FDM_FIELDS
+from endotsr.fitting.fused.deformation import deformation_adam_step
+from endotsr.fitting.model import OffsetsAhead, SceneGrads, SceneSaved, Spectral
+from endotsr.kernels.threads import parallel_calls
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.splatting.render import RenderGrads
+
+
+def optimise(
+    gaussians: Gaussians,
+    adam: AdamState,
+    spectral: Spectral,
+    config: Config,
+    saved: SceneSaved,
+    grads: RenderGrads,
+    back: SceneGrads,
+    rates: dict[str, Rate],
+    next_time: float | None = None,
+) -> OffsetsAhead | None:
+    """Change the Gaussians and their moments in place.
+
+    saved   of `scene_at`, for these very Gaussians
+    grads   gradients by the deformed scene
+    back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
+    rates   learning rate of every array
+    next_time  normalised time of the next iteration, if it is known
+    returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
+    """
+    o = config.optimiser
+    settings = (o.beta1, o.beta2, o.epsilon)
+
+    def step_deformation() -> OffsetsAhead | None:
+        if saved.deformation is None:
+            return None
+        assert back.offsets is not None
+        fdm_rates = {name: rates[name] for name in FDM_FIELDS}
+        offsets = deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
+        if next_time is None or offsets is None:
+            return None
+        return OffsetsAhead(saved.deformation.weight, next_time, offsets)
+
+    def step_appearance() -> None:
+        if saved.appearance is not None:
+            assert grads.residual is not None
+            coefficients, atoms, _ = saved.appearance
+            d_argument = argument_gradient(grads.residual, saved.appearance)
+            coefficients_adam_step(
+                d_argument, atoms, None, coefficients, adam, "appearance_coefficients", rates, *settings
+            )
+
+    def step_motion() -> None:
+        if saved.motion is not None:
+            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.position
+            rho, dtype = spectral.rho, coefficients.dtype
+            shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
+            coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
+
+    ahead, *_ = parallel_calls(  # arrays of their own; the longest sweep first
+        step_deformation,
+        step_appearance,
+        step_motion,
+        lambda: adam_update(adam, arrays(gaussians), back.by_field, rates, *settings),
+    )
+    return ahead

@@ -1,0 +1,27 @@
+"""The public gradient checker and the registry of every forward/reverse pair of the package.
+
+Checking a port takes one call: `check_function(forward, reverse, inputs)` answers a `PairReport`.
+"""
+
+from endotsr.gradcheck.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair
+from endotsr.gradcheck.precision import PrecisionReport, check_precision
+from endotsr.gradcheck.registry import Pair, all_pairs, one_thread, pair_stream
+from endotsr.gradcheck.report import summary, table, to_json
+
+__all__ = [
+    "DOUBLE",
+    "SINGLE",
+    "Pair",
+    "PairReport",
+    "PrecisionReport",
+    "Settings",
+    "all_pairs",
+    "check_function",
+    "check_pair",
+    "check_precision",
+    "one_thread",
+    "pair_stream",
+    "summary",
+    "table",
+    "to_json",
+]

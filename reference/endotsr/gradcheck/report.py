@@ -1,0 +1,103 @@
+"""Reports of the gradient checker: a table for a person, JSON for a machine."""
+
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from endotsr.gradcheck.checker import BlockReport, PairReport
+from endotsr.gradcheck.precision import PrecisionReport
+
+HEADER = ("stage", "equation", "block", "probes", "refused", "unresolved", "worst rel. error", "step", "verdict")
+_LEFT = (0, 1, 2, 8)
+_COLOURS = {"ok": "\x1b[32m", "skipped": "\x1b[33m"}
+_RED, _RESET = "\x1b[31m", "\x1b[0m"
+
+
+def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = (), colour: bool = False) -> str:
+    """Aligned plain text: a line per block, below them the pair's float32 line; reasons of failures at the end."""
+    single = {p.name: p for p in precisions}
+    rows: list[tuple[str, ...]] = [HEADER]
+    reasons: list[str] = []
+    for report in reports:
+        rows += [_row(report, block, first=i == 0) for i, block in enumerate(report.blocks)]
+        if not report.blocks:
+            rows.append((report.name, report.equation, "-", "0", "0", "0", "-", "-", "FAILED"))
+        reasons += [f"{report.name}: {reason}" for reason in report.failures]
+        if report.name in single:
+            rows.append(_single_row(single[report.name]))
+            reasons += [f"{report.name}: {reason}" for reason in single[report.name].failures]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
+    lines = [_line(row, widths, colour) for row in rows]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join(lines + ([""] + reasons if reasons else []))
+
+
+def summary(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = ()) -> str:
+    """One line: how many pairs, blocks and probes, how many failed, how long it took."""
+    reports, precisions = list(reports), list(precisions)
+    bad = {r.name for r in (*reports, *precisions) if not r.passed}
+    probes = sum(block.probes for report in reports for block in report.blocks)
+    blocks = sum(len(report.blocks) for report in reports)
+    seconds = sum(report.seconds for report in reports)
+    verdict = f"{len(bad)} failed: {', '.join(sorted(bad))}" if bad else "all passed"
+    return f"{len(reports)} pairs, {blocks} blocks, {probes} probes in {seconds:.1f} s: {verdict}"
+
+
+def to_json(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport], seed: int) -> str:
+    """Everything that the table shows and every number behind it. Non-finite numbers are written as strings."""
+    single = {p.name: p for p in precisions}
+    pairs = []
+    for report in reports:
+        entry = {"passed": report.passed} | _plain(report)
+        if report.name in single:
+            entry["float32"] = {"passed": single[report.name].passed} | _plain(single[report.name])
+        pairs.append(entry)
+    passed = all(p["passed"] and p.get("float32", p)["passed"] for p in pairs)
+    return json.dumps({"passed": passed, "seed": seed, "pairs": pairs}, indent=1, allow_nan=False) + "\n"
+
+
+def _row(report: PairReport, block: BlockReport, first: bool) -> tuple[str, ...]:
+    worst = block.worst
+    head = (report.name, report.equation) if first else ("", "")
+    error, step = (_number(worst.relative_error), _number(worst.difference.step)) if worst else ("-", "-")
+    return (
+        *head,
+        block.block,
+        str(block.probes),
+        str(block.refused),
+        str(block.unresolved),
+        error,
+        step,
+        block.verdict,
+    )
+
+
+def _single_row(precision: PrecisionReport) -> tuple[str, ...]:
+    if precision.skipped:
+        return ("", "", f"float32: {precision.skipped}", "", "", "", "-", "-", "skipped")
+    worst = max((b.distance for b in precision.blocks), default=math.nan)
+    verdict = "ok" if precision.passed else "FAILED"
+    return ("", "", "float32 against float64", "", "", "", _number(worst), "-", verdict)
+
+
+def _number(value: float) -> str:
+    return f"{value:.1e}" if math.isfinite(value) else str(value)
+
+
+def _line(row: tuple[str, ...], widths: list[int], colour: bool) -> str:
+    cells = [c.ljust(w) if i in _LEFT else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths))]
+    if colour and row is not HEADER:
+        cells[-1] = f"{_COLOURS.get(row[-1], _RED)}{row[-1]}{_RESET}"
+    return "  ".join(cells).rstrip()
+
+
+def _plain(value) -> Any:
+    """Named tuples as dictionaries, non-finite numbers as strings."""
+    if hasattr(value, "_asdict"):
+        return {key: _plain(item) for key, item in value._asdict().items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value

@@ -1,0 +1,1 @@
+"""Kernel support: how a kernel is compiled, shared among threads and given registers. Knows no equation."""

@@ -1,0 +1,208 @@
+"""Small arrays that live in a kernel's registers: what plain arrays cannot tell the compiler.
+
+An array from `np.empty` lies in memory that others may point to, so the compiler reloads and stores it at every step
+and guards each loop against overlap. A local array is the kernel's own: sums over a loop stay in vector registers
+and no guard is needed. The blend's reverse pass takes two thirds of the time with them; in float64 a half, because
+a loop over the eight lanes of a register, too short for guards, becomes vector code. A loop that reads and writes many
+arrays keeps the results of a GROUP of items in one and copies them out: the projection takes a third of the time.
+
+Each function below is a plain Python function, which is its definition and runs when the JIT is off, beside the
+instructions that stand for it in compiled code. A local array must not leave the function that made it: it may be
+passed to functions inlined into that one (`jit_inline`), not returned, stored, or passed on to others.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+from numba.np.arrayobj import make_array, populate_array
+from numpy.typing import NDArray
+
+from endotsr.kernels.jit import jit_inline
+
+GROUP = 64  # items of a loop whose results wait in a local array
+FEWEST_LANES = 8  # lanes: loops over fewer do not become vector code
+_INT32 = ir.IntType(32)
+_instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
+
+
+def _register_bytes() -> int:
+    """64 with AVX-512; else 32, which sixteen short registers of other machines hold as well."""
+    features = numba.config.CPU_FEATURES  # type: ignore[attr-defined]  # what Numba was told to compile for
+    if features is None:
+        features = get_host_cpu_features().flatten()
+    return 64 if "+avx512f" in features else 32
+
+
+REGISTER = _register_bytes()
+
+
+def lanes(like: NDArray[np.floating]) -> int:
+    """Numbers in one vector: 16 of float32 with AVX-512, else 8; 8 of float64."""
+    return _lanes(like.itemsize)
+
+
+def _lanes(bytes_each: int) -> int:
+    return max(FEWEST_LANES, REGISTER // bytes_each)
+
+
+def vector(like: NDArray[np.floating]) -> NDArray[np.floating]:
+    """A local array of `lanes(like)` numbers, not initialised."""
+    return np.empty(lanes(like), like.dtype)
+
+
+def local_array(size: int, like: NDArray[np.floating]) -> NDArray[np.floating]:
+    """A local array of `size` numbers, not initialised; in compiled code `size` is a named constant of the module."""
+    return np.empty(size, like.dtype)
+
+
+def fold(values: NDArray[np.floating]) -> np.floating:
+    """Sum of the lanes of a vector: the upper half is added to the lower until one is left. Always the same order."""
+    while values.size > 1:
+        half = values.size // 2
+        values = values[:half] + values[half:]
+    return values[0]
+
+
+def lowest_bit(bits: np.uint64) -> np.uint64:
+    """Number of the lowest bit that is 1; there must be one."""
+    return np.uint64((int(bits) & -int(bits)).bit_length() - 1)
+
+
+def prefetch(table: NDArray[Any], row: int) -> None:
+    """Ask for a row of a C-ordered table ahead of its use; changes nothing. The row must exist."""
+
+
+def _write_group(results: NDArray[np.floating], start: int, count: int, out: NDArray[np.floating]) -> None:
+    """The columns of `results`, GROUP numbers each, to columns start ... start + count - 1 of the rows of `out`.
+
+    For loops that read and write many arrays: with the results of a group of items in a local array, the loop over
+    the group becomes vector code, as nothing that it reads can change.
+    """
+    for column in range(out.shape[0]):
+        for item in range(count):
+            out[np.uint64(column), np.uint64(start + item)] = results[np.uint64(column * GROUP + item)]
+
+
+write_group = jit_inline(_write_group)
+
+
+def _lanes_of(like: Any) -> int:
+    return _lanes(like.dtype.bitwidth // 8)
+
+
+def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:
+    """A place on the stack, as a one-dimensional array without an owner.
+
+    Not by `cgutils.alloca_once`, which fills it with zeros, number by number: seconds of compilation for a tile.
+    """
+    number = context.get_data_type(kind.dtype)
+    with builder.goto_entry_block():
+        place = builder.alloca(ir.ArrayType(number, size))
+    place.align = 64
+    array = make_array(kind)(context, builder)
+    shape, stride = context.get_constant(types.intp, size), context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    data = builder.bitcast(place, number.as_pointer())
+    populate_array(array, data=data, shape=[shape], strides=[stride], itemsize=stride, meminfo=None)
+    return array._getvalue()
+
+
+@_instructions(prefer_literal=True)
+def _local_array(typing: Any, size: Any, like: Any) -> Any:
+    if not isinstance(size, types.IntegerLiteral):
+        return None
+    kind, count = types.Array(like.dtype, 1, "C"), size.literal_value
+    return kind(size, like), lambda context, builder, signature, arguments: _make_local(context, builder, kind, count)
+
+
+@_instructions
+def _vector(typing: Any, like: Any) -> Any:
+    kind = types.Array(like.dtype, 1, "C")
+    return kind(like), lambda context, builder, signature, arguments: _make_local(
+        context, builder, kind, _lanes_of(like)
+    )
+
+
+@_instructions
+def _fold(typing: Any, values: Any) -> Any:
+    """Loads the vector once; halves are shuffles of the register."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number, count = context.get_data_type(values.dtype), _lanes_of(values)
+        array = make_array(values)(context, builder, arguments[0])
+        place = builder.bitcast(array.data, ir.VectorType(number, count).as_pointer())
+        folded = builder.load(place, align=values.dtype.bitwidth // 8)
+        while count > 1:
+            count //= 2
+            halves = [ir.Constant(ir.VectorType(_INT32, count), list(range(k, k + count))) for k in (0, count)]
+            nothing = ir.Constant(folded.type, ir.Undefined)
+            folded = builder.fadd(*(builder.shuffle_vector(folded, nothing, half) for half in halves))
+        return builder.extract_element(folded, ir.Constant(_INT32, 0))
+
+    return values.dtype(values), generate
+
+
+@_instructions
+def _lowest_bit(typing: Any, bits: Any) -> Any:
+    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.cttz(
+        arguments[0], ir.Constant(ir.IntType(1), 1)
+    )
+
+
+@_instructions
+def _prefetch(typing: Any, table: Any, row: Any) -> Any:
+    """First and last number of the row: it may lie in two cache lines (of three the middle one comes by itself)."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = make_array(table)(context, builder, arguments[0])
+        stride = cgutils.unpack_tuple(builder, array.strides, table.ndim)[0]
+        byte = ir.IntType(8).as_pointer()
+        start = builder.gep(builder.bitcast(array.data, byte), [builder.mul(arguments[1], stride)])
+        last = builder.sub(stride, ir.Constant(stride.type, table.dtype.bitwidth // 8))
+        kind = ir.FunctionType(ir.VoidType(), [byte, _INT32, _INT32, _INT32])
+        instruction = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        for place in (start, builder.gep(start, [last])):
+            builder.call(instruction, [place, *(ir.Constant(_INT32, v) for v in (0, 3, 1))])  # read, keep, data
+        return context.get_dummy_value()
+
+    return types.void(table, types.intp), generate
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    return overload(function, inline="always", **options)
+
+
+@_compiled(lanes)
+def _compile_lanes(like):
+    return {16: lambda like: 16, 8: lambda like: 8}[_lanes_of(like)]
+
+
+@_compiled(vector)
+def _compile_vector(like):
+    return lambda like: _vector(like)
+
+
+@_compiled(local_array, prefer_literal=True)
+def _compile_local_array(size, like):
+    return lambda size, like: _local_array(size, like)
+
+
+@_compiled(fold)
+def _compile_fold(values):
+    return lambda values: _fold(values)
+
+
+@_compiled(lowest_bit)
+def _compile_lowest_bit(bits):
+    return lambda bits: _lowest_bit(bits)
+
+
+@_compiled(prefetch)
+def _compile_prefetch(table, row):
+    return lambda table, row: _prefetch(table, row)

@@ -1,0 +1,228 @@
+"""Charts of a run from its log (one JSON object per line) and its evaluation, drawn with matplotlib on Agg.
+
+Every chart exists for a light and for a dark page (transparent ground). A key that the log lacks is a curve that
+is not drawn; a chart without any curve is left out.
+"""
+
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LogEntries = list[dict[str, Any]]
+
+TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
+UNSIGNED = {"Software": None}  # no version and no address of the drawing library inside the pictures
+THEMES = {
+    "light": {
+        "ink": "#24303a",
+        "faint": "#c9d1d8",
+        "colours": ("#0b6e99", "#c2501e", "#5b8c2a", "#8a4fa3", "#b08a00", "#6b7680"),
+    },
+    "dark": {
+        "ink": "#d7dee4",
+        "faint": "#46525c",
+        "colours": ("#58b4dd", "#f08a5d", "#9ccc65", "#c79be0", "#e6c14a", "#9aa6b0"),
+    },
+}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A titled chart; `draw(axes, theme)` puts the curves on matplotlib axes."""
+
+    title: str
+    draw: Callable[[Any, dict[str, Any]], None]
+    along: str = "iteration"  # what the horizontal axis counts
+
+
+def read_log(path: Path) -> LogEntries:
+    """The entries of a JSON-lines log. A last line cut short by an interruption is left out; none if no file."""
+    if not Path(path).exists():
+        return []
+    entries = []
+    for line in Path(path).read_text(encoding="utf-8").splitlines():
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if isinstance(entry, dict):
+            entries.append(entry)
+    return entries
+
+
+def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(iterations, values) of the entries that hold a finite number under `key`, both (n,)."""
+    pairs = [
+        (entry.get("iteration", position + 1), entry[key])
+        for position, entry in enumerate(log)
+        if isinstance(entry.get(key), int | float) and np.isfinite(entry[key])
+    ]
+    table = np.array(pairs, np.float64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """Centred running mean over `window` entries, shorter at both ends. (n,) -> (n,)."""
+    half = window // 2
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    positions = np.arange(values.size)
+    start, stop = np.maximum(positions - half, 0), np.minimum(positions + half + 1, values.size)
+    return (sums[stop] - sums[start]) / (stop - start)
+
+
+def charts(log: LogEntries, evaluation: dict[str, Any] | None = None) -> list[Chart]:
+    """All charts the given data allows: loss, PSNR, loss terms, Gaussians."""
+    evaluation = evaluation or {}
+    found = []
+    if series(log, "loss")[0].size:
+        found.append(Chart("Loss", lambda axes, theme: _draw_loss(axes, theme, log)))
+    if series(log, "psnr")[0].size:
+        found.append(Chart("PSNR of the training view, dB", lambda a, t: _draw_psnr(a, t, log, evaluation)))
+    if any(series(log, key)[0].size for key in TERMS):
+        found.append(Chart("Loss terms", lambda axes, theme: _draw_terms(axes, theme, log)))
+    if series(log, "gaussians")[0].size:
+        found.append(Chart("Gaussians", lambda axes, theme: _draw_count(axes, theme, log)))
+    return found
+
+
+def frame_chart(evaluation: dict[str, Any], key: str) -> Chart | None:
+    """Held-out PSNR of the model and of the interpolating baselines, frame by frame; None without frames."""
+    lines = frame_lines(evaluation, key)
+    if not lines:
+        return None
+    return Chart("Held-out PSNR by frame, tissue, dB", lambda axes, theme: _draw_frames(axes, theme, lines), "frame")
+
+
+def frame_lines(evaluation: dict[str, Any], key: str) -> list[tuple[str, NDArray, NDArray]]:
+    """(name, frame numbers, values) of the model and the two strongest kinds of baseline, null values left out."""
+    sources = [("Model", (evaluation.get("held_out") or {}).get("per_frame"))]
+    for name, label in (("two_neighbours", "Two neighbours"), ("flow_interpolation", "Optical flow")):
+        sources.append((label, ((evaluation.get("baselines") or {}).get(name) or {}).get("per_frame")))
+    lines = []
+    for label, rows in sources:
+        pairs = [(row["frame"], row[key]) for row in rows or [] if row.get(key) is not None]
+        if pairs:
+            table = np.array(pairs, np.float64)
+            lines.append((label, table[:, 0], table[:, 1]))
+    return lines
+
+
+def chart_png(chart: Chart, theme: str, width: float = 4.4, height: float = 2.75, dots: int = 220) -> bytes:
+    """One chart as a PNG file with a transparent ground, `width` x `height` inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    figure.subplots_adjust(left=0.13, right=0.985, top=0.97, bottom=0.17)
+    _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots, transparent=True, metadata=UNSIGNED)
+    return buffer.getvalue()
+
+
+def curves_png(log: LogEntries, evaluation: dict[str, Any] | None = None) -> bytes | None:
+    """All charts in one PNG on white, for the run folder; None if there is nothing to draw."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    found = charts(log, evaluation)
+    if not found:
+        return None
+    rows = (len(found) + 1) // 2
+    figure = Figure(figsize=(10.4, 3.3 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    for position, chart in enumerate(found):
+        _draw(figure.add_subplot(rows, 2, position + 1), chart, THEMES["light"], title=True)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=150, metadata=UNSIGNED)
+    return buffer.getvalue()
+
+
+def _draw(axes: Any, chart: Chart, theme: dict[str, Any], title: bool) -> None:
+    ink, faint = theme["ink"], theme["faint"]
+    chart.draw(axes, theme)
+    if title:
+        axes.set_title(chart.title, color=ink, fontsize=11, loc="left")
+    axes.set_xlabel(chart.along, color=ink, fontsize=9)
+    axes.tick_params(which="both", colors=ink, labelsize=9, length=0)
+    axes.grid(True, color=faint, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in axes.spines.values():
+        side.set_visible(False)
+    if len(axes.get_legend_handles_labels()[1]) > 0:
+        axes.legend(frameon=False, fontsize=9, labelcolor=ink, ncols=2 if len(axes.lines) > 4 else 1)
+
+
+def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True) -> None:
+    iterations, values = series(log, key)
+    if not values.size:
+        return
+    window = max(1, values.size // 60)
+    if raw and window > 1:
+        axes.plot(iterations, values, color=colour, linewidth=0.5, alpha=0.25)
+    axes.plot(iterations, smoothed(values, window), color=colour, linewidth=1.6, label=label)
+
+
+def _draw_loss(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
+    _curve(axes, log, "loss", theme["colours"][0], "")
+    _log_scale(axes, log, ("loss",))
+
+
+def _draw_terms(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
+    for position, key in enumerate(TERMS):
+        positive = [{**entry, key: value} for entry in log if (value := _term(entry, key)) is not None and value > 0]
+        if positive:  # a weight that is still zero has no place on a logarithmic axis
+            label = "1 − ssim" if key == "ssim" else key
+            _curve(axes, positive, key, theme["colours"][position], label, raw=False)
+    _log_scale(axes, log, TERMS)
+
+
+def _term(entry: dict[str, Any], key: str) -> float | None:
+    """The value that is minimised: the log holds SSIM itself."""
+    value = entry.get(key)
+    if not isinstance(value, int | float):
+        return None
+    return 1.0 - value if key == "ssim" else float(value)
+
+
+def _log_scale(axes: Any, log: LogEntries, keys: tuple[str, ...]) -> None:
+    if any((series(log, key)[1] > 0).any() for key in keys):
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+        axes.set_yscale("log", nonpositive="mask")
+        low, high = axes.get_ylim()
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 50 * low else (1.0,)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _draw_psnr(axes: Any, theme: dict[str, Any], log: LogEntries, evaluation: dict[str, Any]) -> None:
+    _curve(axes, log, "psnr", theme["colours"][0], "training view")
+    levels = (("held_out", "held-out frames, end", "--", 1), ("training", "training frames, end", ":", 2))
+    for key, label, dashes, colour in levels:
+        value = ((evaluation.get(key) or {}).get("mean") or {}).get("psnr_full")
+        if value is not None:
+            axes.axhline(
+                value, color=theme["colours"][colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"
+            )
+
+
+def _draw_count(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
+    iterations, values = series(log, "gaussians")
+    axes.plot(iterations, values, color=theme["colours"][0], linewidth=1.6)
+    axes.set_ylim(bottom=0)
+
+
+def _draw_frames(axes: Any, theme: dict[str, Any], lines: list[tuple[str, NDArray, NDArray]]) -> None:
+    for position, (label, frames, values) in enumerate(lines):
+        marker = "o" if position == 0 else "s"
+        axes.plot(
+            frames, values, marker=marker, markersize=5, linewidth=1.4, color=theme["colours"][position], label=label
+        )

@@ -1,0 +1,173 @@
+"""Pieces of the report as HTML text: escaping, numbers, tables, pictures, and the one style sheet.
+
+Everything that comes from a run passes through `text`, so that no name can break the page. No script, no link.
+"""
+
+import html
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from endotsr.report import figures
+from endotsr.report.figures import ByteImage
+
+ABSENT = '<span class="absent" title="no value">&ndash;</span>'
+
+LOSSLESS_BYTES = 200_000  # raw size up to which an embedded picture is a PNG
+
+
+def text(value: Any) -> str:
+    """`value` as text that is safe between tags and inside double-quoted attributes."""
+    return html.escape(str(value), quote=True)
+
+
+def number(value: Any, digits: int) -> str:
+    """A number with fixed decimals; a dash for None and for what is not a finite number."""
+    if value is None or isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return ABSENT
+    return f"{value:.{digits}f}".replace("-", "&minus;")
+
+
+def cell(value: Any) -> str:
+    """A table cell of a free table: short for floats, grouped digits for integers, text as it is."""
+    if value is None:
+        return ABSENT
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "&#8239;").replace("-", "&minus;")
+    if isinstance(value, float):
+        return f"{value:.4g}".replace("-", "&minus;") if math.isfinite(value) else ABSENT
+    return text(value)
+
+
+def section(title: str, *content: str, note: str = "") -> str:
+    """A headed section; empty when there is no content."""
+    body = "\n".join(part for part in content if part)
+    if not body:
+        return ""
+    lead = f'<p class="note">{note}</p>' if note else ""
+    return f"<section><h2>{text(title)}</h2>{lead}\n{body}</section>"
+
+
+def table(columns: Iterable[str], rows: Iterable[Iterable[str]], classes: Iterable[str] = (), caption: str = "") -> str:
+    """A table that scrolls sideways on a narrow page; the first column stays in sight. Cells are HTML already."""
+    head = "".join(f'<th scope="col">{text(c)}</th>' for c in columns)
+    kinds = list(classes)
+    body = []
+    for position, (first, *rest) in enumerate(rows):
+        kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
+        body.append(f'<tr{kind}><th scope="row">{first}</th>' + "".join(f"<td>{c}</td>" for c in rest) + "</tr>")
+    title = f"<caption>{text(caption)}</caption>" if caption else ""
+    return (
+        f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div>'
+    )
+
+
+def details(summary: str, content: str, opened: bool = False) -> str:
+    """A part that a person can fold. Both arguments are HTML already."""
+    return f"<details{' open' if opened else ''}><summary>{summary}</summary>{content}</details>"
+
+
+def image(picture: ByteImage, alternative: str, css: str = "") -> str:
+    """An embedded picture with its size, so that the page does not jump while it loads; small ones are lossless."""
+    kind = "webp" if picture.size > LOSSLESS_BYTES else "png"
+    address = figures.data_uri(figures.encode(picture, kind), kind)
+    style = f' class="{css}"' if css else ""
+    height, width = picture.shape[:2]
+    return f'<img{style} src="{address}" alt="{text(alternative)}" width="{width}" height="{height}" loading="lazy">'
+
+
+def themed_image(light: bytes, dark: bytes, alternative: str) -> str:
+    """A PNG chart in two versions; the page shows the one that fits the reader's colour scheme."""
+    return (
+        f'<picture><source media="(prefers-color-scheme: dark)" srcset="{figures.data_uri(dark, "png")}">'
+        f'<img class="chart" src="{figures.data_uri(light, "png")}" alt="{text(alternative)}"></picture>'
+    )
+
+
+def colour_bar(name: str, low: str, high: str) -> str:
+    """The colour map as a strip with its two end values."""
+    colours = figures.colour_table(name)[::17]
+    stops = ",".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in colours)
+    strip = f'<i style="background:linear-gradient(90deg,{stops})"></i>'
+    return f'<span class="bar">{text(low)}{strip}{text(high)}</span>'
+
+
+def page(title: str, body: str) -> str:
+    """The whole document."""
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f"<title>{text(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
+    )
+
+
+STYLE = """
+:root{--ground:#fafbfc;--panel:#fff;--ink:#1c262e;--soft:#5a6771;--line:#dfe5e9;--accent:#0b6e99;--tint:#e8f3f8;
+--good:#1f7a45;--bad:#b3441a}
+@media(prefers-color-scheme:dark){:root{--ground:#11171b;--panel:#182026;--ink:#e2e8ec;--soft:#98a5ae;--line:#2b363e;
+--accent:#62bde6;--tint:#17303c;--good:#7fd39f;--bad:#f29a70}}
+*{box-sizing:border-box}
+body{margin:0;background:var(--ground);color:var(--ink);-webkit-text-size-adjust:100%;
+font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif}
+main{max-width:1180px;margin:0 auto;padding:2.2rem 1.25rem 4rem}
+h1{font-size:clamp(1.5rem,4vw,2.1rem);line-height:1.2;margin:.1rem 0 .5rem;letter-spacing:-.015em;text-wrap:balance}
+h2{font-size:1.25rem;margin:0 0 .4rem;letter-spacing:-.01em}
+h3{font-size:1rem;margin:1.1rem 0 .4rem}
+section{margin-top:2.6rem}
+.eyebrow{color:var(--accent);font-size:.8rem;font-weight:600;letter-spacing:.06em;text-transform:uppercase;margin:0}
+.lead{font-size:1.06rem;max-width:46rem;margin:.3rem 0 0;text-wrap:pretty}
+.note,figcaption,caption{color:var(--soft);font-size:.88rem}
+.note{max-width:52rem;margin:.2rem 0 .8rem;text-wrap:pretty}
+.good{color:var(--good)}.bad{color:var(--bad)}.absent{color:var(--soft)}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(9.2rem,1fr));gap:.7rem;margin-top:1.5rem}
+.card{background:var(--panel);border:1px solid var(--line);border-radius:10px;padding:.75rem .9rem}
+.card b{display:block;white-space:nowrap;font-size:1.38rem;line-height:1.25;font-weight:650;
+font-variant-numeric:tabular-nums}
+.card b small{font-size:.85rem;font-weight:500;color:var(--soft);margin-left:.2em}
+.card span{color:var(--soft);font-size:.82rem}
+.scroll{overflow-x:auto;background:var(--panel);border:1px solid var(--line);border-radius:10px;margin:.5rem 0}
+table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
+caption{text-align:left;padding:.6rem .9rem 0}
+th,td{padding:.5rem .9rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
+thead th{color:var(--soft);font-weight:600;font-size:.8rem;vertical-align:bottom;white-space:normal}
+th:first-child{text-align:left;position:sticky;left:0;background:var(--panel)}
+tbody th{font-weight:500}
+tbody tr:last-child>*{border-bottom:0}
+tr.model>*{background:var(--tint)!important;font-weight:650}
+tr.reference>*{color:var(--soft);font-style:italic}
+td.best,td .best{color:var(--accent);font-weight:650}
+figure{margin:0}
+.charts{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:1rem}
+.charts figure,.panel{background:var(--panel);border:1px solid var(--line);border-radius:10px;padding:.7rem .8rem}
+.charts{align-items:start}.charts .scroll{margin:0}
+.charts figcaption{color:var(--ink);font-weight:600;margin-bottom:.2rem}
+img{display:block;width:100%;height:auto;border-radius:4px}
+img.chart{border-radius:0}
+img.inset{image-rendering:pixelated}
+.views{display:grid;grid-auto-flow:column;grid-template-rows:auto auto;grid-auto-columns:minmax(0,1fr);gap:.45rem}
+.views figure{display:contents}
+.views div{position:relative}
+.views div>span{position:absolute;left:.4rem;top:.4rem;padding:.05rem .5rem;border-radius:99px;font-size:.76rem;
+color:#fff;background:rgba(10,14,18,.66)}
+section>.panel{margin-bottom:1rem}
+details{border-top:1px solid var(--line);padding:.7rem 0}
+summary{cursor:pointer;font-weight:600}
+summary small{color:var(--soft);font-weight:400;margin-left:.5rem}
+details[open]>summary{margin-bottom:.6rem}
+.legend{display:flex;flex-wrap:wrap;gap:.3rem 1.5rem;color:var(--soft);font-size:.85rem;margin:.2rem 0 .8rem}
+.bar{display:inline-flex;align-items:center;gap:.45rem;white-space:nowrap}
+.bar i{display:inline-block;width:7.5rem;height:.65rem;border-radius:3px}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:.25rem 1.4rem;margin:0;font-size:.92rem}
+dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
+pre{overflow-x:auto;font:.82rem/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;margin:0}
+code{font:.85em ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
+footer{margin-top:3rem;border-top:1px solid var(--line);padding-top:1rem;color:var(--soft);font-size:.86rem}
+@media(max-width:640px){main{padding:1.3rem .9rem 3rem}.charts{grid-template-columns:1fr}
+.views{grid-auto-flow:row;grid-template-rows:none;grid-template-columns:1fr 1fr}
+.cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}dl{grid-template-columns:1fr}dd{margin-bottom:.4rem}
+tbody th{white-space:normal;min-width:8.5rem}}
+@media print{section{break-inside:avoid}details>*{display:block}}
+"""

@@ -1,0 +1,257 @@
+"""The sections of the report, top to bottom; each is a function of the data and is empty when its data is missing."""
+
+from typing import Any
+
+import numpy as np
+
+from endotsr.evaluation.evaluate import left_out
+from endotsr.report import curves, figures
+from endotsr.report import parts as parts
+from endotsr.report.data import COLUMNS, FramePictures, ReportData
+
+OPENED_FRAMES = 3  # the worst frames are unfolded, the others one touch away
+
+
+def _mean(data: ReportData, key: str) -> dict[str, Any]:
+    return (data.evaluation.get(key) or {}).get("mean") or {}
+
+
+def _baseline_rows(data: ReportData) -> list[tuple[str, dict[str, Any]]]:
+    baselines = data.evaluation.get("baselines") or {}
+    return [(row.get("label", name), row.get("mean") or {}) for name, row in baselines.items()]
+
+
+def headline(data: ReportData) -> str:
+    """Title, one sentence against the baselines, the headline numbers."""
+    mean = _mean(data, "held_out")
+    count = len((data.evaluation.get("held_out") or {}).get("per_frame") or [])
+    cards = [
+        (mean.get("psnr_full"), 2, "dB", "held-out PSNR, full image"),
+        (mean.get("psnr_tissue"), 2, "dB", "held-out PSNR, tissue"),
+        (mean.get("ssim_full"), 4, "", "SSIM, full image"),
+        (mean.get("lpips"), 4, "", "LPIPS (AlexNet)"),
+    ]
+    boxes = [_card(parts.number(value, digits), unit, label) for value, digits, unit, label in cards if mean]
+    reached, gaussians = curves.series(data.log, "gaussians")
+    seconds = curves.series(data.log, "seconds")[1]
+    if gaussians.size:
+        boxes.append(_card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
+    if "Training time" in data.facts:
+        boxes.append(_card(parts.text(data.facts["Training time"]), "", "training time"))
+    elif seconds.size:
+        boxes.append(_card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
+    frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
+    return (
+        f'<header><p class="eyebrow">Endo-TSR · {frames}</p><h1>{parts.text(data.title)}</h1>{_verdict(data)}'
+        f'<div class="cards">{"".join(boxes)}</div></header>'
+    )
+
+
+def _card(value: str, unit: str, label: str) -> str:
+    suffix = f"<small>{unit}</small>" if unit and "absent" not in value else ""
+    return f'<div class="card"><b>{value}{suffix}</b><span>{parts.text(label)}</span></div>'
+
+
+def _verdict(data: ReportData) -> str:
+    """The one sentence a reader wants: above or below what needs no model, in tissue PSNR."""
+    ours = _mean(data, "held_out").get("psnr_tissue")
+    means = _baseline_rows(data)
+    rows = [(label, float(mean["psnr_tissue"])) for label, mean in means if mean.get("psnr_tissue") is not None]
+    if ours is None or not rows or len(rows) < len(means):
+        return ""  # a baseline without a value may be a perfect one
+    label, best = max(rows, key=lambda row: row[1])
+    kind, word = ("good", "above") if ours >= best else ("bad", "below")
+    beaten = sum(ours >= value for _, value in rows)
+    return (
+        f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the strongest '
+        f"answer that needs no model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB); "
+        f"it is above {beaten} of {len(rows)} baselines.</p>"
+    )
+
+
+def held_out(data: ReportData) -> str:
+    """The table of held-out metrics: model, baselines, published rows."""
+    rows: list[tuple[str, dict[str, Any], str]] = []
+    if mean := _mean(data, "held_out"):
+        rows.append(("This model", mean, "model"))
+    rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
+    rows += [(str(row.get("label", "published")), row, "reference") for row in data.reference_rows]
+    columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
+    if not columns:
+        return ""
+    best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
+    cells = [
+        [
+            parts.text(label),
+            *(
+                _metric(row.get(key), digits, None if kind == "reference" else best[key])
+                for key, _, digits, _ in columns
+            ),
+        ]
+        for label, row, kind in rows
+    ]
+    note = (
+        "Mean over the held-out frames. Baselines use training frames only. Best measured value of a column in colour; "
+        "published rows are quoted, not measured here."
+    )
+    table = parts.table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
+    return parts.section("Held-out frames against doing without a model", table, _absent_reasons(data), note=note)
+
+
+def _best(rows: list[tuple[str, dict[str, Any], str]], key: str, sign: int) -> float | None:
+    values = [row[key] for _, row, kind in rows if kind != "reference" and row.get(key) is not None]
+    return max(values, key=lambda v: sign * v) if len(values) > 1 else None
+
+
+def _metric(value: Any, digits: int, best: float | None) -> str:
+    shown = parts.number(value, digits)
+    return f'<span class="best">{shown}</span>' if value is not None and value == best else shown
+
+
+def _absent_reasons(data: ReportData) -> str:
+    reasons = []
+    if reason := data.evaluation.get("lpips_reason"):
+        reasons.append(f"LPIPS: {reason}")
+    if frames := left_out(data.evaluation):
+        reasons.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
+    if count := data.evaluation.get("not_finite"):
+        reasons.append(f"{count} value(s) were not finite numbers and are shown as a dash")
+    return f'<p class="note">{parts.text("; ".join(reasons))}.</p>' if reasons else ""
+
+
+def temporal_gap(data: ReportData) -> str:
+    """Training frames beside held-out frames, and the held-out frames one by one."""
+    held_out, training = _mean(data, "held_out"), _mean(data, "training")
+    table = ""
+    if held_out and training:
+        rows = []
+        for key, label, digits, _ in COLUMNS:
+            inside, outside = training.get(key), held_out.get(key)
+            if inside is None or outside is None:
+                continue
+            values = (inside, outside, inside - outside)
+            rows.append([parts.text(label), *(parts.number(value, digits) for value in values)])
+        table = parts.table(["Mean over frames", "Training", "Held-out", "Gap"], rows)
+    chart = curves.frame_chart(data.evaluation, "psnr_tissue")
+    pair = f'<div class="charts">{table}{_chart(chart)}</div>' if chart else table
+    note = (
+        "A model that reproduces its training frames better than the frames between them is limited by time, "
+        "not by capacity: the difference is the temporal gap."
+    )
+    return parts.section("Temporal gap", pair, note=note)
+
+
+def _chart(chart: curves.Chart) -> str:
+    light, dark = curves.chart_png(chart, "light"), curves.chart_png(chart, "dark")
+    caption = f"<figcaption>{parts.text(chart.title)}</figcaption>"
+    return f"<figure>{caption}{parts.themed_image(light, dark, chart.title)}</figure>"
+
+
+def training(data: ReportData) -> str:
+    """The curves of the log."""
+    found = curves.charts(data.log, data.evaluation)
+    figures_ = "".join(_chart(chart) for chart in found)
+    return parts.section("Training", f'<div class="charts">{figures_}</div>' if found else "")
+
+
+def pictures(data: ReportData) -> str:
+    """Render, truth, error and depth of every held-out frame, worst first."""
+    if not data.frames:
+        return ""
+    errors = [figures.tissue_error(f.render, f.truth, f.mask) for f in data.frames]
+    scale = figures.error_scale(errors)
+    order = sorted(range(len(errors)), key=lambda i: (-_squared(data.frames[i]), data.frames[i].index))
+    depths = [f for f in data.frames if f.depth is not None]
+    span = _depth_span(depths)
+    legend = [f"Error {parts.colour_bar(figures.ERROR_MAP, '0', f'{scale:g} or more')}"]
+    if depths:
+        bar = parts.colour_bar(figures.DEPTH_MAP, f"{span[0]:.4g}", f"{span[1]:.4g} {data.depth_unit}")
+        legend.append(f"Rendered depth {bar}")
+    note = (
+        "Worst first. Error: absolute difference, mean over the colour channels, in display units from 0 to 1; "
+        "the same scale in all frames. Grey: excluded or without depth. The frame marks the window with the largest "
+        "tissue error, shown 4× beside or below."
+    )
+    blocks = [_frame(data.frames[i], scale, span, position < OPENED_FRAMES) for position, i in enumerate(order)]
+    return parts.section(
+        "Pictures of the held-out frames", f'<div class="legend">{"".join(legend)}</div>', *blocks, note=note
+    )
+
+
+def _squared(frame: FramePictures) -> float:
+    """Mean squared tissue error: the order of the frames; a render that is not finite counts as the worst."""
+    error = np.where(frame.mask, np.clip(frame.render, 0, 1) - frame.truth, 0.0)
+    value = float(np.square(error, dtype=np.float64).sum() / max(3 * frame.mask.sum(), 1))
+    return value if np.isfinite(value) else np.inf
+
+
+def _depth_span(frames: list[FramePictures]) -> tuple[float, float]:
+    spans = [figures.depth_range(f.depth, f.mask) for f in frames if f.depth is not None]
+    return (min(s[0] for s in spans), max(s[1] for s in spans)) if spans else (0.0, 1.0)
+
+
+def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened: bool) -> str:
+    panels = figures.triptych(frame.render, frame.truth, frame.mask, scale)
+    views = [("Render", panels.render), ("Truth", panels.truth), ("Error", panels.error)]
+    if frame.depth is not None:
+        views.append(("Depth", figures.depth_picture(frame.depth, *span, mask=frame.mask)))
+    cells = []
+    for label, picture in views:
+        name = f"{label}, frame {frame.index}"
+        whole = parts.image(figures.framed(picture, panels), name)
+        inset = parts.image(panels.window(picture), f"{name}, enlarged", "inset")
+        cells.append(f"<div>{whole}<span>{label}</span></div><div>{inset}<span>4×</span></div>")
+    shown = [f"t = {frame.time:.3f}"]
+    for key, before, digits, after in (("psnr_tissue", "tissue", 2, " dB"), ("ssim_tissue", "SSIM", 4, "")):
+        if frame.metrics.get(key) is not None:
+            shown.append(f"{before} {parts.number(frame.metrics[key], digits)}{after}")
+    facts = " · ".join([*shown, parts.text(frame.name)])
+    summary = f"Frame {frame.index}<small>{facts}</small>"
+    return parts.details(summary, f'<div class="views">{"".join(cells)}</div>', opened)
+
+
+def components(data: ReportData) -> str:
+    """What each component contributed, as tables given with the data."""
+    blocks = []
+    for entry in data.components:
+        rows = [[_free_cell(value, column) for value, column in zip(row, entry.columns)] for row in entry.rows]
+        note = f'<p class="note">{parts.text(entry.note)}</p>' if entry.note else ""
+        blocks.append(f"<h3>{parts.text(entry.title)}</h3>{note}{parts.table(entry.columns, rows)}")
+    return parts.section("What each component contributed", *blocks)
+
+
+def _free_cell(value: Any, column: str) -> str:
+    return parts.number(value, 2) if isinstance(value, float) and "dB" in column else parts.cell(value)
+
+
+def the_run(data: ReportData) -> str:
+    """Facts, configuration, versions and input hashes."""
+    pairs = data.facts | (
+        {"Versions": ", ".join(f"{k} {v}" for k, v in data.versions.items())} if data.versions else {}
+    )
+    facts = "".join(f"<dt>{parts.text(k)}</dt><dd>{parts.cell(v)}</dd>" for k, v in pairs.items())
+    blocks = [f'<div class="panel"><dl>{facts}</dl></div>' if facts else ""]
+    if data.notes:
+        lines = "".join(f"<li>{parts.text(note)}</li>" for note in data.notes)
+        blocks.append(parts.details("What was assumed and found", f"<ul>{lines}</ul>"))
+    if data.configuration:
+        content = f'<div class="panel"><pre>{parts.text(data.configuration)}</pre></div>'
+        blocks.append(parts.details("Configuration (TOML)", content))
+    if data.input_hashes:
+        rows = [[parts.text(k), f"<code>{parts.text(v)}</code>"] for k, v in data.input_hashes.items()]
+        summary = f"Input files<small>{len(rows)}, SHA-256</small>"
+        blocks.append(parts.details(summary, parts.table(["File", "SHA-256"], rows)))
+    return parts.section("The run", *blocks)
+
+
+def footer(data: ReportData) -> str:
+    """What the numbers mean."""
+    return (
+        "<footer><p>PSNR and SSIM are computed frame by frame and averaged over frames. <em>Full</em>: all pixels, "
+        "excluded ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: the "
+        "render rounded to 256 levels first. LPIPS: AlexNet, version 0.1, on pictures with values in the interval "
+        "named, excluded pixels zero.</p></footer>"
+    )
+
+
+SECTIONS = (headline, held_out, temporal_gap, pictures, training, components, the_run, footer)

@@ -1,0 +1,1 @@
+"""Run folders: their files, the sequence and the model that they remember."""

@@ -1,0 +1,129 @@
+"""The run folder: everything that says what was run, on what, how it went and what came out.
+
+    config.toml      resolved settings; `load_config` reads back an equal Config
+    run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
+    sequence.json    cameras, times, names, split: what rendering needs when the pictures are elsewhere
+    log.jsonl        one line an iteration
+    checkpoint.npz   the latest checkpoint
+    metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
+
+A run folder appears complete under its name or not at all, files are replaced whole, and a log that is resumed
+is cut at the checkpoint. Knows file names and JSON; knows nothing of models or pictures.
+"""
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from endotsr.config import Config, config_to_toml, load_config
+from endotsr.errors import InputError
+from endotsr.runs.files import os_error_line, read_json, refuse_folder, replacing_folder, write_json
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A run folder that exists; see the module docstring for its files."""
+
+    path: Path
+
+    @property
+    def checkpoint(self) -> Path:
+        """The latest checkpoint."""
+        return self.path / "checkpoint.npz"
+
+    @property
+    def log(self) -> Path:
+        """One JSON object an iteration."""
+        return self.path / "log.jsonl"
+
+    def config(self) -> Config:
+        """The resolved settings of the run."""
+        return load_config(self.path / "config.toml")
+
+    def record(self, *needed: str) -> dict[str, Any]:
+        """run.json as it is now. Raises InputError if one of the `needed` keys (`input.source`) is not there."""
+        return read_json(self.path / "run.json", needed)
+
+    def sequence_record(self, *needed: str) -> dict[str, Any]:
+        """sequence.json. Raises InputError if one of the `needed` keys is not there."""
+        return read_json(self.path / "sequence.json", needed)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Inside, this process alone trains the run; the system lets go of the lock of a process that was killed.
+
+        Raises: InputError if another process holds it. Without effect where the system or the disk knows no locks.
+        """
+        with self.log.open("ab") as file:
+            _lock(file, self.path)
+            yield
+
+    def remove_leftovers(self) -> None:
+        """Temporary files of a process that was killed."""
+        for pattern in (".*.part", ".partial-*"):
+            for file in self.path.glob(pattern):
+                shutil.rmtree(file) if file.is_dir() else file.unlink(missing_ok=True)
+
+    def update(self, **entries: Any) -> None:
+        """Replace or add entries of run.json."""
+        write_json(self.path / "run.json", self.record() | entries)
+
+
+def _lock(file: IO[bytes], path: Path) -> None:
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{path}: another process trains this run; let it end, or stop it") from None
+    except OSError:
+        return
+
+
+def refuse_existing(path: Path) -> None:
+    """Raises InputError if a new folder cannot be made here: something exists, or its parent takes no folder."""
+    path = Path(path)
+    if (path / "run.json").exists():
+        raise InputError(
+            f"{path}: holds a run already; choose another --out, or continue it with "
+            f"`endotsr train --out {path} --resume`"
+        )
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already; choose another --out")
+    refuse_folder(path)
+
+
+def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:
+    """A new run folder, filled beside its final name and then renamed: it never exists half-written.
+
+    Raises:  InputError if `path` exists or the file system refuses (nothing stays behind).
+    """
+    path = Path(path)
+    refuse_existing(path)
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with replacing_folder(path) as folder:
+            (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
+            write_json(folder / "run.json", record)
+            write_json(folder / "sequence.json", sequence_record)
+            (folder / "log.jsonl").touch()
+    except OSError as error:
+        raise InputError(os_error_line(error, path)) from None
+    return RunFolder(path)
+
+
+def open_run(path: Path) -> RunFolder:
+    """An existing run folder. Raises InputError if there is none."""
+    path = Path(path)
+    if not path.is_dir():
+        raise InputError(f"{path}: run folder not found")
+    for name in ("config.toml", "run.json", "sequence.json"):
+        if not (path / name).is_file():
+            raise InputError(f"{path}: not a run folder: {name} is missing")
+    return RunFolder(path)

@@ -1,0 +1,101 @@
+"""From a run folder to a model that renders, or to a training that goes on.
+
+A checkpoint is read with the settings of config.toml. Should the two not be of one run (an edited file, a checkpoint
+copied in), the arrays would be read as something they are not, so every setting is compared first.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import msgspec
+
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.runs.folder import RunFolder
+
+if TYPE_CHECKING:
+    from endotsr.fitting.checkpoint import Checkpoint
+    from endotsr.scene.gaussians import Gaussians
+
+CHANGE_NO_NUMBER = {"training.threads", "training.checkpoint_every"}  # may differ from what the checkpoint remembers
+
+
+class Model(NamedTuple):
+    """What is needed to render."""
+
+    gaussians: "Gaussians"
+    spectral: Any  # frequencies, atom statistics and penalty weights of the training time stamps
+    config: Config
+    iteration: int
+
+
+def load_model(folder: RunFolder) -> Model:
+    """The model of the latest checkpoint. Raises InputError if there is none, it is damaged or of other settings."""
+    import numpy as np
+
+    from endotsr.fitting.model import spectral_from
+
+    if not folder.checkpoint.exists():
+        raise InputError(
+            f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --out {folder.path} --resume`"
+        )
+    config, record = folder.config(), folder.sequence_record("times", "train_index")
+    checkpoint = _checkpoint_of(folder, config)
+    times = np.array(record["times"])[record["train_index"]]
+    spectral = spectral_from(config.model, times)
+    return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration)
+
+
+def save_training(folder: RunFolder, state: Any, config: Config) -> None:
+    """Put the state of a training in place of the last checkpoint."""
+    from endotsr.fitting.trainer import save_state
+
+    save_state(folder.checkpoint, state, config)
+
+
+def load_training(folder: RunFolder, config: Config) -> Any:
+    """The training at its last checkpoint. Raises InputError if it is damaged or of other settings."""
+    from endotsr.fitting.trainer import state_from_checkpoint
+
+    return state_from_checkpoint(_checkpoint_of(folder, config), config)
+
+
+def _checkpoint_of(folder: RunFolder, config: Config) -> "Checkpoint":
+    """The checkpoint, which must be of a training with these settings."""
+    from endotsr.fitting.checkpoint import load_checkpoint
+
+    checkpoint = load_checkpoint(folder.checkpoint)
+    asked = dict(_named(msgspec.json.decode(msgspec.json.encode(config))))  # as JSON, which the checkpoint holds
+    for key, value in (*_named(checkpoint.header.get("config")), *_seen_in_arrays(checkpoint, config)):
+        if key in asked and key not in CHANGE_NO_NUMBER and asked[key] != value:
+            raise InputError(
+                f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} says "
+                f"{asked[key]!r}; allowed: checkpoint and settings of one run, as it wrote them"
+            )
+    return checkpoint
+
+
+def _named(settings: Any) -> Iterator[tuple[str, Any]]:
+    """`section.key` and value of every setting; none where there are no sections."""
+    for section, values in settings.items() if isinstance(settings, dict) else ():
+        for key, value in values.items() if isinstance(values, dict) else ():
+            yield f"{section}.{key}", value
+
+
+def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[str, Any]]:
+    """The settings that show in the arrays themselves."""
+    from endotsr.fitting.schedules import residuals_active
+
+    gaussians, born = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
+    yield "training.precision", gaussians.position.dtype.name
+    yield "model.harmonics_degree", math.isqrt(len(gaussians.harmonics)) - 1
+    yield "model.deformation", gaussians.fdm_weight is not None
+    if gaussians.fdm_weight is not None:
+        yield "model.bases", gaussians.fdm_weight.shape[1]
+    residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}
+    for name, coefficients in residuals.items():
+        if born or coefficients is not None:  # before their birth they are missing in any model
+            yield f"model.{name}", coefficients is not None
+        if coefficients is not None:
+            yield "model.frequencies", coefficients.shape[1] // 2

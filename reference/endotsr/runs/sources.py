@@ -1,0 +1,128 @@
+"""Where a sequence comes from: a folder, or `simulated`; and what a run folder remembers of it."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from endotsr.config import Config, checked
+from endotsr.errors import InputError
+from endotsr.runs.folder import RunFolder
+from endotsr.sequences.sequence import Sequence
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.splatting.camera import Camera
+
+SIMULATED = "simulated"  # the word that stands for the embedded sequence; a folder of that name is `./simulated`
+ARRAYS = ("images", "masks", "depth", "times")
+
+
+def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> Sequence:
+    """The whole sequence in memory, fully checked. Raises InputError for anything that cannot be used."""
+    if source == SIMULATED:
+        from endotsr.simulator.simulate import simulate
+
+        return simulate(simulated_settings(simulator, config)).sequence
+    from endotsr.sequences.endonerf import read_endonerf
+
+    return read_endonerf(Path(source), config.sequence, config.raster.near)
+
+
+def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:
+    """The simulator's settings with what the sequence settings say about scale and split."""
+    wanted = config.sequence
+    if wanted.frames:
+        raise InputError("simulated: --frames selects files of a folder; here --simulator.frames N says how many")
+    changes = {
+        "width": round(simulator.width * wanted.scale),
+        "height": round(simulator.height * wanted.scale),
+        "block_length": wanted.block_length if wanted.split == "blocks" else simulator.block_length,
+    }
+    return checked(msgspec.to_builtins(simulator) | changes, SimulatorSettings, "command line", "simulator.")
+
+
+def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> dict[str, Any]:
+    """What was read, for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
+    import numpy as np
+
+    digests = {name: _digest(getattr(sequence, name)) for name in ARRAYS}
+    poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
+    digests["cameras"] = _digest(poses)
+    record = {
+        "source": source if source == SIMULATED else str(Path(source).resolve()),
+        "frames": sequence.count,
+        "width": sequence.width,
+        "height": sequence.height,
+        "training_frames": len(sequence.train_index),
+        "held_out_frames": len(sequence.test_index),
+        "tissue_fraction": sequence.tissue_fraction,
+        "static_camera": sequence.static_camera,
+        "notes": list(sequence.notes),
+        "arrays_sha256": digests,
+    }
+    if source == SIMULATED:
+        record["simulator"] = msgspec.to_builtins(simulator)
+    else:
+        from endotsr.sequences.endonerf import input_hashes
+
+        record["files_sha256"] = input_hashes(Path(source), config.sequence)
+    return record
+
+
+def _digest(array) -> str:
+    return hashlib.sha256(array.tobytes()).hexdigest()
+
+
+def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
+    """Raises InputError if this is not the sequence that the run was started on."""
+    remembered = run.record().get("input", {}).get("arrays_sha256", {})
+    for name in ARRAYS:
+        if remembered.get(name) != _digest(getattr(sequence, name)):
+            raise InputError(
+                f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
+                "a run continues on the input it began with"
+            )
+
+
+def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
+    """Where the sequence of a run was, and how it was simulated. Raises InputError if run.json does not say."""
+    record = folder.record("input.source", "input.arrays_sha256")["input"]
+    where = str(folder.path / "run.json")
+    simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
+    return str(record["source"]), simulator
+
+
+def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
+    """The sequence that a run was trained on, from where it was or from `source`; it must be the same."""
+    remembered, simulator = run_source(folder)
+    source = source or remembered
+    sequence = load_sequence(source, folder.config(), simulator)
+    check_same_input(folder, sequence, source)
+    return sequence
+
+
+def sequence_record(sequence: Sequence) -> dict[str, Any]:
+    """Cameras, times, names and split, for sequence.json."""
+    cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras
+    return {
+        "unit": sequence.unit,
+        "near": sequence.near,
+        "largest_depth": float(sequence.depth.max()),
+        "static_camera": sequence.static_camera,
+        "names": sequence.names,
+        "times": sequence.times,
+        "train_index": sequence.train_index,
+        "test_index": sequence.test_index,
+        "cameras": [camera._asdict() for camera in cameras],
+    }
+
+
+def remembered_cameras(record: dict[str, Any]) -> list[Camera]:
+    """The cameras of sequence.json, one a frame."""
+    import numpy as np
+
+    cameras = [
+        Camera(**(entry | {name: np.array(entry[name]) for name in ("rotation", "translation")}))
+        for entry in record["cameras"]
+    ]
+    return cameras * len(record["names"]) if record["static_camera"] else cameras

@@ -1,0 +1,1 @@
+"""The fast path of compositing: the sums of `splatting.compositing`, many pixels at a time."""

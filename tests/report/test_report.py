@@ -1,0 +1,196 @@
+"""The report: complete, self-contained, safe against odd text, written whole or not at all."""
+
+import base64
+import io
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from endotsr.report.page import FramePictures, FreeTable, ReportData, report_html, write_report
+
+VOID = {"meta", "img", "source", "br"}
+
+
+class Reader(HTMLParser):
+    """Checks that tags close in order; collects tags, attributes and cell texts."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.tags, self.attributes, self.words = [], [], [], []
+        self.feed(page)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if data.strip() and "style" not in self.open:
+            self.words.append(data.strip())
+
+
+def without_pictures(page):
+    return re.sub(r"base64,[A-Za-z0-9+/=]+", "", page)
+
+
+def metrics(value):
+    return {"psnr_full": value + 1.8, "psnr_tissue": value, "ssim_full": 0.9671, "lpips": None}
+
+
+def made_up_data(**changes):
+    rng = np.random.default_rng(0)
+    mask = np.ones((24, 32), bool)
+    mask[:, :4] = False
+    frames = []
+    for index, error in ((1, 0.01), (9, 0.1), (17, 0.05), (25, 0.02)):
+        truth = rng.uniform(0.3, 0.6, (3, 24, 32))
+        depth = rng.uniform(40, 90, (24, 32))
+        frames.append(FramePictures(index, f"f{index}.png", index / 63, truth + error, truth, mask, depth, metrics(30)))
+    rows = [{"frame": f.index, **metrics(30 + f.index / 10)} for f in frames]
+    baselines = {
+        "two_neighbours": {"label": "Blend of two", "mean": metrics(31.0), "per_frame": rows},
+        "temporal_mean": {"label": "Temporal mean", "mean": metrics(20.0), "per_frame": rows},
+    }
+    evaluation = {
+        "held_out": {"mean": metrics(30.25), "per_frame": rows},
+        "training": {"mean": metrics(35.25)},
+        "baselines": baselines,
+        "lpips_reason": "no weights file was given",
+        "not_finite": 2,
+    }
+    values = {
+        "title": "made up",
+        "evaluation": evaluation,
+        "log": [{"iteration": k, "loss": 1 / k, "psnr": 20.0 + k, "gaussians": 1234 + k} for k in range(1, 9)],
+        "frames": tuple(frames),
+        "reference_rows": ({"label": "As published", "psnr_full": 39.34, "ssim_full": 0.967, "lpips": 0.035},),
+        "components": (FreeTable("Switched off", ("Variant", "PSNR, dB"), (("without A", 29.5), ("without S", None))),),
+        "facts": {"Seed": 0, "Machine": "two cores"},
+        "configuration": 'preset = "paper"\n',
+        "versions": {"numpy": "2.1"},
+        "input_hashes": {"images/a.png": "ab" * 32},
+    }
+    return ReportData(**(values | changes))
+
+
+@pytest.fixture(scope="module")
+def page():
+    return report_html(made_up_data())
+
+
+def test_page_needs_nothing_but_itself(page):
+    assert "http" not in without_pictures(page) and "//" not in without_pictures(page)
+    reader = Reader(page)
+    assert not {"script", "link", "iframe", "object"} & set(reader.tags)
+    for name, value in reader.attributes:
+        if name in ("src", "srcset", "href"):
+            assert value.startswith("data:image/")
+    assert "url(" not in page and "@import" not in page
+
+
+def test_every_embedded_picture_can_be_decoded(page):
+    found = re.findall(r"data:image/(\w+);base64,([A-Za-z0-9+/=]+)", page)
+    assert len(found) >= 4 * 4 * 2 + 2 * 4
+    for kind, content in found:
+        picture = Image.open(io.BytesIO(base64.b64decode(content, validate=True)))
+        picture.load()
+        assert picture.format == kind.upper()
+        assert b"http" not in base64.b64decode(content)  # writers like to sign their files with an address
+
+
+def test_tables_hold_the_numbers(page):
+    words = " ".join(Reader(page).words)
+    for word in ("This model", "Blend of two", "Temporal mean", "As published", "39.34", "30.25", "32.05", "0.9671"):
+        assert word in words, word
+    for word in ("without A", "29.50", "Seed", "two cores", 'preset = "paper"', "ab" * 32, "numpy 2.1"):
+        assert word in words, word
+    assert page.count("<table") == 4
+
+
+def test_temporal_gap_is_training_minus_held_out(page):
+    words = Reader(page).words
+    at = words.index("Temporal gap")
+    row = words[words.index("PSNR tissue, dB", at) :][:4]
+    assert row[1:] == ["35.25", "30.25", "5.00"]
+
+
+def test_verdict_names_the_strongest_baseline(page):
+    assert "0.75 dB below" in page and "blend of two" in page and "above 1 of 2 baselines" in page
+
+
+def test_no_verdict_against_a_baseline_without_a_value():
+    """Infinite PSNR (a still scene) is no value: saying "above the strongest" would be false."""
+    data = made_up_data()
+    data.evaluation["baselines"]["temporal_mean"]["mean"]["psnr_tissue"] = None
+    assert "the model is" not in report_html(data)
+
+
+def test_frames_come_worst_first(page):
+    assert re.findall(r"<summary>Frame (\d+)", page) == ["9", "17", "25", "1"]
+    assert page.count("<details open>") == 3
+
+
+def test_a_render_that_is_not_finite_is_the_worst_frame():
+    data = made_up_data()
+    data.frames[0].render[0, 5, 9] = np.nan
+    page = report_html(data)
+    assert re.findall(r"<summary>Frame (\d+)", page)[0] == "1"
+    assert "nan" not in " ".join(Reader(page).words).lower()
+
+
+def test_absent_values_are_a_dash_with_a_reason(page):
+    assert "no weights file was given" in page and "2 value(s) were not finite" in page
+    assert not re.search(r"\b(nan|inf|None)\b", " ".join(Reader(page).words))
+
+
+def test_a_frame_without_tissue_is_named():
+    rows = [{"frame": 3, "name": "right", "psnr_tissue": 30.0}, {"frame": 5, "name": "covered", "psnr_tissue": None}]
+    evaluation = {"held_out": {"mean": {"psnr_tissue": 30.0}, "per_frame": rows}, "baselines": {}}
+    page = report_html(ReportData(title="x", evaluation=evaluation))
+    assert "left out of the means of the tissue, without a finite value there: covered." in page
+
+
+def test_text_cannot_break_the_page():
+    evil = '<script>alert("x")</script>&"\''
+    page = report_html(
+        made_up_data(
+            title=evil,
+            facts={evil: evil},
+            configuration=evil,
+            notes=(evil,),
+            input_hashes={evil: evil},
+            components=(FreeTable(evil, (evil, evil), ((evil, evil),), evil),),
+            reference_rows=({"label": evil, "psnr_full": 1.0},),
+            depth_unit=evil,
+        )
+    )
+    assert "script" not in Reader(page).tags
+
+
+@pytest.mark.parametrize("data", [ReportData("bare"), made_up_data(evaluation={}), made_up_data(log=[], frames=())])
+def test_missing_parts_are_left_out(data):
+    reader = Reader(report_html(data))
+    assert data.title in reader.words
+
+
+def test_writing_replaces_the_old_page_whole(tmp_path, monkeypatch):
+    path = tmp_path / "report.html"
+    write_report(path, ReportData("first"))
+    assert "first" in path.read_text(encoding="utf-8")
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_report(path, ReportData("second"))
+    assert "first" in path.read_text(encoding="utf-8")
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
