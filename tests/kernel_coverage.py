@@ -20,7 +20,7 @@ PACKAGE = ROOT / "reference" / "endotsr"
 ROOMS = ("equations", "splatting", "losses", "scene", "fitting")
 SELECTION = [
     "tests/hard/test_kinks.py", "tests/hard/test_platform.py", "tests/properties", "tests/equations", "tests/losses",
-    "tests/scene", "tests/fitting/test_adam.py", "tests/fitting/test_optimise.py",
+    "tests/scene", "tests/fitting/test_adam.py", "tests/fitting/test_fused_step.py",
     "tests/splatting/test_compositing.py", "tests/splatting/test_harmonics.py", "tests/splatting/test_projection.py",
     "tests/splatting/test_render.py::test_gradients_that_nobody_asks_for_are_not_made",
 ]  # fmt: skip

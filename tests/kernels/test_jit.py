@@ -13,7 +13,7 @@ import endotsr
 from endotsr.kernels.jit import kernel_sources
 
 PACKAGE = Path(endotsr.__file__).parent
-COMPILES = re.compile(r"^from endotsr\.jit import .*\bjit|^from numba\.extending|njit", re.MULTILINE)
+COMPILES = re.compile(r"^from endotsr\.kernels\.jit import .*\bjit|^from numba\.extending|njit", re.MULTILINE)
 PROGRAM = """
 import numpy as np
 from endotsr.equations.deformation import deformation_forward
@@ -45,7 +45,7 @@ def test_an_edit_of_a_file_that_a_kernel_inlines_is_never_stale(tmp_path):
     before = answer(tmp_path)
     assert before == answer(tmp_path)  # from the kept kernel
     kept = set((tmp_path / "cache").rglob("*.nbi"))
-    file = tmp_path / "endotsr" / "splatting" / "exponential.py"
+    file = tmp_path / "endotsr" / "kernels" / "exponential.py"
     text = file.read_text(encoding="utf-8")
     assert text.count("+ np.float64(1)\n") == 1
     file.write_text(text.replace("+ np.float64(1)\n", "+ np.float64(3)\n"), encoding="utf-8")

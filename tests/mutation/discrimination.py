@@ -40,6 +40,7 @@ from mutation.registry import DEFECT, defect_mutants  # noqa: E402
 from mutation.survey import Checks  # noqa: E402
 
 FOLDERS = (
+    "kernels/test_exponential.py",
     "equations",
     "splatting",
     "losses",
@@ -47,8 +48,8 @@ FOLDERS = (
     "fitting",
     "hard",
     "properties",
-    "checking/test_ranges.py",
-    "checking/pieces_without_compiler.py",
+    "checker/test_ranges.py",
+    "checker/pieces_without_compiler.py",
 )
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
 LATER = 30.0  # s of further checks for a mutant that no suite has noticed and that is not listed as equivalent
