@@ -1,0 +1,134 @@
+"""The shape of the package, read from its sources: python tests/house.py [FOLDER OF ANOTHER CHECKOUT]
+
+Prints the lines of the method and of the instruments around it, modules at the root, long functions and signatures,
+and every import that runs up or round in a circle. `test_layout.py` asserts what must stay true.
+"""
+
+import ast
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+# From the ground up. A module imports its own room and the rooms before it, nothing else.
+ROOMS = (
+    "errors", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene", "fitting",
+    "simulator", "runs", "evaluation", "report", "stages", "gradcheck", "golden", "bench", "tradeoff", "api", "cli",
+    "__main__",
+)  # fmt: skip
+METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")
+LONGEST_FUNCTION = 40  # lines
+MOST_ARGUMENTS = 12
+
+
+class Function(NamedTuple):
+    """A function of the package."""
+
+    name: str  # dotted, below the package
+    lines: int
+    arguments: int
+
+
+@cache
+def modules(root: Path = ROOT) -> dict[str, ast.Module]:
+    """Syntax trees by dotted name below the package; `""` is the package itself."""
+    package = root / "reference" / "endotsr"
+    found = {}
+    for file in sorted(package.rglob("*.py")):
+        parts = file.relative_to(package).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(file.read_text(encoding="utf-8"))
+    return found
+
+
+@cache
+def imports(root: Path = ROOT) -> frozenset[tuple[str, str]]:
+    """(module, module that it imports), imports inside functions included."""
+    known, found = modules(root), set()
+    for name, tree in known.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "endotsr":
+                base = (node.module or "").removeprefix("endotsr").lstrip(".")
+                for alias in node.names:
+                    inner = f"{base}.{alias.name}".lstrip(".")
+                    found.add((name, inner if inner in known else base))
+            elif isinstance(node, ast.Import):
+                for alias in node.names:
+                    if alias.name.split(".")[0] == "endotsr":
+                        found.add((name, alias.name.removeprefix("endotsr").lstrip(".")))
+    return frozenset(found)
+
+
+def room(module: str) -> str:
+    """The first part of a dotted name."""
+    return module.split(".")[0]
+
+
+def upward(root: Path = ROOT) -> list[str]:
+    """Imports that run up; those of the package's own face (version, docstring) are none."""
+    rank = {name: k for k, name in enumerate(ROOMS)}
+    pairs = [(a, b) for a, b in imports(root) if a and b]
+    return sorted(f"{a} -> {b}" for a, b in pairs if rank.get(room(b), -1) > rank.get(room(a), len(rank)))
+
+
+def circles(root: Path = ROOT) -> list[list[str]]:
+    """Groups of modules that import one another, directly or through others."""
+    below: dict[str, set[str]] = {}
+    for a, b in imports(root):
+        if a and b:
+            below.setdefault(a, set()).add(b)
+
+    def reached(start: str) -> set[str]:
+        seen, todo = set(), [start]
+        while todo:
+            for other in below.get(todo.pop(), set()) - seen:
+                seen.add(other)
+                todo.append(other)
+        return seen
+
+    reach = {name: reached(name) for name in below}
+    groups = {tuple(sorted(b for b in reach[a] if a in reach.get(b, set()))) for a in below if a in reach[a]}
+    return [list(group) for group in sorted(groups)]
+
+
+def functions(root: Path = ROOT) -> Iterator[Function]:
+    """Every function, methods and inner ones included; the docstring does not count as length."""
+    for name, tree in modules(root).items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                a = node.args
+                count = len(a.posonlyargs) + len(a.args) + len(a.kwonlyargs)
+                first = node.body[1] if ast.get_docstring(node) and len(node.body) > 1 else node.body[0]
+                lines = (node.end_lineno or node.lineno) - first.lineno + 1
+                yield Function(f"{name}.{node.name}", lines, count)
+
+
+def lines_of(root: Path = ROOT) -> dict[str, int]:
+    """Lines of every room."""
+    package, found = root / "reference" / "endotsr", {}
+    for file in package.rglob("*.py"):
+        first = file.relative_to(package).parts[0].removesuffix(".py")
+        found[first] = found.get(first, 0) + len(file.read_text(encoding="utf-8").splitlines())
+    return found
+
+
+def main(root: Path) -> None:
+    """Print the measures."""
+    lines, found = lines_of(root), list(functions(root))
+    method = sum(lines.get(name, 0) for name in METHOD)
+    print(f"lines: {sum(lines.values())}, of the method ({', '.join(METHOD)}): {method}")
+    print("modules at the root:", sum(1 for file in (root / "reference" / "endotsr").glob("*.py")))
+    widest, long = max(found, key=lambda f: f.arguments), [f for f in found if f.lines > LONGEST_FUNCTION]
+    print(f"most arguments: {widest.arguments} ({widest.name}); functions above {LONGEST_FUNCTION} lines: {len(long)}")
+    for f in sorted(long, key=lambda f: -f.lines):
+        print(f"    {f.lines:4d} {f.name}")
+    wide = [f for f in found if f.arguments > MOST_ARGUMENTS]
+    print(f"functions with more than {MOST_ARGUMENTS} arguments: {len(wide)}")
+    up, round_ = upward(root), circles(root)
+    print("imports that run up:", len(up), *up, sep="\n    ")
+    print("circles:", len(round_), *round_, sep="\n    ")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT)

@@ -1,0 +1,48 @@
+"""The layout is a program: imports run down, never round, and every room is on the list."""
+
+import pytest
+
+import house
+
+
+def test_every_room_is_on_the_list():
+    rooms = {house.room(name) for name in house.modules() if name}
+    assert rooms <= set(house.ROOMS), "a new room needs its place in tests/house.py"
+
+
+def test_imports_run_down_only():
+    assert house.upward() == []
+
+
+def test_no_modules_import_one_another():
+    assert house.circles() == []
+
+
+def test_equations_know_nothing_but_kernels():
+    assert {house.room(b) for a, b in house.imports() if house.room(a) == "equations"} <= {
+        "equations",
+        "kernels",
+        "errors",
+    }
+
+
+def test_the_trainer_knows_no_file_format():
+    known = {"sequences.sequence", "sequences.splits"}
+    assert {b for a, b in house.imports() if house.room(a) == "fitting" and house.room(b) == "sequences"} <= known
+
+
+@pytest.mark.parametrize("name", ["scene", "splatting", "losses", "equations"])
+def test_what_is_fitted_does_not_know_the_optimiser(name):
+    assert not [b for a, b in house.imports() if house.room(a) == name and house.room(b) == "fitting"]
+
+
+def test_an_import_that_runs_up_is_seen(tmp_path):
+    package = tmp_path / "reference" / "endotsr"
+    for name, text in (
+        ("kernels/jit.py", "from endotsr.scene import gaussians\n"),
+        ("scene/gaussians.py", "import endotsr.kernels.jit\n"),
+    ):
+        (package / name).parent.mkdir(parents=True)
+        (package / name).write_text(text)
+    assert house.upward(tmp_path) == ["kernels.jit -> scene.gaussians"]
+    assert house.circles(tmp_path) == [["kernels.jit", "scene.gaussians"]]
