@@ -119,24 +119,66 @@ def canny_edges(depth: Array) -> NDArray[np.bool_]:
     return _cv2().Canny(np.ascontiguousarray(eight_bit), CANNY_LOW, CANNY_HIGH) > 0
 
 
-def dis_flow(source: Array, target: Array) -> NDArray[np.float32]:
-    """Dense inverse-search optical flow (DIS, medium preset) from one grey picture to another.
+FLOW_METHODS = {
+    "dis": lambda cv2: cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM),
+    "farneback": lambda cv2: cv2.FarnebackOpticalFlow_create(),
+    "deepflow": lambda cv2: cv2.optflow.createOptFlow_DeepFlow(),
+    "tvl1": lambda cv2: cv2.optflow.DualTVL1OpticalFlow_create(),
+    "rlof": lambda cv2: cv2.optflow.createOptFlow_DenseRLOF(),
+}
+"""Dense optical flow by name -> maker of the method, given the module `cv2`. `rlof` reads colour, the others grey."""
+
+
+def dense_flow(source: Array, target: Array, method: str = "dis") -> NDArray[np.float32]:
+    """Dense optical flow from one picture to another.
 
     source, target  (H, W) uint8, or (3, H, W) uint8 planar RGB, reduced to grey by their mean
+    method          a key of `FLOW_METHODS`; `dis` is dense inverse search, medium preset
     returns         (2, H, W) float32 pixels: source[y, x] is found at target[y + flow[1], x + flow[0]]
 
-    Pictures too small for the coarsest level of the method (a side under 16 pixels) give zero flow.
+    Edges:   pictures too small for the coarsest level of the methods (a side under 16 pixels) give zero flow.
+    Raises:  ValueError for an unknown method, or for arrays that are not two uint8 pictures of one size.
+    """
+    if method not in FLOW_METHODS:
+        raise ValueError(f"dense_flow: method {method!r} is not allowed; allowed: {', '.join(FLOW_METHODS)}")
+    cv2 = _cv2()
+    if source.shape != target.shape or source.dtype != np.uint8 or target.dtype != np.uint8:
+        raise ValueError(f"dense_flow: two uint8 pictures of one size expected, got {source.shape} and {target.shape}")
+    if min(source.shape[-2:]) < 16:
+        return np.zeros((2, *source.shape[-2:]), np.float32)
+
+    def prepared(picture: Array) -> Array:
+        if method == "rlof":
+            colour = np.broadcast_to(picture, (3, *picture.shape[-2:]))
+            return np.ascontiguousarray(colour[::-1].transpose(1, 2, 0))
+        grey = picture if picture.ndim == 2 else picture.mean(axis=0).round().astype(np.uint8)
+        return np.ascontiguousarray(grey)
+
+    flow = FLOW_METHODS[method](cv2).calc(prepared(source), prepared(target), None)
+    return np.ascontiguousarray(flow.transpose(2, 0, 1), np.float32)
+
+
+def dis_flow(source: Array, target: Array) -> NDArray[np.float32]:
+    """`dense_flow` by dense inverse search: the flow of the interpolation baseline."""
+    return dense_flow(source, target, "dis")
+
+
+def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:
+    """As `warp_bilinear`, by bicubic interpolation; for pictures, whose finest detail a bilinear warp would blur.
+
+    image    (H, W) or (C, H, W) float32
+    flow     (2, H, W) pixels, x first
+    returns  float32 of the same shape; values may overshoot the range of the image
+
+    OpenCV interpolates from a table of 1/32 pixel, which is finer than any flow is exact.
     """
     cv2 = _cv2()
-    grey = [
-        np.ascontiguousarray(a if a.ndim == 2 else a.mean(axis=0).round().astype(np.uint8)) for a in (source, target)
-    ]
-    if grey[0].shape != grey[1].shape or grey[0].dtype != np.uint8:
-        raise ValueError(f"dis_flow: two uint8 pictures of one size expected, got {grey[0].shape} and {grey[1].shape}")
-    if min(grey[0].shape) < 16:
-        return np.zeros((2, *grey[0].shape), np.float32)
-    method = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    return np.ascontiguousarray(method.calc(grey[0], grey[1], None).transpose(2, 0, 1))
+    height, width = image.shape[-2:]
+    x = (np.arange(width, dtype=np.float32)[None, :] + flow[0]).astype(np.float32)
+    y = (np.arange(height, dtype=np.float32)[:, None] + flow[1]).astype(np.float32)
+    planes = image.reshape(-1, height, width)
+    found = [cv2.remap(np.ascontiguousarray(p), x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE) for p in planes]
+    return np.stack(found).reshape(image.shape)
 
 
 def warp_bilinear(image: Array, flow: Array) -> Array:
