@@ -94,6 +94,11 @@ def keep(results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> N
         results[k * GROUP + item] = value
 
 
+def kept(results: NDArray[np.floating], size: int, item: int) -> tuple[Any, ...]:
+    """What `keep` has put there: `size` numbers, in compiled code a named constant of the module."""
+    return tuple(results[k * GROUP + item] for k in range(size))
+
+
 def keep_where(valid: Any, results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> None:
     """As `keep`; zeros where not `valid`, whatever the values are. A select and no branch: the loop stays vector code."""
     keep(results, item, values if valid else (results.dtype.type(0),) * len(values))
@@ -183,6 +188,20 @@ def _column(typing: Any, table: Any, size: Any, item: Any) -> Any:
     return types.UniTuple(table.dtype, size.literal_value)(table, size, types.intp), generate
 
 
+@_instructions(prefer_literal=True)
+def _kept(typing: Any, results: Any, size: Any, item: Any) -> Any:
+    if not isinstance(size, types.IntegerLiteral):
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data, item = make_array(results)(context, builder, arguments[0]).data, arguments[2]
+        steps = [ir.Constant(item.type, k * GROUP) for k in range(size.literal_value)]
+        places = [builder.gep(data, [builder.add(item, step, flags=["nsw"])]) for step in steps]
+        return context.make_tuple(builder, signature.return_type, [builder.load(place) for place in places])
+
+    return types.UniTuple(results.dtype, size.literal_value)(results, size, types.intp), generate
+
+
 @_instructions
 def _keep_where(typing: Any, valid: Any, results: Any, item: Any, values: Any) -> Any:
     """One store a number; `valid` is a bit."""
@@ -258,6 +277,11 @@ def _compile_column(table, size, item):
 @_compiled(keep)
 def _compile_keep(results, item, values):
     return lambda results, item, values: _keep_where(True, results, item, values)
+
+
+@_compiled(kept, prefer_literal=True)
+def _compile_kept(results, size, item):
+    return lambda results, size, item: _kept(results, size, item)
 
 
 @_compiled(keep_where)
