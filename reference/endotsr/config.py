@@ -8,7 +8,7 @@ import math
 import re
 import tomllib
 from pathlib import Path
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
@@ -350,7 +350,7 @@ def allowed_values(kind: Any) -> str:
     if origin is Literal:
         return ", ".join(map(str, arguments))
     if origin in (Union, UnionType):
-        return " or ".join(map(allowed_values, arguments))
+        return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
     if origin is tuple:
         return f"{len(arguments)} values, each {allowed_values(arguments[0])}"
     if origin is Annotated:
@@ -359,7 +359,7 @@ def allowed_values(kind: Any) -> str:
         return f"{allowed_values(arguments[0])} {words}"
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         return "a section of settings"
-    return {bool: "true, false", int: "an integer", float: "a number", str: "text"}[kind]
+    return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
 
 
 def _refuse_contradictions(config: Config, where: str) -> None:

@@ -13,7 +13,7 @@ from endotsr.cli.parts.bench_options import (
     StagesOptions,
     StartOptions,
 )
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import duration
 from endotsr.runs.files import replace_file, replacing_folder, write_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -34,13 +33,13 @@ TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
 class EvaluateOptions:
     """Measure a run on its held-out frames: metrics.json, renders/, curves.png and report.html in the run folder."""
 
-    run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
+    run: Annotated[Path, Option("RUN", positional=True)]
     """run folder"""
-    sequence: Annotated[str | None, tyro.conf.arg(metavar="SEQUENCE")] = None
+    sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """where the sequence of the run is now (default: where it was)"""
-    lpips: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
-    paper_row: Annotated[Literal["pulling"] | None, tyro.conf.arg(metavar="{pulling}")] = None
+    paper_row: Literal["pulling"] | None = None
     """also show the published figures of this clip"""
     threads: int = 0
     """threads, 0 = all cores"""

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 
-Outdir = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUTDIR")]
+Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
 
 
@@ -22,11 +21,11 @@ class _Reported:
     """precision that the port claims"""
     level: Level = 5
     """highest level that is asked for; exit code 0 if it is complete"""
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    json: Annotated[Path | None, Option("FILE")] = None
     """also write the report as JSON"""
-    html: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    html: Annotated[Path | None, Option("FILE")] = None
     """also write the report as one HTML page with difference images"""
 
 
@@ -35,7 +34,7 @@ class JudgeOptions(_Reported):
     """Judge a folder of outputs OUTDIR/<family>/<case>/<name>.npy; exit code 1 if the level is not complete."""
 
     outdir: Outdir = Path()
-    again: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    again: Annotated[Path | None, Option("DIR")] = None
     """outputs of a second run: level 5 asks for the same bits"""
 
 
@@ -47,7 +46,7 @@ class RunOptions(_Reported):
     """the command, with {requests} and {outputs} where the folders go; called without a shell"""
     timeout: float = 600.0
     """seconds allowed for one call"""
-    keep: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    keep: Annotated[Path | None, Option("DIR")] = None
     """keep requests and outputs in this folder, in place of those of an earlier run"""
 
 
@@ -55,7 +54,7 @@ class RunOptions(_Reported):
 class GenerateOptions:
     """Compute all cases anew and compare with the folder; exit code 1 if anything differs."""
 
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
     within_tolerance: bool = False
     """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
@@ -70,9 +69,9 @@ class ReferenceOptions:
     outdir: Outdir
     precision: Literal["float32", "float64"] = "float32"
     """precision of the arithmetic; with --requests, what the requests say"""
-    requests: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    requests: Annotated[Path | None, Option("DIR")] = None
     """answer this folder of requests"""
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
 
 
@@ -80,9 +79,9 @@ class ReferenceOptions:
 class NegativeOptions:
     """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
 
-    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[FLAG]")] = ""
+    name: Annotated[str, Option("[FLAG]", positional=True)] = ""
     outdir: Outdir = Path()
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
 
 

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import replacing_folder, write_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -20,17 +19,17 @@ class RenderOptions:
     holds colour/, depth/, opacity/ and render.json (time, camera frame and file of every picture, depth scale).
     """
 
-    run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
+    run: Annotated[Path, Option("RUN", positional=True)]
     """run folder"""
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
+    out: Annotated[Path, Option("DIR")]
     """folder to create"""
-    times: Annotated[tuple[float, ...], tyro.conf.arg(metavar="T [T ...]")] = ()
+    times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
-    frames: Annotated[Literal["test", "train", "all"] | None, tyro.conf.arg(metavar="{test,train,all}")] = None
+    frames: Literal["test", "train", "all"] | None = None
     """the frames of the sequence instead of --times (default: test)"""
-    count: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    count: Annotated[int | None, Option("N")] = None
     """N times evenly spaced over [0, 1], instead of --times: a film with in-between times"""
-    camera: Annotated[int | None, tyro.conf.arg(metavar="FRAME")] = None
+    camera: Annotated[int | None, Option("FRAME")] = None
     """always look from the camera of this frame"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder, write_json
 
@@ -26,15 +25,15 @@ class TradeoffOptions:
     training; see its --help. With --budget, the answer comes from the measurement in --out, which is made if missing.
     """
 
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("tradeoff")
+    out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
-    run: Annotated[Path | None, tyro.conf.arg(metavar="RUN")] = None
+    run: Annotated[Path | None, Option("RUN")] = None
     """run folder to take the scene from"""
-    splats: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    splats: Annotated[Path | None, Option("FILE")] = None
     """file of trained Gaussians: .ply, or .npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
     scale: float = 1.0
     """size of the picture, relative to that of the scene"""
-    budget: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
+    budget: str | None = None
     """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
     ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
     images: bool = False

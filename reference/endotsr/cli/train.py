@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
-
+from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import asked_settings, base_settings, differences, parse, with_short_names
 from endotsr.cli.parts.stopping import finishing, stop_asked
 from endotsr.config import PAPER, PRESETS, Config
@@ -38,33 +37,33 @@ class TrainOptions:
     from its last checkpoint to the same result, bit for bit.
     """
 
-    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SEQUENCE")] = ""
+    sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
     """EndoNeRF folder, or `simulated`; with --resume the default is the sequence of the run"""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="RUN")] = None
+    out: Annotated[Path | None, Option("RUN")] = None
     """run folder to create (required)"""
-    config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
-    iterations: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    iterations: Annotated[int | None, Option("N")] = None
     """length of the run; stretches the schedule"""
     schedule: Literal["stretched", "absolute"] = "stretched"
-    """with --iterations: milestones keep their share of the run, or stay at their iterations"""
-    scale: Annotated[float | None, tyro.conf.arg(metavar="FLOAT")] = None
+    """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
+    scale: float | None = None
     """image scale (= --sequence.scale)"""
-    frames: Annotated[str | None, tyro.conf.arg(metavar="A:B[:S]")] = None
+    frames: Annotated[str | None, Option("A:B[:S]")] = None
     """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, tyro.conf.arg(metavar="{masks,gt_masks}")] = None
+    masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
     """mask folder (= --sequence.masks)"""
-    seed: Annotated[int | None, tyro.conf.arg(metavar="INT")] = None
+    seed: int | None = None
     """seed of every random draw (= --training.seed)"""
-    threads: Annotated[int | None, tyro.conf.arg(metavar="INT")] = None
+    threads: int | None = None
     """threads, 0 = all cores (= --training.threads)"""
     resume: bool = False
     """continue the run in --out"""
     evaluate: bool = True
     """measure, render and report when training is done"""
-    lpips: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights for the evaluation"""
-    settings: Annotated[Config, tyro.conf.arg(name="")] = PAPER
+    settings: Annotated[Config, Option(flat=True)] = PAPER
     simulator: SimulatorSettings = DEMONSTRATION
     """what `simulated` shows"""
 
