@@ -114,5 +114,5 @@ def _row(name: str, spread: dict[str, Any], result: dict[str, Any]) -> list[str]
     limit = result["limits"].get(name)
     if limit is None:
         return [*cells, "", "", ""]
-    reached = f"{limit['share']:.0%}" if limit["share"] is not None else "-"
+    reached = f"{limit['fraction']:.0%}" if limit["fraction"] is not None else "-"
     return [*cells, f"{limit['limit_ms']:.2f}", reached, limit["bound"]]
