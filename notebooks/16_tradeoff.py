@@ -16,7 +16,7 @@
 # A Gaussian never ends, and light behind an opaque stack never quite dies out. A renderer that wants to be fast cuts both off. This
 # notebook measures what that costs and what it gains, on a scene small enough to render exactly.
 #
-# Equation {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/accuracy_against_time` shows the same for every dial.
+# Equation {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/tradeoff` shows the same for every dial.
 
 # %%
 import os

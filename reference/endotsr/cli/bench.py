@@ -7,7 +7,6 @@ from typing import Any
 from endotsr.cli.parts.bench_options import (
     AllOptions,
     IterationOptions,
-    PageOptions,
     PeersOptions,
     ScalingOptions,
     StagesOptions,
@@ -127,19 +126,9 @@ def _start(options: StartOptions) -> None:
 
 
 def _all(options: AllOptions) -> None:
-    from endotsr.bench import page, suite
+    from endotsr.bench import suite
 
-    if options.page and not options.page.is_file():
-        raise InputError(f"{options.page}: no such page; allowed: a file with marks, as docs/performance.md")
     suite.run_all(options.out, options.scenes, print)
-    if options.page:
-        page.write_page(options.out, options.page)
-
-
-def _page(options: PageOptions) -> None:
-    from endotsr.bench.page import write_page
-
-    write_page(options.results, options.page)
 
 
 MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
@@ -149,5 +138,4 @@ MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
     "peers": (PeersOptions, _peers),
     "start": (StartOptions, _start),
     "all": (AllOptions, _all),
-    "page": (PageOptions, _page),
 }

@@ -25,6 +25,7 @@ from endotsr.equations.dictionary import (
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
@@ -84,18 +85,24 @@ def raster_settings(config: Config) -> RasterSettings:
 
 
 def scene_at(
-    gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float, ahead: OffsetsAhead | None = None
+    gaussians: Gaussians,
+    spectral: Spectral,
+    model: ModelConfig,
+    t: float,
+    ahead: OffsetsAhead | None = None,
+    timer: Timer = NO_TIMER,
 ) -> tuple[Scene, SceneSaved]:
     """The Gaussians at time t (normalised; any value, in [0, 1] meant).
 
     ahead   of `optimise`; used instead of a forward pass of the FDM if it is for these Gaussians and this time
+    timer   told of the stages "FDM" and "Fourier"
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(
-        lambda: _deformed(gaussians, model, t, ahead),
-        lambda: _translation(gaussians, spectral, t),
-        lambda: _residual(gaussians, spectral, model, t),
+        timed(timer, "FDM", lambda: _deformed(gaussians, model, t, ahead)),
+        timed(timer, "Fourier", lambda: _translation(gaussians, spectral, t)),
+        timed(timer, "Fourier", lambda: _residual(gaussians, spectral, model, t)),
     )
     if translation is not None:
         position = position + translation

@@ -23,6 +23,7 @@ from endotsr.equations.laplacian import (
 from endotsr.equations.pyramid import Upsampling
 from endotsr.fitting.model import Spectral, render_at
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
 from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_ssim_reverse, ssim_target
@@ -33,6 +34,9 @@ from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
 
 FloatArray = NDArray[np.floating]
+
+
+TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothness", "laplacian": "pyramid"}
 
 
 class Targets(NamedTuple):
@@ -119,8 +123,12 @@ def laplacian_term(
     return Term(value, laplacian_loss_reverse(weight, saved), None)
 
 
-def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig) -> ImageLoss:
+def image_loss(
+    rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig, timer: Timer = NO_TIMER
+) -> ImageLoss:
     """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
+
+    timer   told of the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
     """
@@ -133,7 +141,10 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
         calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
     if weights.laplacian > 0 and supports is not None:
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
-    photometric, *others = parallel_calls(lambda: photometric_loss(colour, targets, weights.ssim), *calls.values())
+    photometric, *others = parallel_calls(
+        timed(timer, "L1 and SSIM", lambda: photometric_loss(colour, targets, weights.ssim)),
+        *(timed(timer, TERM_STAGES[name], call) for name, call in calls.items()),
+    )
     loss, terms, d_colour, _ = photometric
     d_depth = np.zeros_like(rendered.depth)
     for name, term in zip(calls, others, strict=True):

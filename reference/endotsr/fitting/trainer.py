@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -35,6 +35,7 @@ from endotsr.fitting.schedules import (
 )
 from endotsr.kernels.memory import keep_freed_memory
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.density_control import (
     DensityStatistics,
     densify,
@@ -52,21 +53,6 @@ FloatArray = NDArray[np.floating]
 OnIteration = Callable[[dict[str, Any]], None]
 
 PSNR_EVERY = 10  # iterations between training PSNRs in the log: the figure costs a pass over the image
-
-
-class Timer(Protocol):
-    """What a benchmark hands in to see where the time goes."""
-
-    def mark(self, stage: str) -> None:
-        """The stage of this name has just ended."""
-
-
-class _NoTimer:
-    def mark(self, stage: str) -> None:
-        """Nothing to measure."""
-
-
-NO_TIMER = _NoTimer()
 
 
 @dataclass
@@ -197,34 +183,29 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     index, t = _draw_view(state.rng, shop)
     targets = shop.targets_of(index)
     camera = shop.sequence.cameras[index]
-    timer.mark("view")
-    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t, state.ahead)
-    timer.mark("scene")
+    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t, state.ahead, timer)
     settings = raster_settings(config)
-    rendered, render_saved = render_forward(scene, camera, settings, degree=active_degree(iteration, config))
-    timer.mark("render")
-    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss)
-    timer.mark("losses")
-    grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved)
-    timer.mark("render reverse")
+    degree = active_degree(iteration, config)
+    rendered, render_saved = render_forward(scene, camera, settings, degree=degree, timer=timer)
+    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer)
+    grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved, timer=timer)
+    watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
         lambda: scene_reverse(grads, scene_saved, coefficients=False),
-        lambda: _spectral_penalty(state.gaussians, shop),
-        lambda: _watch_density(state, grads, camera, statistics_active(iteration, config)),
+        timed(timer, "Fourier", lambda: _spectral_penalty(state.gaussians, shop)),
+        timed(timer, "density control", lambda: _watch_density(state, grads, camera, watched)),
     )
-    timer.mark("scene reverse")
     entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
         rates = learning_rates(iteration, config)
         later = _next_time(state.rng, shop) if iteration < config.training.iterations and not dense else None
         state.ahead = optimise(
-            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, later
+            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, later, timer
         )
-    timer.mark("optimiser")
     if dense:
-        _control_density(state, shop)
-        timer.mark("density control")
+        with timer.stage("density control"):
+            _control_density(state, shop)
     state.iteration = iteration
     return entry
 

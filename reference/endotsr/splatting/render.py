@@ -4,12 +4,13 @@ Comes in: deformed raw parameters and a camera. Goes out: colour, depth, opacity
 every parameter and, when asked for, to the background and the camera pose. Knows nothing of time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.timer import NO_TIMER, Timer
 from endotsr.splatting import compositing
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
@@ -109,6 +110,7 @@ def render_forward(
     degree: int = 3,
     background: FloatArray | None = None,
     compositor: Compositor = "auto",
+    timer: Timer = NO_TIMER,
 ) -> tuple[RenderOut, RenderSaved]:
     """Render one view (specification B2-B5).
 
@@ -116,6 +118,7 @@ def render_forward(
     settings    a preset of `settings.PRESETS` or any point between
     degree      active degree of the harmonics, 0..3
     background  (3,) colour, default black
+    timer       told of the stages "projection" (B2-B4), "binning" and "blend forward"
     returns     RenderOut in the dtype of scene.position
 
     Reverse: `render_reverse`.
@@ -125,20 +128,20 @@ def render_forward(
     dtype = scene.position.dtype
     width, height = camera.width, camera.height
     back = np.zeros(3, dtype) if background is None else np.ascontiguousarray(background, dtype)
-    shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
-    projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
-    centre = camera_centre(camera)
-    colour, harmonics_saved = harmonics_forward(scene.harmonics, scene.residual, scene.position, centre, degree)
-    log_alpha = log_opacity(scene.opacity_logit)
-    box, visible = screen_boxes(projected, log_alpha, settings, width, height)
-    order = depth_order(projected.depth, visible)
-    records = pack_records(order, projected, log_alpha, colour)
-    if choose_compositor(settings, compositor) == "blocks":
-        lists = tile_lists(box, order, compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT, width, height)
-        out, saved = compositing_blocks.composite_blocks_forward(records, lists, settings, back, width, height)
-    else:
-        lists = tile_lists(box, order, compositing.TILE_WIDTH, compositing.TILE_HEIGHT, width, height)
-        out, saved = compositing.composite_forward(records, lists, settings, back, width, height)
+    (tile_width, tile_height), composite = _forward_compositor(settings, compositor)
+    with timer.stage("projection"):
+        shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
+        projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
+        centre = camera_centre(camera)
+        colour, harmonics_saved = harmonics_forward(scene.harmonics, scene.residual, scene.position, centre, degree)
+    with timer.stage("binning"):
+        log_alpha = log_opacity(scene.opacity_logit)
+        box, visible = screen_boxes(projected, log_alpha, settings, width, height)
+        order = depth_order(projected.depth, visible)
+        records = pack_records(order, projected, log_alpha, colour)
+        lists = tile_lists(box, order, tile_width, tile_height, width, height)
+    with timer.stage("blend forward"):
+        out, saved = composite(records, lists, settings, back, width, height)
     stages = (covariance_saved, projection_saved, harmonics_saved, projected, order, visible, saved)
     return RenderOut(out.colour, out.depth, out.opacity), RenderSaved(scene, settings, camera, *stages)
 
@@ -151,26 +154,30 @@ def render_reverse(
     *,
     background_gradient: bool = False,
     pose_gradient: bool = False,
+    timer: Timer = NO_TIMER,
 ) -> RenderGrads:
     """Gradients of a loss by everything the view depends on.
 
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
+    timer      told of the stages "blend reverse", "binning" and "projection"
     """
     composite = saved.composite
-    if isinstance(composite, compositing_blocks.BlocksSaved):
-        pairs = compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, composite)
-    else:
-        d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
-        pairs = compositing.composite_reverse(d_colour, d_depth, d_opacity, composite)
+    with timer.stage("blend reverse"):
+        pairs = _composite_reverse(d_colour, d_depth, d_opacity, composite)
     deviations = saved.settings.deviations
-    d_mean2d, d_footprint, d_logit, d_rgb, d_z = gather_footprint_gradients(
-        saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
-        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
-        keep_depth=not deviations.drop_depth_to_z,
-    )  # fmt: skip
-    harmonics = harmonics_reverse(d_rgb, saved.harmonics)
-    projection = projection_reverse_footprint(d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient)
-    covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
+    with timer.stage("binning"):
+        d_mean2d, d_footprint, d_logit, d_rgb, d_z = gather_footprint_gradients(
+            saved.order, composite.records, composite.lists, pairs, saved.projected.determinant,
+            saved.scene.opacity_logit,
+            conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
+            keep_depth=not deviations.drop_depth_to_z,
+        )  # fmt: skip
+    with timer.stage("projection"):
+        harmonics = harmonics_reverse(d_rgb, saved.harmonics)
+        projection = projection_reverse_footprint(
+            d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient
+        )
+        covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
     return RenderGrads(
         position=projection.position + harmonics.position,
         quaternion=covariance.quaternion,
@@ -187,8 +194,29 @@ def render_reverse(
     )
 
 
+def _forward_compositor(settings: RasterSettings, compositor: Compositor) -> tuple[tuple[int, int], Callable]:
+    """Tile width and height in pixels, and the forward pass of the chosen compositor."""
+    if choose_compositor(settings, compositor) == "blocks":
+        tile = compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT
+        return tile, compositing_blocks.composite_blocks_forward
+    return (compositing.TILE_WIDTH, compositing.TILE_HEIGHT), compositing.composite_forward
+
+
+def _composite_reverse(
+    d_colour: FloatArray,
+    d_depth: FloatArray,
+    d_opacity: FloatArray | None,
+    saved: compositing.CompositeSaved | compositing_blocks.BlocksSaved,
+) -> FloatArray:
+    """Gradients of every pair by the reverse pass of the compositor that made `saved`."""
+    if isinstance(saved, compositing_blocks.BlocksSaved):
+        return compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, saved)
+    d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
+    return compositing.composite_reverse(d_colour, d_depth, d_opacity, saved)
+
+
 def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera: Camera) -> CameraGrads:
-    """Add the share that reaches the pose through the view direction: centre = -rotation^T translation."""
+    """Add the part that reaches the pose through the view direction: centre = -rotation^T translation."""
     assert projection is not None
     translation = np.asarray(camera.translation, d_centre.dtype)
     rotation = np.asarray(camera.rotation, d_centre.dtype)

@@ -98,21 +98,9 @@ class StartOptions:
 
 @dataclass
 class AllOptions:
-    """Start, stages, peers and scaling in one go, for a quiet machine: JSON, pictures, and the page that shows them."""
+    """Start, stages, peers and scaling in one go, on a machine without other work: JSON files and pictures in --out."""
 
     out: Path
     """folder for the results"""
     scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
     """trained scenes (npz) to time as well"""
-    page: File = None
-    """page whose marked parts are then written anew"""
-
-
-@dataclass
-class PageOptions:
-    """Write the marked parts of the performance page anew from results that exist."""
-
-    results: Path = Path("docs/results")
-    """folder of the results"""
-    page: Path = Path("docs/performance.md")
-    """the page"""

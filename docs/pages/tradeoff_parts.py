@@ -1,10 +1,8 @@
-"""The generated parts of the documentation page: Markdown from the JSON files of docs/results.
-
-The words around them are written by hand.
-"""
+"""Generated parts of docs/tradeoff.md as Markdown; the input is the JSON of `endotsr tradeoff` and `tradeoff train`."""
 
 from typing import Any
 
+from endotsr.report.tables import markdown
 from endotsr.tradeoff.page import (
     COLUMNS,
     advice,
@@ -17,6 +15,7 @@ from endotsr.tradeoff.page import (
     made,
     preset_lines,
 )
+from endotsr.tradeoff.settings import OMITTED
 from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_rows
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
@@ -31,17 +30,17 @@ def fragments(
     others      the same of trained real scenes, by name
     trainings   training.json by name
     """
-    parts = {
+    omitted = result["omitted"] | OMITTED  # reasons are facts of the present program, not of the measurement
+    return {
         "advice": _numbered(advice(result)),
         "made": made(result),
-        "front": table(COLUMNS, front_rows(result)),
+        "front": markdown(COLUMNS, front_rows(result)),
         "presets": _bullets(preset_lines(result)),
         "certificate": certificate_line(result),
-        "omitted": _bullets([f"{what}: {why}." for what, why in result["omitted"].items()]),
+        "omitted": _bullets([f"{what}: {why}." for what, why in omitted.items()]),
         "scenes": scenes(result, others),
         "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
     }
-    return parts
 
 
 def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
@@ -59,7 +58,7 @@ def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
     )
     rows = [_scene_row(result, result), *(_scene_row(other, result) for other in others.values())]
     about = [f"`{name}`: {made(other)} {certificate_line(other)}" for name, other in others.items()]
-    return "\n\n".join([table(columns, rows), _bullets(about)]) if others else "Not measured yet."
+    return "\n\n".join([markdown(columns, rows), _bullets(about)]) if others else "Not measured yet."
 
 
 def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
@@ -108,7 +107,7 @@ def training(name: str, result: dict[str, Any]) -> str:
         for part in (
             head,
             pictures[0],
-            table(TRAINING_COLUMNS, training_rows(result)),
+            markdown(TRAINING_COLUMNS, training_rows(result)),
             _bullets(summary(result)),
             "Which minute bought how many decibels, whatever the training:" if bought else "",
             _bullets(bought),
@@ -117,12 +116,6 @@ def training(name: str, result: dict[str, Any]) -> str:
         )
         if part
     )
-
-
-def table(columns: tuple[str, ...], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
 def _numbered(sentences: list[str]) -> str:

@@ -1,4 +1,4 @@
-"""The generated page, the pictures and the refusals of `endotsr bench`."""
+"""The pictures, the tables and the refusals of `endotsr bench`."""
 
 import json
 from pathlib import Path
@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from endotsr.bench import charts, page, peers, scaling, stages, start, suite, trained
+from endotsr.bench import charts, peers, scaling, stages, start, suite, trained
 from endotsr.bench.case import Case, measure
 from endotsr.bench.limits import limits
-from endotsr.bench.page_parts import MAIN
 from endotsr.bench.stages import grid, ns_per_pair
 from endotsr.cli.main import main
 from endotsr.cli.parts.bench_options import StagesOptions
@@ -21,84 +20,38 @@ PEAKS = {
     "flop_per_second": {"float32": 1e11, "float64": 5e10},
     "bytes_per_second": {"triad": 1e10, "update": 2e10},
 }
-ERRORS = {"colour": 1e-6, "position": 4e-4}
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
 
 @pytest.fixture(scope="module")
 def results():
-    """What the four measurements return, at the smallest sizes."""
+    """What two of the measurements return, at the smallest sizes."""
     small = [Case(gaussians=n, width=48, height=32, repeats=1, threads=1, densifications=1) for n in (60, 30, 90)]
     measured = [measure(case) for case in small]
     for result in measured:
         result |= {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)}
-    for result, precision in zip(measured, ("float32", "float64")):  # the two that the targets speak of
-        result["case"] = result["case"] | MAIN | {"precision": precision}
     axis = scaling.axes(1000)["gaussians"]._replace(along=lambda result: float(result["view"]["visible"]))
     grown = {"gaussians": scaling.summary(axis, measured)}
-    spread = {"median_ms": 2.0, "quartiles_ms": [1.0, 3.0]}
-    compared = {
-        "gaussians": 60, "precision": "float32", "threads": 1, "ours": spread, "gsplat": spread, "pair_lists": spread,
-        "ratio": 1.0, "errors": ERRORS, "versions": {"torch": "2", "gsplat": "1"},
-    }  # fmt: skip
-    moments = {moment: 1.5 for moment in start.MOMENTS}
     return {
         suite.STAGES_FILE: {"peaks": [PEAKS], "cases": measured},
         suite.SCALING_FILE: {"axes": grown, "memory": scaling.memory(grown)},
-        suite.PEERS_FILE: {"cases": [compared]},
-        suite.START_FILE: {"cold": moments, "warm": moments, "warm_repeats": 1},
     }
 
 
-@pytest.fixture
-def folder(results, tmp_path):
-    for name, result in results.items():
-        (tmp_path / name).write_text(json.dumps(suite.dated(result)))
-    return tmp_path
+def keys(result) -> object:
+    """The names in a result at every depth, without its values; of a list, those of its first entry."""
+    if isinstance(result, dict):
+        return {name: keys(value) for name, value in result.items()}
+    return [keys(result[0])] if isinstance(result, list) and result else None
 
 
-def test_page_is_filled_and_keeps_its_words(folder):
-    target = folder / "performance.md"
-    original = (Path(__file__).parents[2] / "docs" / "performance.md").read_text(encoding="utf-8")
-    target.write_text(original, encoding="utf-8")
-    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 0
-    once = target.read_text(encoding="utf-8")
-    assert "blend reverse" in once and "4.0e-04 (position), within 1e-03" in once and "1.5" in once
-    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 0
-    assert target.read_text(encoding="utf-8") == once
-    without = lambda text: page.re.sub(r"(:start -->).*?(<!-- bench)", r"\1\2", text, flags=page.re.DOTALL)
-    assert without(once) == without(original)
-
-
-def test_every_part_of_the_page_is_made(folder):
-    text = (Path(__file__).parents[2] / "docs" / "performance.md").read_text(encoding="utf-8")
-    made = page.fragments({n: json.loads((folder / f).read_text()) for n, f in page.FILES.items()}, {})
-    assert sorted(page.re.findall(r"<!-- bench:(\w+):start -->", text)) == sorted(made)
-
-
-def test_target_that_is_missed_says_so(results):
-    found = {name: suite.dated(results[file]) for name, file in page.FILES.items()}
-    slow = {moment: 99.0 for moment in start.MOMENTS}
-    text = page.fragments(found | {"start": found["start"] | {"cold": slow}}, {})["targets"]
-    line = next(line for line in text.splitlines() if "cold start" in line)
-    assert "99 s" in line and "**not met**" in line
-    assert "not measured" in next(line for line in text.splitlines() if "6000" in line)
-
-
-def test_page_names_what_is_missing(folder, capsys):
-    target = folder / "page.md"
-    target.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
-    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 2
-    assert "bench:colour has no end or no meaning" in capsys.readouterr().err
-    (folder / suite.PEERS_FILE).unlink()
-    assert main(["bench", "page", "--results", str(folder), "--page", str(target)]) == 2
-    assert "endotsr bench all" in capsys.readouterr().err
-
-
-def test_page_refuses_results_of_other_sizes(results):
-    found = {name: suite.dated(results[file]) for name, file in page.FILES.items()}
-    found["stages"] = found["stages"] | {"cases": found["stages"]["cases"][1:]}
-    with pytest.raises(InputError, match="no case with"):
-        page.fragments(found, {})
+def test_results_have_the_keys_of_the_committed_ones(results):
+    """The pages are made from the committed files: a key that changes has to change there too."""
+    committed = {name: json.loads((RESULTS / name).read_text(encoding="utf-8")) for name in results}
+    made = suite.dated(results[suite.STAGES_FILE])
+    assert keys(made) == keys(committed[suite.STAGES_FILE])
+    grown, known = (found[suite.SCALING_FILE]["axes"]["gaussians"] for found in (results, committed))
+    assert keys(grown) == keys(known)
 
 
 def test_pictures_are_drawn(results, tmp_path):
@@ -117,7 +70,7 @@ def test_grid_is_every_combination():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["everything"], "allowed: iteration, stages, scaling, peers, start, all, page"),
+        (["everything"], "allowed: iteration, stages, scaling, peers, start, all"),
         (["stages", "--gaussians", "3"], "--gaussians 3 is not allowed"),
         (["scaling", "--largest", "10"], "--largest 10 is not allowed"),
         (["start", "--repeats", "0"], "--repeats 0 is not allowed"),
@@ -137,12 +90,6 @@ def test_wrong_scene_is_refused_before_anything_is_measured(words, tmp_path, mon
     words = [word.format(tmp_path) for word in words]
     assert main(["bench", *words, "--scenes", str(tmp_path / "none.npz")]) == 2
     assert "none.npz: not a trained scene" in capsys.readouterr().err
-
-
-def test_missing_page_is_refused_before_anything_is_measured(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(suite, "run_all", lambda *arguments: pytest.fail("measured before the page was looked for"))
-    assert main(["bench", "all", "--out", str(tmp_path), "--page", str(tmp_path / "none.md")]) == 2
-    assert "none.md: no such page" in capsys.readouterr().err
 
 
 def test_peers_without_torch_say_what_to_install(monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""Markdown of the performance page, one function a part; the input is the JSON that `endotsr bench all` wrote."""
+"""Generated parts of docs/bench.md, one function a part, as Markdown; the input is the JSON of `endotsr bench all`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,6 +7,7 @@ from endotsr.bench import peers as peer_results
 from endotsr.bench.clock import REST
 from endotsr.bench.stages import memory
 from endotsr.errors import InputError
+from endotsr.report.tables import markdown
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of
@@ -39,7 +40,7 @@ def machine(stages: Result) -> str:
         for peak in stages["peaks"]
     ]
     head = ["threads", "float32, GFLOP/s", "float64, GFLOP/s", "triad, GB/s", "in-place update, GB/s"]
-    return f"{text}\n\n{table(head, rows)}"
+    return f"{text}\n\n{markdown(head, rows)}"
 
 
 def targets(stages: Result, scaling: Result, peers: Result, start: Result, runs: Mapping[str, Result]) -> str:
@@ -63,7 +64,7 @@ def targets(stages: Result, scaling: Result, peers: Result, start: Result, runs:
             (largest["peak_memory_bytes"][-1] or 0) / 1e9 or None, 16, None, "GB",
         ),
     ]  # fmt: skip
-    return table(["", "measured", "asked for", ""], [_target(t) for t in found])
+    return markdown(["", "measured", "asked for", ""], [_target(t) for t in found])
 
 
 def _target(target: Target) -> list[str]:
@@ -92,9 +93,9 @@ def stages(found: Result) -> str:
         f"A densification, once in a hundred iterations, takes {dense['median_ms']:.0f} ms: "
         f"{dense['per_iteration_ms']:.2f} ms an iteration."
     )
-    head = ["stage", "median, ms", "quartiles, ms", "share", "limit, ms", "of the limit", "bound by"]
+    head = ["stage", "median, ms", "quartiles, ms", "fraction", "limit, ms", "of the limit", "bound by"]
     picture = "![Stacked bars: time of each stage of one training iteration](results/bench_stages.png)"
-    return f"{picture}\n\n{table(head, rows)}\n\n{after}"
+    return f"{picture}\n\n{markdown(head, rows)}\n\n{after}"
 
 
 def _times(spread: Result) -> list[str]:
@@ -105,8 +106,8 @@ def _times(spread: Result) -> list[str]:
 def _limit(limit: Result | None) -> list[str]:
     if limit is None:
         return ["", "", ""]
-    share = f"{limit['share']:.0%}" if limit["share"] is not None else "-"
-    return [f"{limit['limit_ms']:.2f}", share, limit["bound"]]
+    reached = f"{limit['fraction']:.0%}" if limit["fraction"] is not None else "-"
+    return [f"{limit['limit_ms']:.2f}", reached, limit["bound"]]
 
 
 def gain(found: Result) -> str:
@@ -121,7 +122,7 @@ def gain(found: Result) -> str:
     rows = [[name, f"{above[name]:.1f}", f"{above[name] / case['iteration']['median_ms']:.0%}"] for name in first]
     floor = sum(limit["limit_ms"] for limit in case["limits"].values())
     sentence = f"The limits of all stages add up to {floor:.1f} ms of {case['iteration']['median_ms']:.1f} ms."
-    return f"{sentence}\n\n{table(['stage', 'above its limit, ms', 'of the iteration'], rows)}"
+    return f"{sentence}\n\n{markdown(['stage', 'above its limit, ms', 'of the iteration'], rows)}"
 
 
 def cases(found: Result) -> str:
@@ -142,7 +143,7 @@ def cases(found: Result) -> str:
             ]
         )  # fmt: skip
     head = ["Gaussians", "precision", "threads", "iteration, ms", "times float32", "splat, ms", "blended pairs, M"]
-    return table([*head, "blend forward, ns a pair", "blend reverse, ns a pair", "peak memory"], rows)
+    return markdown([*head, "blend forward, ns a pair", "blend reverse, ns a pair", "peak memory"], rows)
 
 
 def scaling(found: Result) -> str:
@@ -160,7 +161,7 @@ def scaling(found: Result) -> str:
     largest = found["axes"]["gaussians"]
     lines = [
         "![Cost against each size, with fitted powers](results/scaling.png)",
-        table(["along", "range", "exponents over the upper decade"], rows),
+        markdown(["along", "range", "exponents over the upper decade"], rows),
         f"The steepest of them is {steepest[0]:.2f} ({steepest[1]} along {steepest[2]}).",
         _memory(found["memory"], largest),
     ]
@@ -194,13 +195,13 @@ def peers(found: Result) -> str:
     versions = f"gsplat {first['versions']['gsplat']}, torch {first['versions']['torch']}"
     about = f"Measured on {found['date'][:10]} with {versions}, {first['threads']} threads."
     names = [name.replace("_", " ") for name in first["errors"]]
-    return f"{table(head, rows)}\n\n{about}\n\n{table(['Gaussians', 'precision', *names], blocks)}"
+    return f"{markdown(head, rows)}\n\n{about}\n\n{markdown(['Gaussians', 'precision', *names], blocks)}"
 
 
 def start(found: Result) -> str:
     """Cold start, and the median of the warm ones, by moment."""
     rows = [[moment, f"{found['cold'][moment]:.1f}", f"{found['warm'][moment]:.1f}"] for moment in found["cold"]]
-    return table(["seconds from the call to", "cold", "warm"], rows)
+    return markdown(["seconds from the call to", "cold", "warm"], rows)
 
 
 def runs(found: Mapping[str, Result]) -> str:
@@ -212,7 +213,7 @@ def runs(found: Mapping[str, Result]) -> str:
         ]
         for name, run in found.items()
     ]  # fmt: skip
-    return table(["run", "date", "minutes", "iterations", "Gaussians at the end", "peak memory", "threads"], rows)
+    return markdown(["run", "date", "minutes", "iterations", "Gaussians at the end", "peak memory", "threads"], rows)
 
 
 def main_case(found: Result) -> Result:
@@ -226,9 +227,3 @@ def find(results: Sequence[Result], wanted: Mapping[str, Any]) -> Result:
         if all(result["case"][key] == value for key, value in wanted.items()):
             return result
     raise InputError(f"the stages hold no case with {dict(wanted)}; measure it with `endotsr bench all`")
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
