@@ -329,10 +329,11 @@ class Run:
         return folder.path
 
     def _training(self) -> "TrainingState":
-        if self._state is None:
+        state = self._state
+        if state is None:
             assert self._folder is not None
-            self._state = load_training(self._folder, self.config)
-        return self._state
+            state = self._state = load_training(self._folder, self.config)
+        return state
 
     def _model_of(self, state: "TrainingState") -> Model:
         import numpy as np
