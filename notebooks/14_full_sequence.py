@@ -330,6 +330,35 @@ axis.set(title="held-out PSNR over tissue", xlabel="dB", xlim=(min(scores.values
 plt.show()
 
 # %% [markdown]
+# ## From Python, in ten lines
+#
+# The stages above are the inside. From the outside, `import endotsr` is enough: the same training with a callback, a picture at
+# a time between two frames, the metrics of the held-out frames, and a run folder that the command line reads as well.
+
+# %%
+import tempfile
+
+import endotsr
+
+clip = endotsr.load_sequence("simulated", simulator={"width": 48, "height": 38, "frames": 16})
+losses = []
+run = endotsr.train(
+    clip,
+    preset="demo",
+    iterations=60,
+    initialisation={"first_frame_points": 900, "other_frame_points": 225},
+    on_iteration=lambda entry: losses.append(entry["loss"]),
+)
+view = run.render(time=0.37)
+metrics = run.evaluate()
+print(run, f"{metrics['held_out']['mean']['psnr_tissue']:.2f} dB on held-out tissue")
+assert view.colour.shape == (3, 38, 48) and view.depth.shape == view.opacity.shape == (38, 48)
+assert len(losses) == 60 and np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])
+with tempfile.TemporaryDirectory() as folder:
+    opened = endotsr.open_run(run.save(f"{folder}/run"))
+np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
+
+# %% [markdown]
 # ## The reverse pass
 #
 # The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. From there it runs

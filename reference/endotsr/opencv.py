@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-
-Array = NDArray[Any]
+from endotsr.kernels.arrays import Array
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth

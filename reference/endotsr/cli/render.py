@@ -67,6 +67,8 @@ def run(words: list[str]) -> int:
 
 def wanted_views(record: dict[str, Any], options: RenderOptions) -> list[View]:
     """The pictures that the options ask for. Raises InputError for a time or frame that does not exist."""
+    from endotsr.runs.sources import nearest_frame
+
     given = [bool(options.times), options.frames is not None, options.count is not None]
     if sum(given) > 1:
         raise InputError("render: give one of --times, --frames and --count")
@@ -78,7 +80,7 @@ def wanted_views(record: dict[str, Any], options: RenderOptions) -> list[View]:
         for time in times:
             if not 0.0 <= time <= 1.0:
                 raise InputError(f"render: --times {time:g} is not allowed; allowed: times in [0, 1]")
-        views = [View(t, _nearest(record["times"], t), f"{i:05d}") for i, t in enumerate(times)]
+        views = [View(t, nearest_frame(record["times"], t), f"{i:05d}") for i, t in enumerate(times)]
     else:
         index = {"test": record["test_index"], "train": record["train_index"], "all": range(count)}
         views = [View(record["times"][i], i, record["names"][i]) for i in index[options.frames or "test"]]
@@ -89,10 +91,6 @@ def _even(count: int) -> list[float]:
     if count < 1:
         raise InputError(f"render: --count {count} is not allowed; allowed: an integer >= 1")
     return [i / max(count - 1, 1) for i in range(count)]
-
-
-def _nearest(times: list[float], time: float) -> int:
-    return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
 
 
 def renderer(folder: RunFolder, without: tuple[str, ...] = ()):

@@ -15,7 +15,7 @@ from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunFolder, create_run, open_run, refuse_existing
 from endotsr.runs.log import RunLog
-from endotsr.runs.machine import machine, now, peak_memory_bytes, versions
+from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.simulator.settings import SimulatorSettings
 
 if TYPE_CHECKING:
@@ -109,6 +109,7 @@ def train_new(
     """Check everything, create the run folder, train to the end."""
     from endotsr.fitting.trainer import new_training
     from endotsr.kernels.threads import use_threads
+    from endotsr.runs.record import new_record
     from endotsr.runs.sources import input_record, load_sequence, sequence_record
 
     refuse_existing(out)
@@ -118,22 +119,8 @@ def train_new(
     threads = use_threads(config.training.threads)
     print("starting", flush=True)
     state = new_training(sequence, config)
-    record = {
-        "status": "running",
-        "command": ["endotsr", "train", *words],
-        "started": now(),
-        "finished": None,
-        "seconds": 0.0,
-        "iterations_done": 0,
-        "lambda_lap": None,
-        "peak_memory_bytes": None,
-        "seed": config.training.seed,
-        "threads": threads,
-        "versions": versions(),
-        "machine": machine(),
-        "input": input_record(source, sequence, config, simulator),
-        "resumed": [],
-    }
+    about = input_record(source, sequence, config, simulator)
+    record = new_record(["endotsr", "train", *words], config, threads, about)
     folder = create_run(out, config, record, sequence_record(sequence))
     try:
         with folder.locked():

@@ -9,16 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import combine, spread
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
-
 
 LN2_HIGH = 355.0 / 512.0  # ln 2 in nine bits: k * LN2_HIGH is exact for every exponent k of either precision
 LN2_LOW = -2.1219444005469058e-4  # ln 2 - LN2_HIGH

@@ -6,12 +6,10 @@ float64, block by block.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 GAUSSIANS_PER_TASK = 1024  # Gaussians a task; a few rows of a block stay in the first-level cache
 LANES = 64  # partial sums side by side: enough to fill the vector units

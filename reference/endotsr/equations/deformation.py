@@ -15,13 +15,12 @@ basis) row is streamed once, in pieces that stay in the second-level cache.
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Basis = Literal["quartic", "gaussian"]
 BASES: tuple[Basis, ...] = ("quartic", "gaussian")
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 DEAD_RMS = 1e-6  # below it an atom is rounding noise over the stamps; dividing by it would amplify that noise
 WEAK_RMS = 0.05  # below it an atom is amplified more than twentyfold: worth a warning

@@ -32,11 +32,9 @@ from endotsr.equations.pyramid import (
     reduce_row_adjoint,
     reflect_indices,
 )
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
-MaskArray = NDArray[np.bool_]
 
 LEVELS = 3
 
@@ -51,8 +49,8 @@ class LaplacianLevels(NamedTuple):
 class SupportMasks(NamedTuple):
     """Which band pixels are valid; depends on the frame only, so it is computed once and cached."""
 
-    image: MaskArray  # (H, W)  the tissue mask
-    bands: tuple[MaskArray, ...]  # valid pixels of P_1 ... P_levels
+    image: BoolArray  # (H, W)  the tissue mask
+    bands: tuple[BoolArray, ...]  # valid pixels of P_1 ... P_levels
     upsampling: Upsampling
 
     @property
@@ -66,7 +64,7 @@ class LaplacianSaved(NamedTuple):
 
     signs: tuple[NDArray[np.int8], ...]  # (3, h, w) a level: -1, 0, 1; 0 where not valid
     weights: tuple[float, ...]  # 1 / (levels * channels * valid pixels), 0 for an empty level
-    mask: MaskArray  # (H, W)
+    mask: BoolArray  # (H, W)
     upsampling: Upsampling
     dtype: np.dtype
 
@@ -89,7 +87,7 @@ def laplacian_levels(image: FloatArray, levels: int = LEVELS, upsampling: Upsamp
     return LaplacianLevels(tuple(bands), image)
 
 
-def _reduce_support(valid: MaskArray) -> MaskArray:
+def _reduce_support(valid: BoolArray) -> BoolArray:
     """A coarse sample is valid when its 5x5 fine samples are: erosion, then the even samples."""
     for axis in (0, 1):
         taps = reflect_indices(valid.shape[axis])
@@ -97,7 +95,7 @@ def _reduce_support(valid: MaskArray) -> MaskArray:
     return valid
 
 
-def _expand_support(valid: MaskArray, shape: tuple[int, ...], upsampling: Upsampling) -> MaskArray:
+def _expand_support(valid: BoolArray, shape: tuple[int, ...], upsampling: Upsampling) -> BoolArray:
     """A fine sample is valid when all coarse samples it is interpolated from are."""
     for axis in (0, 1):
         parents = [[p for p, _ in expand_parents(i, shape[axis], upsampling)] for i in range(shape[axis])]
@@ -106,7 +104,7 @@ def _expand_support(valid: MaskArray, shape: tuple[int, ...], upsampling: Upsamp
     return valid
 
 
-def support_masks(mask: MaskArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
+def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
     """Valid pixels of every band: the mask sent through the operations of the pyramid as a boolean.
 
     mask     (H, W)  True = tissue
@@ -258,7 +256,7 @@ def laplacian_loss_reverse(d_loss: float, saved: LaplacianSaved) -> FloatArray:
 
 
 def pull_back(
-    fields: tuple[NDArray, ...], scales: tuple[float, ...], mask: MaskArray, upsampling: Upsampling, dtype: np.dtype
+    fields: tuple[NDArray, ...], scales: tuple[float, ...], mask: BoolArray, upsampling: Upsampling, dtype: np.dtype
 ) -> FloatArray:
     """Adjoint of masked image -> bands: sum_j scales[j] (d P_j / d image)^T fields[j], 0 outside the mask.
 

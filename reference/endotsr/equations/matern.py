@@ -9,13 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import LANES
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 
 class MaternSaved(NamedTuple):

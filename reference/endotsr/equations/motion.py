@@ -7,12 +7,8 @@ phase of a sine/cosine pair, and centring or scaling the two atoms of a pair dif
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.equations.atom_sums import combine, spread
-
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 
 class MotionSaved(NamedTuple):

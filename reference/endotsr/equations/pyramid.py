@@ -19,10 +19,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Upsampling = Literal["co_sited", "half_pixel"]
 
 # (even, odd): the weight of coarse sample k at fine samples 2k and 2k + 1

@@ -20,12 +20,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
-FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
 
 

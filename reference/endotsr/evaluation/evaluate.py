@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from endotsr.evaluation.baselines import BASELINES, unit_image
 from endotsr.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
 from endotsr.evaluation.metrics import image_metrics, mean_metrics
+from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
-FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
 Metrics = dict[str, float | None]
 

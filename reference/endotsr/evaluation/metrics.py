@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.losses.masked_ssim import masked_ssim_forward, ssim_target
-from endotsr.losses.rows import BoolArray, FloatArray, check_image
+from endotsr.losses.rows import check_image
 
 LEVELS = 255  # of an 8-bit image
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
-from endotsr.losses.rows import BoolArray, FloatArray, check_mask, check_plane, row_total
+from endotsr.losses.rows import check_mask, check_plane, row_total
 
 FEWEST_VALID = 10  # with fewer pixels that have a prior, a frame says nothing about depth
 

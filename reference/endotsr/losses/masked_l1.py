@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.losses.rows import check_image, row_total
 
 
 class MaskedL1Saved(NamedTuple):

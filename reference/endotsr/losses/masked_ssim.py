@@ -23,9 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.losses.rows import check_image, row_total
 
 RADIUS = 5  # the window spans 11 pixels
 TAPS = 2 * RADIUS + 1

@@ -7,10 +7,8 @@ number of threads, and the row totals are added by one thread, so a loss is bitw
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
-
-FloatArray = NDArray[np.floating]
-BoolArray = NDArray[np.bool_]
 
 
 def _row_total(row):

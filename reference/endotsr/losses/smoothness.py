@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, check_plane, row_total
+from endotsr.losses.rows import check_image, check_plane, row_total
 
 FEW_PIXELS = 1e-6  # keeps S finite without valid pixels
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-
-IndexArray = NDArray[np.intp]
+from endotsr.kernels.arrays import IndexArray
 
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2

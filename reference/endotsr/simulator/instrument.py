@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
-
-Array = NDArray[np.floating]
 
 ENTRY = np.array([1.12, 0.78])  # where the shaft leaves the picture, image widths
 HOME = np.array([0.70, 0.52])  # middle of the path of the wrist
@@ -23,8 +22,8 @@ SLEEVE = np.array([0.045, 0.045, 0.05])
 class Drawing(NamedTuple):
     """The instrument in one frame."""
 
-    light: Array  # (3, H, W) linear RGB
-    coverage: Array  # (H, W)    0 .. 1, smooth over one pixel at the outline
+    light: FloatArray  # (3, H, W) linear RGB
+    coverage: FloatArray  # (H, W)    0 .. 1, smooth over one pixel at the outline
     excluded: NDArray[np.bool_]  # (H, W) instrument and margin
 
 
@@ -61,7 +60,7 @@ def draw(settings: SimulatorSettings, t: float) -> Drawing:
     return Drawing(light, coverage, outline < part.margin + pixel)
 
 
-def _segment(x: Array, y: Array, start: Array, end: Array) -> tuple[Array, Array]:
+def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Distance of every pixel from a segment, and the signed distance from its line."""
     axis = end - start
     length = np.linalg.norm(axis)
@@ -72,13 +71,13 @@ def _segment(x: Array, y: Array, start: Array, end: Array) -> tuple[Array, Array
     return distance, dx * axis[1] - dy * axis[0]
 
 
-def _sheen(side: Array) -> Array:
+def _sheen(side: FloatArray) -> FloatArray:
     """Brightness across a round, polished bar, side in [-1, 1]."""
     profile = np.sqrt(np.clip(1 - side**2, 0.0, 1.0))
     return 0.25 + 0.6 * profile + 1.2 * np.exp(-(((side - 0.25) / 0.16) ** 2))
 
 
-def _turned(vector: Array, angle: float) -> Array:
+def _turned(vector: FloatArray, angle: float) -> FloatArray:
     return np.array(
         [np.cos(angle) * vector[0] - np.sin(angle) * vector[1], np.sin(angle) * vector[0] + np.cos(angle) * vector[1]]
     )

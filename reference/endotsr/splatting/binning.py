@@ -12,13 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray, IntArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.projection import Projected
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 
 CHUNKS = 16  # fixed, so that the lists do not depend on the number of threads
 LEGACY_TILE = 16

@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.binning import TileLists
@@ -42,8 +42,6 @@ from endotsr.splatting.records import (
     V,
 )
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 TILE_WIDTH = 16
 TILE_HEIGHT = 16

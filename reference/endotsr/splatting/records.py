@@ -10,14 +10,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import prefetch
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.projection import Projected
-
-FloatArray = NDArray[np.floating]
 
 # columns of a record
 U, V, PRECISION, SLOPE, INVERSE_C, LOG2_OPACITY, RED, GREEN, BLUE, DEPTH, OPACITY = range(11)

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.timer import NO_TIMER, Timer
 from endotsr.splatting import compositing
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
@@ -20,8 +21,6 @@ from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmo
 from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse_footprint
 from endotsr.splatting.records import gather_footprint_gradients, log_opacity, pack_records
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
 

@@ -23,8 +23,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit, jit_inline
 from endotsr.kernels.threads import parallel_for
@@ -69,8 +69,6 @@ from endotsr.splatting.records import (
     V,
 )
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 WORD_ROWS = 64 // BLOCKS_ACROSS  # rows of blocks whose visits are the bits of one word
 E, CENTRE_LINE, DY = 0, 64, 128  # parts of what `_lane_tables` fills, of WORD_ROWS rows of blocks at most
