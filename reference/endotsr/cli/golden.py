@@ -77,7 +77,7 @@ class ReferenceOptions:
 
 
 @dataclass
-class NegativeOptions:
+class WrongPortOptions:
     """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[FLAG]")] = ""
@@ -191,7 +191,7 @@ def _negative(words: list[str]) -> int:
     from endotsr.golden.vectors.reference import answer_wrongly
     from endotsr.golden.vectors.registry import all_wrong_ports
 
-    options = parse(NegativeOptions, words, "golden negative")
+    options = parse(WrongPortOptions, words, "golden negative")
     known = all_wrong_ports()
     if not options.name:
         print("\n".join(f"{w.flag}: {w.title} ({w.wrong})" for w in known.values()))
