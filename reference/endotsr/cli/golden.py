@@ -76,7 +76,7 @@ class ReferenceOptions:
 
 
 @dataclass
-class NegativeOptions:
+class WrongPortOptions:
     """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
 
     name: Annotated[str, Option("[FLAG]", positional=True)] = ""
@@ -107,8 +107,8 @@ def run(words: list[str]) -> int:
 
 
 def _judge(words: list[str]) -> int:
-    from endotsr.golden.judge import judge
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.judge.verdict import judge
 
     options = parse(JudgeOptions, words, "golden judge")
     if options.outdir == Path():
@@ -123,9 +123,9 @@ def _judge(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.golden.judge import judge, without_claim
-    from endotsr.golden.port import KEPT, clear_kept, refuse_command, run_port, write_requests
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.judge.verdict import judge, without_claim
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
@@ -146,7 +146,7 @@ def _run(words: list[str]) -> int:
 
 
 def _tell(report, golden, outdir: Path, options: _Reported) -> int:
-    from endotsr.golden.report import as_html, as_json, as_table
+    from endotsr.golden.judge.report import as_html, as_json, as_table
 
     print(as_table(report))
     if options.json:
@@ -157,8 +157,8 @@ def _tell(report, golden, outdir: Path, options: _Reported) -> int:
 
 
 def _generate(words: list[str]) -> int:
-    from endotsr.golden.generate import check, write
-    from endotsr.golden.store import golden_folder
+    from endotsr.golden.judge.store import golden_folder
+    from endotsr.golden.vectors.generate import check, write
 
     options = parse(GenerateOptions, words, "golden generate")
     folder = golden_folder(options.golden)
@@ -173,8 +173,8 @@ def _generate(words: list[str]) -> int:
 
 
 def _reference(words: list[str]) -> int:
-    from endotsr.golden.port import answer_all, answer_requests
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.vectors.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
     if options.requests is not None:
@@ -186,14 +186,14 @@ def _reference(words: list[str]) -> int:
 
 
 def _negative(words: list[str]) -> int:
-    from endotsr.golden.negative import all_negatives
-    from endotsr.golden.port import answer_wrongly
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.vectors.reference import answer_wrongly
+    from endotsr.golden.vectors.registry import all_wrong_ports
 
-    options = parse(NegativeOptions, words, "golden negative")
-    known = all_negatives()
+    options = parse(WrongPortOptions, words, "golden negative")
+    known = all_wrong_ports()
     if not options.name:
-        print("\n".join(f"{n.name}: {n.title} ({n.wrong})" for n in known.values()))
+        print("\n".join(f"{w.flag}: {w.title} ({w.wrong})" for w in known.values()))
         return 0
     if options.name not in known or options.outdir == Path():
         raise InputError("golden negative: give the FLAG of a mistake (without arguments: a list) and OUTDIR")

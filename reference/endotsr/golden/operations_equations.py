@@ -25,7 +25,7 @@ from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reve
 from endotsr.equations.motion import motion_forward, motion_reverse
 from endotsr.errors import CalibrationError
 from endotsr.fitting.adam import AdamState, adam_update
-from endotsr.golden.generator import fnv1a, words
+from endotsr.golden.judge.words import fnv1a, words
 from endotsr.golden.operation import Asked, Inputs, Operation, Settings
 
 
