@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.kernels.jit import jit_inline
+from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.settings import RasterSettings
 
@@ -76,4 +76,4 @@ def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
     return d_x + d_slope_x, d_y + d_slope_y, d_z - (d_slope_x * raw_x + d_slope_y * raw_y)
 
 
-pinhole, pinhole_reverse = jit_inline(pinhole), jit_inline(pinhole_reverse)
+pinhole, pinhole_reverse = jit_formula(pinhole), jit_formula(pinhole_reverse)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.kernels.jit import jit, jit_inline
+from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import GROUP, column, keep, local_array, write_group
 
@@ -111,9 +111,9 @@ def semi_axis_reverse(log_scale, scale, d_scale):
     return d_scale * scale if inside else type(log_scale)(0)
 
 
-unit_quaternion, unit_quaternion_reverse = jit_inline(unit_quaternion), jit_inline(unit_quaternion_reverse)
-rotation_of, rotation_reverse = jit_inline(rotation_of), jit_inline(rotation_reverse)
-semi_axis, semi_axis_reverse = jit_inline(semi_axis), jit_inline(semi_axis_reverse)
+unit_quaternion, unit_quaternion_reverse = jit_formula(unit_quaternion), jit_formula(unit_quaternion_reverse)
+rotation_of, rotation_reverse = jit_formula(rotation_of), jit_formula(rotation_reverse)
+semi_axis, semi_axis_reverse = jit_formula(semi_axis), jit_formula(semi_axis_reverse)
 
 
 # All Gaussians: a group at a time, as vector code (`vectors`).

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.constants import Y00
-from endotsr.kernels.jit import jit, jit_inline
+from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.sums import sum_columns
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import GROUP, column, keep, keep_where, kept, local_array, write_group
@@ -114,8 +114,8 @@ def harmonic_basis_reverse(x, y, z, d_basis):
     return -c1 * g3 + x2 + x3, -c1 * g1 + y2 + y3, c1 * g2 + z2 + z3
 
 
-direction, direction_reverse = jit_inline(direction), jit_inline(direction_reverse)
-harmonic_basis, harmonic_basis_reverse = jit_inline(harmonic_basis), jit_inline(harmonic_basis_reverse)
+direction, direction_reverse = jit_formula(direction), jit_formula(direction_reverse)
+harmonic_basis, harmonic_basis_reverse = jit_formula(harmonic_basis), jit_formula(harmonic_basis_reverse)
 
 
 # All Gaussians: a group at a time, as vector code (`vectors`). The number of bands is known at run time only: the sum

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.kernels.jit import jit_inline
+from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera_model import pinhole, pinhole_reverse
 
 
@@ -146,11 +146,11 @@ def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
     return (d_t00, d_t01, d_t02, d_t10, d_t11, d_t12), (d_s0, d_s1, d_s2)
 
 
-to_view, to_view_reverse = jit_inline(to_view), jit_inline(to_view_reverse)
-pose_reverse = jit_inline(pose_reverse)
-product, product_reverse = jit_inline(product), jit_inline(product_reverse)
-clipped_axis, axis_reverse = jit_inline(clipped_axis), jit_inline(axis_reverse)
-screen_covariance, screen_covariance_reverse = jit_inline(screen_covariance), jit_inline(screen_covariance_reverse)
+to_view, to_view_reverse = jit_formula(to_view), jit_formula(to_view_reverse)
+pose_reverse = jit_formula(pose_reverse)
+product, product_reverse = jit_formula(product), jit_formula(product_reverse)
+clipped_axis, axis_reverse = jit_formula(clipped_axis), jit_formula(axis_reverse)
+screen_covariance, screen_covariance_reverse = jit_formula(screen_covariance), jit_formula(screen_covariance_reverse)
 
 
 def project_one(position, rotation, scale, lens, pose, rules):
@@ -191,4 +191,4 @@ def project_one_reverse(
     return d_position + d_scale + d_rotation + pose_reverse(position, d_w, d_x, d_y, d_z)
 
 
-project_one, project_one_reverse = jit_inline(project_one), jit_inline(project_one_reverse)
+project_one, project_one_reverse = jit_formula(project_one), jit_formula(project_one_reverse)
