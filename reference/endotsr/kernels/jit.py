@@ -129,7 +129,7 @@ def jit_inline(function: F) -> F:
 
 
 def jit_formula(function: F) -> F:
-    """Compile a formula of scalars and tuples of scalars; every kernel that calls it holds it inlined.
+    """Compile a formula of scalars and tuples of scalars; every kernel that calls it holds it inlined. A decorator.
 
     Unlike `jit_inline` it leaves the inlining to LLVM: types are inferred once for each dtype and not at every call,
     which halves the compilation of the projection. A local array of `vectors` must not be passed to it.
