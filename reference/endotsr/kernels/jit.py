@@ -126,3 +126,13 @@ def jit_inline(function: F) -> F:
     """Compile a small helper that other kernels call; it is inlined into them and has no cache entry of its own."""
     compiled: Any = numba.njit(inline="always", error_model="numpy")(function)
     return compiled
+
+
+def jit_formula(function: F) -> F:
+    """Compile a formula of scalars and tuples of scalars; every kernel that calls it holds it inlined. A decorator.
+
+    Unlike `jit_inline` it leaves the inlining to LLVM: types are inferred once for each dtype and not at every call,
+    which halves the compilation of the projection. A local array of `vectors` must not be passed to it.
+    """
+    compiled: Any = numba.njit(forceinline=True, error_model="numpy")(function)
+    return compiled

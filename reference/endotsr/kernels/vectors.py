@@ -3,8 +3,8 @@
 An array from `np.empty` lies in memory that others may point to, so the compiler reloads and stores it at every step
 and guards each loop against overlap. A local array is the kernel's own: sums over a loop stay in vector registers
 and no guard is needed. The blend's reverse pass takes two thirds of the time with them; in float64 a half, because
-a loop over the eight lanes of a register, too short for guards, becomes vector code. A loop that reads and writes many
-arrays keeps the results of a GROUP of items in one and copies them out: the projection takes a third of the time.
+a loop over the eight lanes of a register, too short for guards, becomes vector code. `kernels.groups` builds on them
+the loops that carry a formula to all items.
 
 Each function below is a plain Python function, which is its definition and runs when the JIT is off, beside the
 instructions that stand for it in compiled code. A local array must not leave the function that made it: it may be
@@ -24,9 +24,6 @@ from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from endotsr.kernels.jit import jit_inline
-
-GROUP = 64  # items of a loop whose results wait in a local array
 FEWEST_LANES = 8  # lanes: loops over fewer do not become vector code
 _INT32 = ir.IntType(32)
 _instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
@@ -77,45 +74,6 @@ def lowest_bit(bits: np.uint64) -> np.uint64:
 
 def prefetch(table: NDArray[Any], row: int) -> None:
     """Ask for a row of a C-ordered table ahead of its use; changes nothing. The row must exist."""
-
-
-def column(table: NDArray[np.floating], size: int, item: int) -> tuple[Any, ...]:
-    """The first `size` numbers of a column of a two-dimensional array; in compiled code `size` is a named constant.
-
-    With `keep` and `write_group` the driver of every stage: a formula takes one item and knows no array. The column
-    must exist: no index counts from the end.
-    """
-    return tuple(table[row, item] for row in range(size))
-
-
-def keep(results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> None:
-    """The results of an item of a group (0 ... GROUP - 1) to a local array: number k of a group begins at k GROUP."""
-    for k, value in enumerate(values):
-        results[k * GROUP + item] = value
-
-
-def kept(results: NDArray[np.floating], size: int, item: int) -> tuple[Any, ...]:
-    """What `keep` has put there: `size` numbers, in compiled code a named constant of the module."""
-    return tuple(results[k * GROUP + item] for k in range(size))
-
-
-def keep_where(valid: Any, results: NDArray[np.floating], item: int, values: tuple[Any, ...]) -> None:
-    """As `keep`; zeros where not `valid`, whatever the values are. A select and no branch: the loop stays vector code."""
-    keep(results, item, values if valid else (results.dtype.type(0),) * len(values))
-
-
-def _write_group(results: NDArray[np.floating], start: int, count: int, out: NDArray[np.floating]) -> None:
-    """The columns of `results`, GROUP numbers each, to columns start ... start + count - 1 of the rows of `out`.
-
-    For loops that read and write many arrays: with the results of a group of items in a local array, the loop over
-    the group becomes vector code, as nothing that it reads can change.
-    """
-    for column in range(out.shape[0]):
-        for item in range(count):
-            out[np.uint64(column), np.uint64(start + item)] = results[np.uint64(column * GROUP + item)]
-
-
-write_group = jit_inline(_write_group)
 
 
 def _lanes_of(like: Any) -> int:
@@ -173,52 +131,6 @@ def _fold(typing: Any, values: Any) -> Any:
     return values.dtype(values), generate
 
 
-@_instructions(prefer_literal=True)
-def _column(typing: Any, table: Any, size: Any, item: Any) -> Any:
-    if not isinstance(size, types.IntegerLiteral):
-        return None
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = make_array(table)(context, builder, arguments[0])
-        rows = [context.get_constant(types.intp, row) for row in range(size.literal_value)]
-        places = [cgutils.get_item_pointer(context, builder, table, array, [row, arguments[2]]) for row in rows]
-        values = [builder.load(place) for place in places]
-        return context.make_tuple(builder, signature.return_type, values)
-
-    return types.UniTuple(table.dtype, size.literal_value)(table, size, types.intp), generate
-
-
-@_instructions(prefer_literal=True)
-def _kept(typing: Any, results: Any, size: Any, item: Any) -> Any:
-    if not isinstance(size, types.IntegerLiteral):
-        return None
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data, item = make_array(results)(context, builder, arguments[0]).data, arguments[2]
-        steps = [ir.Constant(item.type, k * GROUP) for k in range(size.literal_value)]
-        places = [builder.gep(data, [builder.add(item, step, flags=["nsw"])]) for step in steps]
-        return context.make_tuple(builder, signature.return_type, [builder.load(place) for place in places])
-
-    return types.UniTuple(results.dtype, size.literal_value)(results, size, types.intp), generate
-
-
-@_instructions
-def _keep_where(typing: Any, valid: Any, results: Any, item: Any, values: Any) -> Any:
-    """One store a number; `valid` is a bit."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        where, array, item, kept = arguments
-        data = make_array(results)(context, builder, array).data
-        zero = ir.Constant(context.get_data_type(results.dtype), 0.0)
-        for k, value in enumerate(cgutils.unpack_tuple(builder, kept, len(values))):
-            place = builder.add(item, ir.Constant(item.type, k * GROUP), flags=["nsw"])
-            builder.store(builder.select(where, value, zero), builder.gep(data, [place]))
-        return context.get_dummy_value()
-
-    kind = types.UniTuple(results.dtype, len(values))
-    return types.void(types.boolean, results, types.intp, kind), generate
-
-
 @_instructions
 def _lowest_bit(typing: Any, bits: Any) -> Any:
     return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.cttz(
@@ -267,26 +179,6 @@ def _compile_local_array(size, like):
 @_compiled(fold)
 def _compile_fold(values):
     return lambda values: _fold(values)
-
-
-@_compiled(column, prefer_literal=True)
-def _compile_column(table, size, item):
-    return lambda table, size, item: _column(table, size, item)
-
-
-@_compiled(keep)
-def _compile_keep(results, item, values):
-    return lambda results, item, values: _keep_where(True, results, item, values)
-
-
-@_compiled(kept, prefer_literal=True)
-def _compile_kept(results, size, item):
-    return lambda results, size, item: _kept(results, size, item)
-
-
-@_compiled(keep_where)
-def _compile_keep_where(valid, results, item, values):
-    return lambda valid, results, item, values: _keep_where(valid, results, item, values)
 
 
 @_compiled(lowest_bit)

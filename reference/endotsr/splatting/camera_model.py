@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.kernels.jit import jit_inline
+from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.settings import RasterSettings
 
@@ -41,6 +41,7 @@ def intrinsics_of(camera: Camera, settings: RasterSettings, dtype: np.dtype) -> 
     )
 
 
+@jit_formula
 def pinhole(x, y, z, lens):
     """(u, v) in px of a point in camera axes, z > 0, and J = d(u, v)/d(x, y, z) row by row, with its off-axis clamp."""
     one, zero = type(z)(1), type(z)(0)
@@ -54,6 +55,7 @@ def pinhole(x, y, z, lens):
     return u, v, (j00, zero, j02, zero, j11, j12)
 
 
+@jit_formula
 def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
     """By (x, y, z), from the gradients by u, v, J and, through the depth image, z."""
     one, two, zero = type(z)(1), type(z)(2), type(z)(0)
@@ -74,6 +76,3 @@ def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
     d_slope_x, d_slope_y = d_u * lens.fx * inverse_z, d_v * lens.fy * inverse_z
     d_z = inverse_z2 * (through_x + through_y) + d_z
     return d_x + d_slope_x, d_y + d_slope_y, d_z - (d_slope_x * raw_x + d_slope_y * raw_y)
-
-
-pinhole, pinhole_reverse = jit_inline(pinhole), jit_inline(pinhole_reverse)

@@ -10,17 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.kernels.jit import jit, jit_inline
+from endotsr.kernels.groups import GROUP, column, keep, write_group
+from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.threads import parallel_for
-from endotsr.kernels.vectors import GROUP, column, keep, local_array, write_group
+from endotsr.kernels.vectors import local_array
 
 FloatArray = NDArray[np.floating]
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
-ROTATION = 9 * GROUP  # numbers that the results of a group take: the matrix
-GRADIENTS = 7 * GROUP  # and by quaternion and log-scale
+ROTATION, GRADIENTS = 9 * GROUP, 7 * GROUP  # numbers that the results of a group take
 SHORTEST_QUATERNION = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
-
 
 _U64 = np.uint64  # no index may count from the end
 
@@ -50,6 +49,7 @@ class CovarianceGrads(NamedTuple):
 # One Gaussian: the formulas of the specification, each above its reverse.
 
 
+@jit_formula
 def unit_quaternion(w, x, y, z):
     """The normalised quaternion and 1/norm; (1, 0, 0, 0) and 0 for the zero quaternion.
 
@@ -66,8 +66,10 @@ def unit_quaternion(w, x, y, z):
     return w / norm, x / norm, y / norm, z / norm, inverse_norm
 
 
-def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_w, d_x, d_y, d_z):
-    """By the raw quaternion, from the gradient by the unit one: the part along it is removed, the rest over the norm."""
+@jit_formula
+def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit):
+    """By the raw quaternion: the part of the gradient along the unit one is removed, the rest divided by the norm."""
+    d_w, d_x, d_y, d_z = d_unit
     along = d_w * w + d_x * x + d_y * y + d_z * z
     return (
         (d_w - along * w) * inverse_norm,
@@ -77,6 +79,7 @@ def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_w, d_x, d_y, d_z):
     )
 
 
+@jit_formula
 def rotation_of(w, x, y, z):
     """R(q) of a unit quaternion, row by row."""
     one, two = type(w)(1), type(w)(2)
@@ -87,6 +90,7 @@ def rotation_of(w, x, y, z):
     )  # fmt: skip
 
 
+@jit_formula
 def rotation_reverse(w, x, y, z, d_rotation):
     """By the unit quaternion, from G = dL/dR, all nine entries independent, row by row."""
     two = type(w)(2)
@@ -99,24 +103,21 @@ def rotation_reverse(w, x, y, z, d_rotation):
     )
 
 
+@jit_formula
 def semi_axis(log_scale):
     """S = exp(s), s clipped."""
     limit = type(log_scale)(LOG_SCALE_LIMIT)
     return math.exp(min(max(log_scale, -limit), limit))
 
 
+@jit_formula
 def semi_axis_reverse(log_scale, scale, d_scale):
     """By the log-scale; zero where it was clipped."""
     inside = abs(log_scale) <= type(log_scale)(LOG_SCALE_LIMIT)
     return d_scale * scale if inside else type(log_scale)(0)
 
 
-unit_quaternion, unit_quaternion_reverse = jit_inline(unit_quaternion), jit_inline(unit_quaternion_reverse)
-rotation_of, rotation_reverse = jit_inline(rotation_of), jit_inline(rotation_reverse)
-semi_axis, semi_axis_reverse = jit_inline(semi_axis), jit_inline(semi_axis_reverse)
-
-
-# All Gaussians: a group at a time, as vector code (`vectors`).
+# All Gaussians: a group at a time, as vector code (`groups`).
 
 
 def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
@@ -125,11 +126,10 @@ def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
         for item in range(count):
-            w, x, y, z = column(quaternion, 4, start + item)
-            w, x, y, z, _ = unit_quaternion(w, x, y, z)
+            w, x, y, z, _ = unit_quaternion(*column(quaternion, 4, start + item))
             keep(results, item, rotation_of(w, x, y, z))
         write_group(results, start, count, rotation)
-        for k in range(3):  # a loop of its own: the exponential is no vector code
+        for k in range(3):  # a loop of its own: the exponential is not vector code
             for item in range(count):
                 i = _U64(start + item)
                 scale[k, i] = semi_axis(log_scale[k, i])
@@ -142,10 +142,9 @@ def _covariance_reverse(first, stop, quaternion, log_scale, scale, d_rotation, d
         count = min(GROUP, stop - start)
         for item in range(count):
             i = start + item
-            w, x, y, z = column(quaternion, 4, i)
-            w, x, y, z, inverse_norm = unit_quaternion(w, x, y, z)
-            d_w, d_x, d_y, d_z = rotation_reverse(w, x, y, z, column(d_rotation, 9, i))
-            d_q = unit_quaternion_reverse(w, x, y, z, inverse_norm, d_w, d_x, d_y, d_z)
+            w, x, y, z, inverse_norm = unit_quaternion(*column(quaternion, 4, i))
+            d_unit = rotation_reverse(w, x, y, z, column(d_rotation, 9, i))
+            d_q = unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit)
             s, axes, d_axes = column(log_scale, 3, i), column(scale, 3, i), column(d_scale, 3, i)
             d_s = (
                 semi_axis_reverse(s[0], axes[0], d_axes[0]),

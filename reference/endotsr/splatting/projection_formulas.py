@@ -1,7 +1,7 @@
 """The projection of one Gaussian: the formulas of specification B3, each above its reverse.
 
 Scalars and tuples of scalars in, tuples out; a matrix is the tuple of its rows. `projection_kernels` carries them to
-all Gaussians. Selects take the place of branches, so that the loop that calls them is vector code.
+all Gaussians. Selects take the place of branches, so that the loop over a group is vector code.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.kernels.jit import jit_inline
+from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera_model import pinhole, pinhole_reverse
 
 
@@ -28,6 +28,7 @@ class Rules(NamedTuple):
     axis_limit: np.floating  # px: a longer projected semi-axis is clipped, a centre farther out is not drawn
 
 
+@jit_formula
 def to_view(position, pose):
     """(x, y, z) = W mu + d: the centre in camera axes."""
     p0, p1, p2 = position
@@ -40,6 +41,7 @@ def to_view(position, pose):
     )
 
 
+@jit_formula
 def to_view_reverse(pose, d_x, d_y, d_z):
     """By the centre: W^T (g_x, g_y, g_z)."""
     w00, w01, w02, w10, w11, w12, w20, w21, w22 = pose.rotation
@@ -50,6 +52,7 @@ def to_view_reverse(pose, d_x, d_y, d_z):
     )
 
 
+@jit_formula
 def pose_reverse(position, d_w, d_x, d_y, d_z):
     """By W and d: what reaches W through J W, `d_w`, and what reaches both through the centre in camera axes."""
     p0, p1, p2 = position
@@ -61,6 +64,7 @@ def pose_reverse(position, d_w, d_x, d_y, d_z):
     )  # fmt: skip
 
 
+@jit_formula
 def product(a, b):
     """A 2x3 matrix times a 3x3 matrix: J W, and T = (J W) R."""
     a00, a01, a02, a10, a11, a12 = a
@@ -71,6 +75,7 @@ def product(a, b):
     )  # fmt: skip
 
 
+@jit_formula
 def product_reverse(a, b, d_product):
     """By the left factor, G b^T, and by the right one, a^T G."""
     a00, a01, a02, a10, a11, a12 = a
@@ -88,13 +93,24 @@ def product_reverse(a, b, d_product):
     return d_a, d_b
 
 
+@jit_formula
 def clipped_axis(t0, t1, scale, limit):
     """S_k, or what `limit` px leaves of it, and whether it is free of that limit; (t0, t1) is column k of T."""
     length = abs(t0) + abs(t1)
-    free = not scale * length > limit  # so that a scale that is not a number stays one
+    free = not scale * length > limit  # so written that a scale of NaN stays NaN
     return scale if free else limit / length, free
 
 
+@jit_formula
+def clipped_axes(t, scale, limit):
+    """The three semi-axes, and which of them are free."""
+    s0, free0 = clipped_axis(t[0], t[3], scale[0], limit)
+    s1, free1 = clipped_axis(t[1], t[4], scale[1], limit)
+    s2, free2 = clipped_axis(t[2], t[5], scale[2], limit)
+    return (s0, s1, s2), (free0, free1, free2)
+
+
+@jit_formula
 def screen_covariance(t, s, low_pass):
     """a, b, c = T diag(S)^2 T^T + epsilon I in px^2; the determinant in px^4, a sum of non-negative terms."""
     t00, t01, t02, t10, t11, t12 = t
@@ -111,6 +127,7 @@ def screen_covariance(t, s, low_pass):
     return a, b, c, low_pass * low_pass + low_pass * spread + areas
 
 
+@jit_formula
 def axis_reverse(t0, t1, s, e, m, g_a, g_m, g_r, free):
     """By column k of T and by S_k; `free`: a clipped axis is constant.
 
@@ -123,6 +140,7 @@ def axis_reverse(t0, t1, s, e, m, g_a, g_m, g_r, free):
     return (d_t0 if free else zero), (d_t1 if free else zero), (d_s if free else zero)
 
 
+@jit_formula
 def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
     """By T and S, from the gradients by A, m, r of the footprint."""
     t00, t01, t02, t10, t11, t12 = t
@@ -146,28 +164,21 @@ def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
     return (d_t00, d_t01, d_t02, d_t10, d_t11, d_t12), (d_s0, d_s1, d_s2)
 
 
-to_view, to_view_reverse = jit_inline(to_view), jit_inline(to_view_reverse)
-pose_reverse = jit_inline(pose_reverse)
-product, product_reverse = jit_inline(product), jit_inline(product_reverse)
-clipped_axis, axis_reverse = jit_inline(clipped_axis), jit_inline(axis_reverse)
-screen_covariance, screen_covariance_reverse = jit_inline(screen_covariance), jit_inline(screen_covariance_reverse)
-
-
+@jit_formula
 def project_one(position, rotation, scale, lens, pose, rules):
     """Whether the Gaussian is drawn, and (u, v, a, b, c, det, z); of one that is not drawn the numbers mean nothing."""
     x, y, z = to_view(position, pose)
     in_front = z > rules.near
     u, v, jacobian = pinhole(x, y, z if in_front else type(z)(1), lens)
     t = product(product(jacobian, pose.rotation), rotation)
-    s0, _ = clipped_axis(t[0], t[3], scale[0], rules.axis_limit)
-    s1, _ = clipped_axis(t[1], t[4], scale[1], rules.axis_limit)
-    s2, _ = clipped_axis(t[2], t[5], scale[2], rules.axis_limit)
-    a, b, c, det = screen_covariance(t, (s0, s1, s2), rules.low_pass)
+    s, _ = clipped_axes(t, scale, rules.axis_limit)
+    a, b, c, det = screen_covariance(t, s, rules.low_pass)
     # a centre out of range, or any NaN or infinity: not drawn, so that no index is made of such a number
-    near_enough = (abs(u) <= rules.axis_limit) & (abs(v) <= rules.axis_limit)
-    return in_front & near_enough & math.isfinite(det + z), (u, v, a, b, c, det, z)
+    in_range = (abs(u) <= rules.axis_limit) & (abs(v) <= rules.axis_limit)
+    return in_front & in_range & math.isfinite(det + z), (u, v, a, b, c, det, z)
 
 
+@jit_formula
 def project_one_reverse(
     position, rotation, scale, lens, pose, rules, drawn, determinant, d_mean, d_footprint, d_depth
 ):  # fmt: skip
@@ -178,17 +189,10 @@ def project_one_reverse(
     _, _, jacobian = pinhole(x, y, z, lens)
     jw = product(jacobian, pose.rotation)
     t = product(jw, rotation)
-    s0, free0 = clipped_axis(t[0], t[3], scale[0], rules.axis_limit)
-    s1, free1 = clipped_axis(t[1], t[4], scale[1], rules.axis_limit)
-    s2, free2 = clipped_axis(t[2], t[5], scale[2], rules.axis_limit)
-    d_t, d_scale = screen_covariance_reverse(
-        t, (s0, s1, s2), (free0, free1, free2), rules.low_pass, determinant, d_footprint
-    )
+    s, free = clipped_axes(t, scale, rules.axis_limit)
+    d_t, d_scale = screen_covariance_reverse(t, s, free, rules.low_pass, determinant, d_footprint)
     d_jw, d_rotation = product_reverse(jw, rotation, d_t)
     d_jacobian, d_w = product_reverse(jacobian, pose.rotation, d_jw)
     d_x, d_y, d_z = pinhole_reverse(x, y, z, lens, d_mean[0], d_mean[1], d_depth, d_jacobian)
     d_position = to_view_reverse(pose, d_x, d_y, d_z)
     return d_position + d_scale + d_rotation + pose_reverse(position, d_w, d_x, d_y, d_z)
-
-
-project_one, project_one_reverse = jit_inline(project_one), jit_inline(project_one_reverse)

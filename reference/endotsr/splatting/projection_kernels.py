@@ -1,15 +1,13 @@
-"""Kernels of the projection, forward and reverse: the formulas of one Gaussian for all, a group at a time.
+"""Kernels of the projection, forward and reverse: the formulas of one Gaussian for all, a group at a time (`groups`).
 
-The results of a group wait in a local array (`vectors`). No store in the loop over the group can then change what the
-loop reads, so the compiler needs no proof that two dozen arrays do not overlap, and the loop becomes vector code: a
-third of the time of one Gaussian after the other. A Gaussian that is not drawn is computed with harmless numbers
-(z = 1, determinant 1) and then set to zero.
+A Gaussian that is not drawn is computed with harmless numbers (z = 1, determinant 1) and then set to zero.
 """
 
 import numpy as np
 
+from endotsr.kernels.groups import GROUP, column, keep_where, write_group
 from endotsr.kernels.jit import jit
-from endotsr.kernels.vectors import GROUP, column, keep_where, local_array, write_group
+from endotsr.kernels.vectors import local_array
 from endotsr.splatting.projection_formulas import project_one, project_one_reverse
 
 PROJECTED = 8  # results: mean 2, covariance 3, determinant, depth, whether it is drawn
