@@ -1,8 +1,10 @@
 """The Python interface: the same numbers as the command line, stable names, and an import that loads nothing heavy."""
 
 import dataclasses
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -231,3 +233,25 @@ def test_arrays_in_memory_train_and_are_saved(sequence, run, tmp_path):
 def test_runs_that_cannot_be_opened(tmp_path):
     with pytest.raises(endotsr.InputError, match="run folder not found"):
         endotsr.open_run(tmp_path / "absent")
+
+
+def python_blocks(page):
+    text = (Path(__file__).parents[1] / page).read_text(encoding="utf-8")
+    return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/guides/python.md"])
+def test_the_code_of_the_pages_runs(page, sequence, tmp_path, monkeypatch, capsys):
+    """As printed, but for the length of the runs."""
+    monkeypatch.chdir(tmp_path)
+    write_endonerf(endotsr.load_sequence("simulated", simulator=SIMULATOR | {"height": 48}), Path("my_sequence"))
+    code = "\n".join(python_blocks(page))
+    assert len(code.splitlines()) >= 8 and "endotsr.load_sequence(" in code
+    short = {"training": {"checkpoint_every": 4}, "iterations": 4}
+    real = endotsr.api.make_config
+    monkeypatch.setattr(endotsr.api, "make_config", lambda *a, **k: real(*a, **(k | short)))
+    monkeypatch.setattr(endotsr, "make_config", endotsr.api.make_config)
+    found = {}
+    exec(compile(code, page, "exec"), found)
+    assert found["run"].iteration == 4 and found["view"].depth.shape == (24, 24)
+    assert endotsr.open_run("runs/mine").iteration == 4

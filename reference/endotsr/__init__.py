@@ -1,13 +1,17 @@
 """endotsr: the reference implementation of Endo-TSR on the CPU.
 
-From Python, ten lines load a sequence, train on it and render: see `endotsr.api`. The names in `__all__` are stable.
+Ten lines of Python load a sequence, train on it and render: see `endotsr.api`. The names in `__all__` are stable.
+Importing this package imports nothing heavy; a name is imported when it is first used.
 
-The package follows the order of the paper. `equations` holds the paper, one equation a module; `splatting` the
-rasteriser; `losses` the base losses; `scene` what is fitted; `fitting` the training; `sequences` and `simulator` what
-is read; `evaluation` what is measured. Every forward pass `<stage>_forward` has its manual reverse pass
-`<stage>_reverse` directly below it.
+The rooms of the package follow the order of the paper:
 
-Importing this package imports nothing heavy: a name is looked up when it is first used.
+    equations              the paper, one equation a module
+    splatting, losses      the rasteriser and the base losses
+    scene, fitting         the Gaussians, and their training
+    sequences, simulator   input: folders, or simulated sequences with known truth
+    evaluation             metrics and baselines
+
+Every forward pass `<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
 """
 
 TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part of this one

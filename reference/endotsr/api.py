@@ -144,6 +144,7 @@ def train(
     on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
 
     The number of kernel threads of the calling thread is set to `training.threads` (0 = all cores).
+    A KeyboardInterrupt ends the training at once, without a run; `StopTraining` keeps it.
     Raises: InputError for settings or a sequence that cannot be used; FloatingPointError naming iteration, frame and
             terms if the loss is not finite; CalibrationError if equation (7) has no answer.
     """

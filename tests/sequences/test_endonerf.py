@@ -291,7 +291,7 @@ DAMAGES = {
     "range text": (lambda f: None, {"frames": "all"}, r"frames 'all': not a range; write start:stop"),
     "range backwards": (lambda f: None, {"frames": "::-1"}, r"frames '::-1': the step must be 1 or more"),
     "no block fits": (lambda f: None, {"split": "blocks"}, r"no held-out block of 8 frames fits into 5 frames"),
-    "scale too small": (lambda f: None, {"scale": 0.5}, r"scale 0.5 makes 16x12 .* under 16"),
+    "scale too small": (lambda f: None, {"scale": 0.5}, r"scale 0.5 makes 16x12 .* at least 16 on each side"),
     "scale above one": (lambda f: None, {"scale": 2.0}, r"scale 2: .*\(0, 1\]"),
 }
 

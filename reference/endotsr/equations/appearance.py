@@ -34,11 +34,11 @@ class AppearanceGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     appearance_coefficients: FloatArray  # (3, 2F, N)
-    phi_bar: FloatArray | None  # (2F,), None when not asked for
+    phi_bar: FloatArray | None  # (2F,), None unless requested
 
 
 def _exp_nonpositive(z):
-    """exp(-z) for z >= 0 by straight-line arithmetic, to a few ulp also where z is large.
+    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp, also for large z.
 
     z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps all its digits (2^(-z log2 e) would lose
     as many as z has).
@@ -129,5 +129,5 @@ def appearance_reverse(
 
 
 def argument_gradient(d_residual: FloatArray, saved: AppearanceSaved) -> FloatArray:
-    """The first half of the reverse pass: derivative (3, N) by A phi_bar, what tanh is taken of."""
+    """First half of the reverse pass: derivative (3, N) by A phi_bar, the argument of tanh."""
     return np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)

@@ -1,4 +1,4 @@
-"""Equation (5): the mask-propagating Laplacian detail loss of component L.
+"""Equation (5): the mask-propagating Laplacian loss of component L.
 
 In: the rendered and the observed image, planar (3, H, W), display units [0, 1], and the tissue mask (H, W), True =
 tissue. Out: a scalar in display units, and its derivative by the rendered image.
@@ -7,8 +7,8 @@ tissue. Out: a scalar in display units, and its derivative by the rendered image
     L_lap = (1/3) sum_j mean over the valid band pixels and the channels of |P_j(rendered) - P_j(observed)|
 
 A band pixel is valid when every input pixel of its footprint is tissue. The pyramid is linear, so one pyramid of the
-difference image, with 0 selected where there is no tissue, gives all valid band pixels exactly: what stands
-under the instrument (NaN included) reaches none of them, and equal images have loss and gradient exactly 0.
+difference image, with 0 selected where there is no tissue, gives all valid band pixels exactly: values under
+the instrument (NaN included) reach none of them, and equal images have loss and gradient exactly 0.
 """
 
 from typing import NamedTuple
@@ -60,7 +60,7 @@ class SupportMasks(NamedTuple):
 
 
 class LaplacianSaved(NamedTuple):
-    """Signs of the valid band differences and what they are weighed with."""
+    """Signs of the valid band differences, and their weights."""
 
     signs: tuple[NDArray[np.int8], ...]  # (3, h, w) a level: -1, 0, 1; 0 where not valid
     weights: tuple[float, ...]  # 1 / (levels * channels * valid pixels), 0 for an empty level
@@ -105,12 +105,12 @@ def _expand_support(valid: BoolArray, shape: tuple[int, ...], upsampling: Upsamp
 
 
 def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
-    """Valid pixels of every band: the mask sent through the operations of the pyramid as a boolean.
+    """Valid pixels of every band: the mask passed through the operations of the pyramid as a boolean.
 
     mask     (H, W)  True = tissue
     returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
              tissue: 5-7, 13-17, 29-37 pixels an axis for `co_sited`, 7, 17, 37 for `half_pixel`
-    Edges:   a level may come out empty; it then adds 0 to the loss.
+    Edges:   a level may be empty; it then adds 0 to the loss.
     Oracle:  the impulse response of the pyramid, tests/oracle/laplacian_oracle.py.
     """
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
@@ -218,7 +218,7 @@ def laplacian_loss_forward(
     Edges:      an empty level adds 0 and the factor 1/levels stays; pixels outside the mask may hold anything;
                 equal images have loss 0 and gradient exactly 0 (subgradient of |.| at 0 is 0).
     Raises:     ValueError if the shapes do not fit or the masks were made for another rule.
-    Oracle:     tests/oracle/laplacian_oracle.py, the two pyramids taken apart.
+    Oracle:     tests/oracle/laplacian_oracle.py, the difference of two separate pyramids.
     """
     if rendered.shape != observed.shape or rendered.shape[1:] != masks.image.shape:
         raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} do not fit")
@@ -246,7 +246,7 @@ def laplacian_loss_forward(
 
 
 def laplacian_loss_reverse(d_loss: float, saved: LaplacianSaved) -> FloatArray:
-    """Reverse of equation (5): the adjoint of the pyramid applied to the weighed signs.
+    """Reverse of equation (5): the adjoint of the pyramid applied to the weighted signs.
 
     d_loss   ()         derivative of the objective by the loss
     returns  (3, H, W)  derivative by the rendered image, dtype of the render; exactly 0 outside the mask

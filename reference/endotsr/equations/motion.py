@@ -22,7 +22,7 @@ class MotionGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     motion_coefficients: FloatArray  # (3, 2F, N)
-    phi: FloatArray | None  # (2F,), None when not asked for
+    phi: FloatArray | None  # (2F,), None unless requested
 
 
 def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[FloatArray, MotionSaved]:

@@ -2,7 +2,7 @@
 
 Five feature maps of each image are divided by their norm over channels, subtracted, squared, weighted by a learned
 non-negative vector, summed over channels and averaged over pixels; the distance is the sum over the five.
-The weights are not part of the package. Without them the value is None, with a reason, and never a made-up number.
+The weights are not part of the package. Without them the value is None, with a reason.
 
 Weights file: an .npz with `conv1..5_weight` (out, in, k, k), `conv1..5_bias` (out,), `lin1..5_weight` (out,),
 `shift` (3,) and `scale` (3,), which normalise RGB in [-1, 1].
@@ -45,7 +45,7 @@ class LpipsWeights(NamedTuple):
 
 
 def default_weights_path() -> Path:
-    """Where weights are looked for when neither an argument nor the environment names a file."""
+    """The weights file that is used when neither an argument nor the environment names one."""
     from platformdirs import user_data_dir
 
     return Path(user_data_dir("endotsr", appauthor=False)) / FILE_NAME
@@ -55,7 +55,7 @@ def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | 
     """Weights from `path`, else from the file in ENDOTSR_LPIPS, else from `default_weights_path()`, else None.
 
     Raises InputError naming file and key if a file that was named is missing, or any found file cannot be used.
-    `lpips_obstacle(None, ...)` says in words that there are none.
+    `lpips_obstacle(None, ...)` describes the places that were searched.
     """
     named = path if path is not None else os.environ.get(ENVIRONMENT) or None
     if named is None:
@@ -65,7 +65,7 @@ def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | 
 
 
 def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str | None:
-    """Why LPIPS of height x width images is not computed; None = it can be."""
+    """The reason why LPIPS of height x width images cannot be computed; None = it can."""
     if weights is None:
         return f"no LPIPS weights: no file was given, {ENVIRONMENT} is not set, {default_weights_path()} does not exist"
     if min(height, width) < SMALLEST_SIDE:
@@ -81,10 +81,10 @@ def lpips(
     """LPIPS (M3) of two images; symmetric, 0 for equal images.
 
     a, b         (3, H, W)  RGB in [0, 1]; NaN gives NaN
-    input_range  "zero_one": fed as they are (the protocol value); "minus_one_one": scaled to [-1, 1] first,
-                 which is what the network was made for. The two are not comparable.
-    returns      the distance, or None where `lpips_obstacle` names a reason
-    Raises:      ValueError for shapes or an input_range that cannot be.
+    input_range  "zero_one": used as they are (the protocol value); "minus_one_one": scaled to [-1, 1] first,
+                 the range that the weights are made for. The two are not comparable.
+    returns      the distance, or None if `lpips_obstacle` gives a reason
+    Raises:      ValueError for shapes that do not fit or an unknown input_range.
     Oracle:      published pair of example images, 0.722 and 0.138 ("minus_one_one").
     Source:      Zhang et al. 2018, the `lpips` package, version 0.1, AlexNet.
     """

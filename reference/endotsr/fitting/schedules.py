@@ -1,7 +1,7 @@
-"""When and how much: every schedule of the training, as pure functions of (iteration, configuration).
+"""Every schedule of the training, as pure functions of (iteration, configuration).
 
-Iterations count from 1. This module knows no array and no state, so any iteration can be asked for at any
-time: a resumed run asks the same questions and gets the same answers.
+Iterations count from 1. This module has no state, so the value of any iteration can be computed at any time: a resumed
+run gets the same values.
 """
 
 from endotsr.config import Config
@@ -24,21 +24,22 @@ def residuals_active(iteration: int, config: Config) -> bool:
 
 
 def residuals_activate(iteration: int, config: Config) -> bool:
-    """Whether this is the first iteration with residuals: their arrays and fresh moments are made before it."""
+    """Whether this is the first iteration with residuals, before which their arrays and moments are created."""
     return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
 
 
 def residual_decay(iteration: int, config: Config) -> float:
     """Factor on the residual rates, from 1 to `final_factor`.
 
-    With `restart_residual_schedule` it runs over the steps K_s .. iterations, else it is that of the base model.
+    With `restart_residual_schedule` the decay runs over the steps K_s .. iterations; otherwise it is that of the base
+    model.
     """
     born = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
     return exponential_decay(iteration - born, config.training.iterations - born, 1.0, config.optimiser.final_factor)
 
 
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
-    """Adam rates by field name of `Gaussians` at this iteration; the spectral residuals only while they are active.
+    """Adam rates by field name of `Gaussians` at this iteration; spectral residuals only while they are active.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant; degree 0 and the higher degrees have their own rate
@@ -83,12 +84,12 @@ def smoothness_active(iteration: int, config: Config) -> bool:
 
 
 def active_degree(iteration: int, config: Config) -> int:
-    """Active harmonic degree: one more every `harmonics_interval` iterations, the interval's own iteration included."""
+    """Active harmonic degree: it rises by one at every multiple of `harmonics_interval`."""
     return min(config.model.harmonics_degree, iteration // config.training.harmonics_interval)
 
 
 def statistics_active(iteration: int, config: Config) -> bool:
-    """Whether screen gradients are gathered: until the last densification."""
+    """Whether screen gradients are accumulated: until the last densification."""
     return iteration < config.density.until
 
 

@@ -1,4 +1,4 @@
-"""Names for the array types of annotations. A name says the kind of number; a comment or docstring says the shape."""
+"""Names for the array types of annotations. The name gives the kind of number; comments and docstrings the shape."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ FloatArray = NDArray[np.floating]
 """Real numbers: float32 in a training run, float64 in a gradient check; the kernels keep the dtype of their input."""
 
 BoolArray = NDArray[np.bool_]
-"""Masks: True = tissue, valid or visible, as the name beside it says."""
+"""Masks; the name of a variable states whether True means tissue, valid or visible."""
 
 IntArray = NDArray[np.integer]
 """Counts, ranks and positions, of any integer width."""

@@ -1,4 +1,4 @@
-"""The one place that says how a kernel is compiled.
+"""How kernels are compiled: the only module that calls `numba.njit`.
 
 Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or
 `blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools.
@@ -71,7 +71,7 @@ def kernel_source_hash() -> str:
 
 def _use_hashed_cache_folder() -> None:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return  # the caller chose a folder and keeps it fresh
+        return  # the caller chose the folder and is responsible for stale entries
     from platformdirs import user_cache_dir
 
     folder = Path(user_cache_dir("endotsr")) / "kernels" / kernel_source_hash()
@@ -81,7 +81,7 @@ def _use_hashed_cache_folder() -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether files can be made there. Numba would take another place without a word: beside the sources, unhashed."""
+    """Whether files can be created there. Otherwise Numba would silently cache beside the sources, without the hash."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -91,7 +91,7 @@ def _takes_files(folder: Path) -> bool:
 
 
 def _passing_folder(wanted: Path) -> Path:
-    """A folder of this process and its children, gone with it."""
+    """A temporary folder for this process and its children, removed at exit."""
     folder = tempfile.mkdtemp(prefix="endotsr-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = folder
@@ -105,7 +105,7 @@ def _passing_folder(wanted: Path) -> Path:
 
 _use_hashed_cache_folder()
 if not os.environ.get("NUMBA_THREADING_LAYER"):
-    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # asked for the thread count only
+    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # only its thread count is used
 
 
 def jit(function: F, *, contract: bool = False) -> F:

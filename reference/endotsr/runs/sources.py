@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIMULATED = "simulated"  # the word that stands for the embedded sequence; a folder of that name is `./simulated`
-IN_MEMORY = "arrays in memory"  # stands for a sequence that was handed over from Python, not read
+IN_MEMORY = "arrays in memory"  # the source of a sequence that was passed from Python and not read from files
 ARRAYS = ("images", "masks", "depth", "times")
 
 

@@ -1,6 +1,6 @@
-"""From mask files to tissue masks: which values are white, which polarity holds, and whether that can be true.
+"""From mask files to tissue masks: thresholds, polarity, and checks of the polarity.
 
-Polarity is stated in the configuration and never guessed, but a wrong statement is recognised. Evidence, measured on a
+The configuration states the polarity; it is never guessed, but a wrong statement is detected. Evidence, measured on a
 public sequence (63 frames, 34 % of the pixels without depth):
 
 | masks folder | fraction without depth: tissue / excluded | redness R - B: tissue / excluded |
@@ -9,8 +9,8 @@ public sequence (63 frames, 34 % of the pixels without depth):
 | `gt_masks`, right polarity | 0.093 / 1.000 | 66 / -3 |
 
 With the wrong polarity each pair is swapped, while the tissue fraction (0.34 and 0.27) would still look plausible.
-Instruments and borders are where stereo depth is missing, so depth decides when enough of it is missing; else the
-colour does.
+Stereo depth is missing on instruments and at borders, so depth decides when enough of it is missing. Otherwise the
+colour decides.
 """
 
 from collections import Counter
@@ -23,11 +23,11 @@ from endotsr.errors import InputError
 from endotsr.sequences.files import shortened
 
 LEAST_TISSUE_FRACTION = 0.05
-MOST_SOFT_FRACTION = 0.05  # of a frame: more pixels between black and white are no mask
-LEAST_MISSING_FRACTION = 0.01  # of all pixels: with less missing depth, depth says nothing about polarity
+MOST_SOFT_FRACTION = 0.05  # of a frame: a picture with more pixels between black and white is no mask
+LEAST_MISSING_FRACTION = 0.01  # of all pixels: with less missing depth, depth is no evidence of polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
-SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN for one frame, where less evidence must weigh more
+SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN, for the smaller evidence of one frame
 OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
 ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fraction = true)"
 
@@ -87,14 +87,14 @@ def check_polarity(
     excluded_value: str,
     allow: bool,
 ) -> str:
-    """Refuse a polarity that the pictures contradict; otherwise a sentence on what supports it.
+    """Refuse a polarity that the pictures contradict; otherwise return a sentence on the evidence for it.
 
     masks    (n, H, W) True = tissue, as understood so far
     depth    (n, H, W) 0 = missing
     images   (n, 3, H, W) display RGB
 
-    Wrong if (a) at least 1 % of all pixels lack depth and the fraction lacking it is larger by 0.25 on "tissue" than on
-    excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
+    Wrong if (a) at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on "tissue" than
+    on excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
     in mean R - B, than "tissue" by 20 grey levels.
     """
     if masks.all() or not masks.any():
@@ -125,17 +125,17 @@ def check_single_masks(
     names: list[str],
     allow: bool,
 ) -> list[str]:
-    """Refuse a mask that is wrong while the others are right, which no sum over the frames shows.
+    """Refuse a single wrong mask among right ones, which sums over all frames do not reveal.
 
     masks, depth, images   as for `check_polarity`
     names    n mask files
-    returns  notes on frames without any tissue or without anything excluded: both are legal, and rare
+    returns  notes on frames without tissue or without excluded pixels: both are legal and rare
 
     Wrong if (a) a frame has some tissue, but less than 5 %, while half the frames have more; (b) it differs on more
     than 75 % of the pixels from the frame before and the frame after it (frames without tissue left out); or (c) it
     resembles the opposite of most masks, and the pictures contradict it but not most of the others.
 
-    Raises:  InputError naming the file, the reason and the setting that overrides; with `allow` it becomes a note.
+    Raises:  InputError naming the file, the reason and the setting that overrides. With `allow` it becomes a note.
     """
     step = sparse_step(masks.shape[1])
     sparse = masks[:, ::step, ::step]
@@ -159,12 +159,12 @@ def check_single_masks(
 
 
 def sparse_step(height: int) -> int:
-    """The step between rows and columns that leaves about 128 rows: enough for a fraction or a median, and quick."""
+    """The step between rows and columns that leaves about 128 rows, enough for a fraction or a median."""
     return max(1, height // 128)
 
 
 def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
-    """Refuse 8-bit masks among 16-bit ones: what is white in one kind is almost black in the other."""
+    """Refuse 8-bit masks among 16-bit ones: white in one kind is almost black in the other."""
     usual, frequency = Counter(types).most_common(1)[0]
     odd = next((i for i, kind in enumerate(types) if kind != usual), None)
     if odd is not None:
@@ -183,11 +183,11 @@ def _too_little_tissue(fractions: NDArray[np.floating]) -> dict[int, str]:
 
 
 def _against_neighbours(masks: NDArray[np.bool_], fractions: NDArray[np.floating]) -> dict[int, str]:
-    """Frames that are nearly the opposite of the two nearest frames with tissue."""
+    """Frames whose mask is nearly the opposite of those of the two nearest frames with tissue."""
     found = {}
     usable = [int(i) for i in np.flatnonzero(fractions > 0)]
     for k, i in enumerate(usable):
-        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # the first and the last frame have both on one side
+        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # at the first and the last frame, both are on one side
         differing = [float((masks[i] != masks[j]).mean()) for j in usable[start : start + 3] if j != i]
         if fractions[i] < 1 and len(differing) == 2 and min(differing) > OPPOSITE_FRACTION:
             found[i] = (
@@ -203,14 +203,14 @@ def _against_pictures(
     verdicts = [_verdict(mask, frame == 0, image) for mask, frame, image in zip(masks, depth, images)]
     signs = np.array([sign for sign, _ in verdicts])
     if np.count_nonzero(signs < 0) >= np.count_nonzero(signs > 0):
-        return {}  # not single frames: a matter of `check_polarity`
+        return {}  # not a fault of single frames: `check_polarity` handles it
     usual = masks.mean(axis=0) >= 0.5
     resembles_opposite = (masks != usual).mean(axis=(1, 2)) > 0.5
     return {int(i): verdicts[i][1] for i in np.flatnonzero((signs < 0) & resembles_opposite)}
 
 
 def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray[np.uint8]) -> tuple[int, str]:
-    """Whether the picture supports one mask (1), contradicts it (-1) or says nothing (0), and by what."""
+    """Whether the picture supports one mask (1), contradicts it (-1) or neither (0), and the evidence."""
     if mask.all() or not mask.any():
         return 0, ""
     on_tissue, on_excluded = float(missing[mask].mean()), float(missing[~mask].mean())

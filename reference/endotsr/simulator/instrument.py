@@ -1,6 +1,6 @@
 """A grasper between camera and tissue, drawn in the image plane: shaft, wrist and two jaws.
 
-In: settings, image size, time. Out: its linear light, its coverage and the pixels a mask must exclude.
+In: settings, image size, time. Out: its linear light, its coverage and the pixels that the mask excludes.
 """
 
 from typing import NamedTuple
@@ -55,7 +55,7 @@ def draw(settings: SimulatorSettings, t: float) -> Drawing:
         light = light * (1 - cover) + colour[:, None, None] * (_sheen(side / half_width) * cover)
         coverage = cover + coverage * (1 - cover)
         outline = np.minimum(outline, distance - half_width)
-    # the light of a half covered pixel is that of the instrument alone; the coverage does the blending
+    # a partly covered pixel has the light of the instrument alone; the coverage blends it with the tissue
     light = np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
     return Drawing(light, coverage, outline < part.margin + pixel)
 

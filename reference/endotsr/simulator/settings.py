@@ -1,7 +1,7 @@
-"""What is simulated: the scene, and one section with a switch for every effect.
+"""Settings of the simulator: the scene, and one section with a switch for every effect.
 
 Lengths are in millimetres, times in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
-that is off is exactly absent: nothing of it is computed and no random number is drawn for it.
+that is off is exactly absent: no part of it is computed, and no random number is drawn for it.
 """
 
 from typing import Annotated
@@ -21,7 +21,7 @@ class _Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Breathing(_Section, frozen=True, kw_only=True):
-    """The whole tissue is lifted towards the camera and shifted, unevenly, with every breath."""
+    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
 
     on: bool = True
     """switch"""
@@ -52,7 +52,7 @@ class Pull(_Section, frozen=True, kw_only=True):
     amplitude: NonNegative = 5.0
     """displacement of the spot while it is held, mm"""
     width: Positive = 11.0
-    """Gaussian radius of what moves along, mm"""
+    """Gaussian radius of the tissue that moves along, mm"""
     start: Fraction = 0.15
     """normalised time at which the pull begins"""
     stop: Fraction = 0.9
@@ -95,7 +95,7 @@ class Highlights(_Section, frozen=True, kw_only=True):
 
 
 class Instrument(_Section, frozen=True, kw_only=True):
-    """A grasper in front of the tissue: drawn, and excluded by the mask together with its depth."""
+    """A grasper in front of the tissue. It is drawn; the mask and the prior depth exclude its pixels."""
 
     on: bool = True
     """switch"""
@@ -104,7 +104,7 @@ class Instrument(_Section, frozen=True, kw_only=True):
     cycles: Positive = 1.0
     """cycles per sequence"""
     margin: NonNegative = 0.006
-    """how far the mask reaches beyond the drawn instrument, image widths"""
+    """width of the masked border around the drawn instrument, image widths"""
 
 
 class CameraMotion(_Section, frozen=True, kw_only=True):
@@ -128,7 +128,7 @@ class Noise(_Section, frozen=True, kw_only=True):
 
 
 class DepthErrors(_Section, frozen=True, kw_only=True):
-    """What stereo matching does to a depth prior. The true depth is kept apart and stays exact."""
+    """Errors of stereo matching in the prior depth. The true depth is stored separately and stays exact."""
 
     on: bool = False
     """switch"""
@@ -156,7 +156,7 @@ class SimulatorSettings(_Section, frozen=True, kw_only=True):
     focal: Positive = 0.89
     """focal length, image widths"""
     block_length: Count = 0
-    """0 = every eighth frame is held out; else contiguous blocks of so many frames"""
+    """0 = every eighth frame is held out; otherwise the length of contiguous held-out blocks, frames"""
     breathing: Breathing = Breathing()
     pulsation: Pulsation = Pulsation()
     pull: Pull = Pull()

@@ -1,4 +1,4 @@
-"""The tissue sheet as a formula: where every material point is at every time, and what a camera sees of it.
+"""The tissue sheet as a formula: the position of every material point over time, and its view from a camera.
 
 A material point has two coordinates (a, b) in millimetres. At rest it lies at (a, b, distance + h(a, b)); at time t at
 
@@ -47,7 +47,7 @@ class Surface(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a camera sees of the sheet, per pixel."""
+    """The part of the sheet that a camera sees, per pixel."""
 
     material: FloatArray  # (2, H, W) material coordinates a, b, mm
     point: FloatArray  # (3, H, W) world position, mm
@@ -107,7 +107,7 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     the ray (p_x, p_y, 1) through the pixel centre. The start is the plane z = distance, the same for every call, so
     equal inputs give bitwise equal views.
 
-    Raises:  InputError if a ray has no solution or the sheet turns its back: settings that fold the sheet over.
+    Raises:  InputError if a ray has no solution or meets the back of the sheet: the settings fold the sheet over.
     """
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
@@ -143,7 +143,7 @@ def _see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray
     normal /= np.sqrt((normal**2).sum(axis=0))
     facing = _rotate(camera.rotation, normal)
     if (ray_x * facing[0] + ray_y * facing[1] + facing[2]).max() >= 0 or seen[2].min() <= 0:
-        raise InputError(f"simulator: at t = {t:g} the sheet turns its back: motion or relief is too strong")
+        raise InputError(f"simulator: at t = {t:g} a ray meets the back of the sheet: motion or relief is too strong")
     return View(np.stack([a, b]), point, normal, seen[2])
 
 
@@ -153,7 +153,7 @@ def to_camera(camera: Camera, point: FloatArray) -> FloatArray:
 
 
 def _start(surface: Surface, camera: Camera, ray_x: FloatArray, ray_y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where the rays meet the plane z = distance."""
+    """Material coordinates at which the rays meet the plane z = distance."""
     direction = _rotate(camera.rotation.T, np.stack([ray_x, ray_y, np.ones_like(ray_x)]))
     centre = -camera.rotation.T @ camera.translation
     length = (surface.distance - centre[2]) / direction[2]
@@ -183,7 +183,7 @@ def gaussian_weight(centre: tuple[float, float], width: float) -> Weight:
 
 
 def _breathing(settings: SimulatorSettings) -> Motion:
-    wave_a, wave_b = 2 * np.pi / 120.0, 2 * np.pi / 90.0  # the lift differs slowly across the tissue
+    wave_a, wave_b = 2 * np.pi / 120.0, 2 * np.pi / 90.0  # the lift varies slowly across the tissue
 
     def weight(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         argument = wave_a * a + wave_b * b

@@ -1,7 +1,7 @@
-"""What the tissue looks like in itself: colour and fine relief over material coordinates, as one tabulated map.
+"""The appearance of the tissue: colour and fine relief over material coordinates, as one tabulated map.
 
 The map is made from smooth random fields (cubic B-splines over a lattice in millimetres) and random vessel trees. All
-random numbers belong to millimetres, not to pixels: another image size samples the same tissue more finely.
+random numbers are drawn per millimetre, not per pixel: a larger image samples the same tissue more finely.
 """
 
 from typing import NamedTuple, cast
@@ -22,7 +22,7 @@ SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit norm
 
 
 class Texture(NamedTuple):
-    """Maps over material coordinates, sampled bilinearly; outside, the border value."""
+    """Maps over material coordinates, sampled bilinearly. Outside, the border value holds."""
 
     values: NDArray[np.float32]  # (5, rows, columns) linear RGB reflectance, relief slope by a and by b
     origin: tuple[float, float]  # material coordinates (a, b) of texel [0, 0], mm
@@ -30,7 +30,7 @@ class Texture(NamedTuple):
 
 
 def make_texture(settings: SimulatorSettings) -> Texture:
-    """Tissue for the part of the sheet that the camera can see, with a margin for motion."""
+    """The texture of the part of the sheet that the camera can see, with a margin for motion."""
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
     half_a = 0.5 * settings.width * pixel * 1.2 + 8.0
@@ -74,7 +74,7 @@ def _colour(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> FloatArra
 
 
 def _fine_relief(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the wet, finely uneven surface; they bend the normal for highlights only, never the geometry."""
+    """Slopes of the fine relief of the wet surface. They change the normal of highlights only, never the geometry."""
     slope_a, slope_b = np.zeros((len(b), len(a))), np.zeros((len(b), len(a)))
     for spacing, slope in ((5.0, 0.20), (2.2, 0.14), (0.9, 0.05)):
         da, db = _field_slopes(a, b, rng, spacing)
@@ -136,7 +136,7 @@ def _vessels(a: FloatArray, b: FloatArray, rng: np.random.Generator, count: int,
 def _vessel_paths(
     a: FloatArray, b: FloatArray, rng: np.random.Generator, count: int, width: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Centre-line points (2, P) and radii (P,) of random walks that keep their heading and now and then branch."""
+    """Centre-line points (2, P) and radii (P,) of random walks with persistent heading and occasional branches."""
     stride = 0.04  # mm; denser than any texel
     walks = [
         (rng.uniform(a[0], a[-1]), rng.uniform(b[0], b[-1]), rng.uniform(0, 2 * np.pi), 0.5 * width, 2)

@@ -1,7 +1,7 @@
-"""One view of the Gaussians at one instant: all splatting stages composed, forward and reverse.
+"""One view of the Gaussians at one time: all splatting stages composed, forward and reverse.
 
-Comes in: deformed raw parameters and a camera. Goes out: colour, depth, opacity and, in reverse, gradients to
-every parameter and, when asked for, to the background and the camera pose. Knows nothing of time.
+Input: deformed raw parameters and a camera. Output: colour, depth, opacity and, in reverse, gradients by every
+parameter and, on request, by the background and the camera pose. This module does not depend on time.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ Compositor = Literal["auto", "definition", "blocks"]
 
 
 class Scene(NamedTuple):
-    """Deformed, raw (pre-activation) parameters of N Gaussians at one instant."""
+    """Deformed, raw (pre-activation) parameters of N Gaussians at one time."""
 
     position: FloatArray  # (3, N) scene units
     quaternion: FloatArray  # (4, N)
@@ -62,7 +62,7 @@ class RenderSaved(NamedTuple):
 
 
 class RenderGrads(NamedTuple):
-    """Gradients of one view; `background` and `camera` are None unless they were asked for."""
+    """Gradients of one view; `background` and `camera` are None unless requested."""
 
     position: FloatArray
     quaternion: FloatArray
@@ -77,7 +77,7 @@ class RenderGrads(NamedTuple):
 
 
 def check_finite(arrays: Mapping[str, FloatArray | None]) -> None:
-    """Refuse numbers that are not finite, before any kernel runs. Raises: ValueError naming array and index."""
+    """Check that all numbers are finite, before any kernel runs. Raises: ValueError naming array and index."""
     for name, array in arrays.items():
         if array is None or np.isfinite(array).all():
             continue
@@ -91,7 +91,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def choose_compositor(settings: RasterSettings, compositor: Compositor) -> Compositor:
-    """`auto` takes the fast path wherever it computes the settings."""
+    """Resolve `auto`: the fast path where it supports the settings. Raises: ValueError for `blocks` elsewhere."""
     if compositor == "auto":
         return "blocks" if compositing_blocks.supports(settings) else "definition"
     if compositor == "blocks" and not compositing_blocks.supports(settings):
@@ -114,7 +114,7 @@ def render_forward(
     """Render one view (specification B2-B5).
 
     scene       raw parameters, N >= 0 Gaussians
-    settings    a preset of `settings.PRESETS` or any point between
+    settings    a preset of `settings.PRESETS`, or other values of its fields
     degree      active degree of the harmonics, 0..3
     background  (3,) colour, default black
     timer       told of the stages "projection" (B2-B4), "binning" and "blend forward"
@@ -155,7 +155,7 @@ def render_reverse(
     pose_gradient: bool = False,
     timer: Timer = NO_TIMER,
 ) -> RenderGrads:
-    """Gradients of a loss by everything the view depends on.
+    """Gradients of a loss by every input of the view.
 
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
     timer      told of the stages "blend reverse", "binning" and "projection"
