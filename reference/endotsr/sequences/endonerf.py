@@ -20,13 +20,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, read_png, write_png
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures, shortened
-from endotsr.sequences.masks import (
-    check_polarity,
-    check_single_masks,
-    check_tissue_fraction,
-    sparse_step,
-    threshold_masks,
-)
+from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_share, sparse_step, threshold_masks
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames, time_stamps
@@ -36,7 +30,7 @@ NEAR = 0.2  # near plane of every preset, scene units
 LEAST_SIDE = 16  # pixels; below, the three-level pyramid has nothing left to compare
 FAR_OFF = 4.0  # times the usual median depth; measured medians of a sequence lie within 1.2
 ANOTHER_SCALE = 64.0  # times the usual median depth: 8 bits stretched to 16 make 256
-LEAST_DEPTH_FRACTION = 0.05  # of a frame: the median of less may be that of a few outliers
+LEAST_DEPTH_SHARE = 0.05  # of a frame: the median of less may be that of a few outliers
 UNIT = "mm"
 
 
@@ -95,10 +89,10 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     images, white, depth = _read_pictures(files, config, notes)
     masks = ~white if config.excluded_value == "white" else white
     where = str(Path(folder) / config.masks)
-    fraction = check_tissue_fraction(masks, where, config.excluded_value, config.allow_tissue_fraction)
+    share = check_tissue_share(masks, where, config.excluded_value, config.allow_tissue_fraction)
     evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_tissue_fraction)
     notes += [
-        f"{config.masks}: {config.excluded_value} = excluded; tissue fraction {fraction:.4f}; {evidence}",
+        f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
         _depth_note(depth, near, files.depth),
     ]
     mask_names = [str(file) for file in files.masks]
@@ -110,8 +104,8 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         height, width = images.shape[2:]
         scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
         cameras = [scaled[id(camera)] for camera in cameras]
-        notes.append(f"scaled to {width}x{height}; tissue fraction {masks.mean():.4f}")
-        check_tissue_fraction(
+        notes.append(f"scaled to {width}x{height}; tissue share {masks.mean():.4f}")
+        check_tissue_share(
             masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_tissue_fraction
         )
     if min(width, height) < LEAST_SIDE:
@@ -250,7 +244,7 @@ def _check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: lis
     Mixed bit depths alone are legal, published sequences have them: one far value makes a picture 16-bit.
     """
     for i, ratio in _far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
-        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_FRACTION * depth[i].size:
+        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_SHARE * depth[i].size:
             bits = 8 * types[i].itemsize
             other = next(j for j, kind in enumerate(types) if kind != types[i])
             raise InputError(
@@ -287,6 +281,6 @@ def _scaled(
     for i in range(n):
         small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
         tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
-        fraction = area_resize((depth[i] > 0).astype(np.float32), width, height)
-        np.divide(area_resize(depth[i], width, height), fraction, out=prior[i], where=fraction > 0)
+        share = area_resize((depth[i] > 0).astype(np.float32), width, height)
+        np.divide(area_resize(depth[i], width, height), share, out=prior[i], where=share > 0)
     return small, tissue, prior

@@ -27,7 +27,7 @@ class Frame(NamedTuple):
 class Sequence:
     """n frames of H x W pixels with masks, depth prior, cameras and a split.
 
-    The notes say in full sentences what the reader assumed and found: polarity, fractions, thresholds, repairs.
+    The notes say in full sentences what the reader assumed and found: polarity, shares, thresholds, repairs.
     """
 
     images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
