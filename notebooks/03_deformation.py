@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 3. The flexible deformation model (FDM)
 #
-# The base model that Endo-TSR extends moves, turns and scales each Gaussian by ten functions of time. Each function is a
-# sum of $B$ bumps, and for every bump three numbers are learned: a weight, a centre and a width.
+# The base model of Endo-TSR moves, rotates and scales each Gaussian by ten functions of time. Each function is a sum of
+# $B$ time bases. Every basis has three learned numbers: a weight, a centre and a width.
 #
-# Equation {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
+# The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -47,8 +47,8 @@ B, N = 17, 4
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# `quartic` is what the released code computes: the exponent is the square of a square. `gaussian` is the textbook form.
-# They are far apart: 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
+# `quartic` is the form that the released code computes: the exponent is the square of a square. `gaussian` is the
+# textbook form. The two differ strongly: they give 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
 
 
 # %% tags=["transcription"]
@@ -80,12 +80,12 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
     assert abs(found[0, 0] - value) < 1e-4
 
 # %% [markdown]
-# ## A picture: which times do the bumps reach?
+# ## Figure: which times do the bases cover?
 #
-# At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. A weight
-# feels a frame only through $e$, the height of its bump there. With the published width of 0.01 there are times at which
-# no bump is higher than 0.001: a frame that lies there hardly moves anything at first. Not an error, but slow. The preset
-# `sharp` starts at 0.05.
+# At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
+# by a weight at a frame is proportional to $e$, the value of its basis there. With the published width of 0.01 there
+# are times at which no basis exceeds 0.001. A frame at such a time changes almost nothing at first. This is not an
+# error, but it slows training down. The preset `sharp` starts at 0.05.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
@@ -156,8 +156,8 @@ for basis in ("quartic", "gaussian"):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
 
 # %% [markdown]
-# Two consequences to know. With all weights 0 the gradients of centre and width are exactly 0: only weights learn at first.
-# And a width of exactly 0 has gradient 0: it is stuck.
+# There are two consequences. While all weights are 0, the gradients by centre and width are exactly 0, so only the
+# weights change at first. A width of exactly 0 has gradient 0 and never changes.
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
@@ -178,8 +178,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# At which distance from its centre does a quartic bump push its centre hardest, that is, where is $|g_\theta|$ largest? Work in
-# $v=\Delta/\sqrt\Sigma$. How far out does a `gaussian` bump of equal $\Sigma$ push hardest?
+# At which distance from the centre of a quartic basis is $|g_\theta|$ largest? Work in $v=\Delta/\sqrt\Sigma$. At which
+# distance is it largest for a `gaussian` basis of equal $\Sigma$?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v = (3/4)^(1/4) = 0.931.

@@ -13,11 +13,12 @@
 # %% [markdown]
 # # 10. The base losses: L1, SSIM, depth and smoothness
 #
-# Four terms hold the base model: colour by pixel, colour by structure, depth by its prior, and smoothness where nothing
-# is known. All but the last never read what lies under the instrument.
+# The base model has four loss terms: the colour of each pixel, the structure of the colours, the depth against the
+# prior depth, and smoothness where nothing is observed. All except the last read no value under the instrument.
 #
-# Equations {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of
-# {doc}`/specification/b08_depth` and {eq}`eq-b9` of {doc}`/specification/b09_smoothness`.
+# The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
+# {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
+# {doc}`/specification/b09_smoothness`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -48,8 +49,8 @@ H, W = M.shape
 #
 # ## Masked SSIM
 #
-# Both images are 0 where the mask is False. $k$ is a Gaussian window of 11×11 with standard deviation 1.5, sum 1; $*$ is
-# convolution with zeros outside the image.
+# Both images are 0 where the mask is False. $k$ is a Gaussian window of 11×11 with standard deviation 1.5 and sum 1.
+# $*$ is convolution with zeros outside the image.
 #
 # $$
 # \begin{aligned}
@@ -61,8 +62,8 @@ H, W = M.shape
 # \end{aligned}
 # $$
 #
-# The code computes the same quantity from the difference $e=x-y$ and the sum $f=x+y$. It needs no covariance, is exactly 1
-# for equal images, and keeps all digits of $1-s$:
+# The code computes the same quantity from the difference $e=x-y$ and the sum $f=x+y$. This form needs no covariance, is
+# exactly 1 for equal images, and keeps all digits of $1-s$:
 #
 # $$
 # \begin{aligned}
@@ -124,7 +125,8 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 # %% [markdown]
 # ## Normalised depth
 #
-# Depth and prior are divided by their own largest value, over the whole image: an unknown scale of the prior does not matter.
+# Rendered depth and prior depth are each divided by their own largest value over the whole image, so the scale of the
+# prior has no effect.
 #
 # $$
 # m=\max_{p}\hat D_p,\qquad m_D=\max_{p}D_p,\qquad
@@ -133,8 +135,8 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps depth smooth on tissue away from depth edges $E$; the two total variations keep depth and colour flat under the
-# instrument, where nothing is observed.
+# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. The two total variations keep depth and
+# colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
@@ -181,10 +183,10 @@ L_smooth, saved_smooth = smoothness_forward(step, I_hat, M, E, 30.0)
 np.testing.assert_allclose(L_smooth, smoothness_text(step, I_hat, M, E, 30.0), rtol=1e-12)
 
 # %% [markdown]
-# ## A picture: why there is an SSIM beside the L1
+# ## Figure: why SSIM is used beside L1
 #
-# Three renders with **equal** masked L1. A person prefers the first by far. L1 cannot tell; SSIM can. (Maps of $1-s$, mean over
-# channels.)
+# The three renders have **equal** masked L1, but the first looks much better. L1 does not distinguish them; SSIM does.
+# (The maps show $1-s$, averaged over channels.)
 
 # %% tags=["hide-input"]
 from scipy.ndimage import gaussian_filter
@@ -212,7 +214,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse passes
 #
-# **L1**: the derivative of $|\cdot|$ is the sign; $\operatorname{sign}(0)=0$.
+# **L1.** The derivative of $|\cdot|$ is the sign, with $\operatorname{sign}(0)=0$.
 #
 # $$
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
@@ -230,13 +232,13 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Depth.** The maximum is part of the formula: all pixels together decide how the largest one is pulled.
+# **Depth.** The maximum is part of the formula, so the gradient at the largest pixel contains a sum over all pixels.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
 # $$
 #
-# **Smoothness.** Each pixel meets its up to four neighbours.
+# **Smoothness.** Each pixel has at most four neighbours.
 #
 # $$
 # \begin{aligned}
@@ -315,8 +317,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The depth loss does not change when the rendered depth is multiplied by a constant. What does that say about the gradient,
-# $\sum_p g_{\hat D_p}\hat D_p$? Check it; then say which term of the gradient makes it true.
+# The depth loss does not change when the rendered depth is multiplied by a constant. What follows for the sum
+# $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum makes it so: without it every pixel

@@ -13,10 +13,12 @@
 # %% [markdown]
 # # 12. The optimiser and density control
 #
-# Gradients are turned into steps by Adam, with one rate per kind of parameter. And every hundred iterations the number of
-# Gaussians itself is adapted: more where the picture pulls hard, fewer where they have faded.
+# Adam turns gradients into steps, with one rate per kind of parameter. Every hundred iterations density control adapts
+# the number of Gaussians: it adds Gaussians where the screen gradient is large and removes Gaussians whose opacity is
+# small.
 #
-# Equations {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of {doc}`/specification/b11_density`.
+# The equations are {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of
+# {doc}`/specification/b11_density`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -45,7 +47,7 @@ rng = np.random.default_rng(12)
 # \end{aligned}
 # $$
 #
-# $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
+# The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
 
 # %% tags=["transcription"]
 beta_1, beta_2, epsilon = 0.9, 0.999, 1e-15
@@ -79,8 +81,9 @@ for k in (1, 2, 3):
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
-# **Size does not matter, sign does.** The first step is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 or of $10^{-10}$. With
-# $\epsilon=10^{-15}$ even rounding noise moves a parameter by a full step. That is why every sum in the package has a fixed order.
+# **The first step depends on the sign only.** It is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 as for one of
+# $10^{-10}$. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a full step. Every sum in the package
+# therefore has a fixed order.
 
 # %%
 for size in (1.0, 1e-10):
@@ -91,7 +94,8 @@ for size in (1.0, 1e-10):
 # %% [markdown]
 # ## The rates
 #
-# Position, deformation and residuals decay exponentially to $\varphi=0.01$ of their start; the residuals begin at $K_s$:
+# The rates of position, deformation and residuals decay exponentially to $\varphi=0.01$ of their start. Those of the
+# residuals start at $K_s$:
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
@@ -121,16 +125,17 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # %% [markdown]
 # ## Density control
 #
-# Where the image pulls a Gaussian hard across the screen, one Gaussian does the work of two. The measure is the mean gradient by its
-# screen centre, in units of normalised device coordinates, over the views in which it is visible:
+# A large gradient by the screen centre of a Gaussian indicates that one Gaussian covers a region that needs two. The
+# statistic is the mean norm of this gradient, in units of normalised device coordinates, over the views in which the
+# Gaussian is visible:
 #
 # $$
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}
 # $$
 #
-# Then, in this order: **prune** below opacity 0.005; **clone** a steep Gaussian whose largest semi-axis is at most $p\,e=0.1$ scene
-# units; **split** a larger one into two children of $1/1.6$ of its size, drawn from it. Children inherit everything; their
-# moments start at 0.
+# The rule has three steps, in this order. **Prune** Gaussians with an opacity below 0.005. **Clone** a candidate whose
+# largest semi-axis is at most $p\,e=0.1$ scene units. **Split** a larger candidate into two children of $1/1.6$ of its
+# size, whose positions are drawn from it. Children inherit all other parameters; their moments start at 0.
 
 
 # %% tags=["transcription"]
@@ -208,7 +213,7 @@ for column, parent in enumerate(to_split):
         np.testing.assert_allclose(after.gaussians.log_scale[:, at], log_scale, rtol=1e-12)
 
 # %% [markdown]
-# ## A picture: rates over a run, and one act of density control
+# ## Figure: rates over a run, and one step of density control
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1])
@@ -250,9 +255,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are by-products of compositing, before the
-# projection adds its share: they say how hard the image pulls, whatever the parameters do with it. So the pair to check is
-# that of {doc}`08_compositing`, block `mean2d`.
+# Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are results of the reverse
+# pass of compositing, before that of the projection. The pair to check is therefore that of {doc}`08_compositing`,
+# block `mean2d`.
 
 # %%
 with one_thread():
@@ -263,8 +268,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and goes on. How large is the first update of a child born at
-# $k=600$, in units of $\eta$? And when the count is very large?
+# A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and continues. How large is the first update
+# of a child added at $k=600$, in units of $\eta$? How large is it when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and the corrections no longer make up for it.

@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 14. From one frame to a full sequence
 #
-# All stages are in place. We fit one frame, then a whole clip; look at frames that the training has never seen; and take the
-# components of the paper out one by one.
+# The previous notebooks explain all stages. This notebook fits one frame and then a whole clip, evaluates frames that
+# were not used in training, and removes the components of the paper one by one.
 #
-# Equation {eq}`eq-6` of {doc}`/specification/06_objective`; {eq}`eq-m1` and {eq}`eq-m2` of {doc}`/specification/metrics`.
+# The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
+# {doc}`/specification/metrics`.
 
 # %%
 import base64
@@ -63,17 +64,18 @@ print(f"{sequence.count} frames of {sequence.width}x{sequence.height}; held out:
 # \end{aligned}
 # $$
 #
-# The terms are those of {doc}`10_base_losses`, {doc}`09_laplacian_pyramid` and {doc}`04_motion_and_prior`. The detail weight rises
-# from iteration $a$ to $b$:
+# The terms are those of {doc}`10_base_losses`, {doc}`09_laplacian_pyramid` and {doc}`04_motion_and_prior`. The
+# Laplacian weight is a ramp from iteration $a$ to $b$:
 #
 # $$
 # \lambda_{\mathrm{lap}}(i) = \lambda_{\mathrm{lap}}\,\min\!\left(1,\max\!\left(0,\frac{i-a}{b-a}\right)\right).
 # $$
 #
-# The rest of the iteration is bookkeeping: draw a view, render, reverse, one Adam step ({doc}`12_optimiser_and_density`).
+# The other steps of an iteration are: draw a view, render, reverse, one Adam step ({doc}`12_optimiser_and_density`).
+# {doc}`/one_iteration` describes them all.
 #
-# The transcription takes the terms that an iteration reports and forms the sum by the text. It is compared with **every**
-# iteration of the run below.
+# The transcription takes the terms that an iteration reports and forms the sum of the text. It is compared with
+# **every** iteration of the run below.
 
 
 # %% tags=["transcription"]
@@ -123,7 +125,7 @@ def score(state, shop, frames, **components):
 # %% [markdown]
 # ## One frame
 #
-# The first training frame alone. Nothing moves, so everything that moves is off.
+# This run uses the first training frame alone. Nothing moves, so every component of motion is off.
 
 # %%
 first = int(sequence.train_index[0])
@@ -186,7 +188,8 @@ plt.show()
 # %% [markdown]
 # ## Held-out frames: the numbers
 #
-# $\hat x,x$ are render and truth with excluded pixels 0, $n$ counts tissue pixels, $s$ is the map of {eq}`eq-b7`.
+# $\hat x,x$ are render and truth with excluded pixels set to 0. $n$ is the number of tissue pixels, and $s$ is the map
+# of {eq}`eq-b7`.
 #
 # $$
 # \begin{aligned}
@@ -237,9 +240,10 @@ for k in sequence.test_index:
 # %% [markdown]
 # ## Held-out frames: the pictures
 #
-# Frames that took part in nothing: not in the losses, not in the initial points, not in the statistics of the atoms. Below:
-# truth, render, error over tissue, and what each residual does to the picture. S adds little here: its rate is a tenth of that of
-# the deformation, and a short run gives it few steps.
+# Held-out frames are used in no part of training: not in the losses, not for the initial points, not in the statistics
+# of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each residual on the
+# image. The effect of S is small here, because its rate is a tenth of that of the deformation and a short run has few
+# steps.
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -272,8 +276,8 @@ for row, k in zip(axes, shown):
 plt.show()
 
 # %% [markdown]
-# And moving, from the first to the last frame and half-way between any two: observed frames on the left, the render on the
-# right, with a red bar while the moment is that of a held-out frame.
+# The animation runs from the first to the last frame and includes the times half-way between frames. Observed frames
+# are on the left and the render is on the right. A red bar marks the times of held-out frames.
 
 # %% tags=["hide-input"]
 times = np.arange(2 * sequence.count - 1) / (2 * sequence.count)
@@ -296,9 +300,9 @@ SimpleNamespace(
 # %% [markdown]
 # ## Ablation
 #
-# Each component out, everything else equal: the same seed, the same schedule. Beside them the answers that need no model. Be
-# honest with small differences: one seed of a short run says little. On a slow clip the blend of two neighbouring frames is
-# hard to beat; a reconstruction also gives depth, and any other moment and view.
+# Each component is removed in turn, with the same seed and the same schedule. The table also lists the baselines, which
+# need no model. Small differences are not significant: they come from one seed of a short run. On a slow clip the blend
+# of two neighbouring frames is a strong baseline. A reconstruction also gives depth, and any other time and view.
 
 # %% tags=["hide-input"]
 variants = {
@@ -361,14 +365,15 @@ np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
 # %% [markdown]
 # ## The reverse pass
 #
-# The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. From there it runs
-# through compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection {eq}`eq-b3`, covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals
-# {eq}`eq-2` and {eq}`eq-3`, in that order: each stage of these notebooks, backwards. $\mathcal L_{\mathrm{msp}}$ adds to $g_C$ directly.
+# The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. It
+# continues through the reverse passes of compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection {eq}`eq-b3`,
+# covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and {eq}`eq-3`, in that order. The
+# gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
 #
 # ## The gradient check
 #
-# The whole chain as one function: ten groups of raw parameters in, one number out. One block per group here;
-# `endotsr gradcheck` probes the same pair in finer blocks.
+# The whole chain is checked as one function of ten groups of raw parameters with one number as its value. Here each
+# group is one block; `endotsr gradcheck` probes the same pair in finer blocks.
 
 # %%
 pair = all_pairs()["objective"]
@@ -388,8 +393,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# Take component A out of the **trained** model (`render_at(..., appearance=False)`), and compare with the model that was trained
-# without A. Which is better on the training frames? Why does an ablation need a training of its own?
+# Remove component A from the **trained** model (`render_at(..., appearance=False)`), and compare with the model that
+# was trained without A. Which is better on the training frames? Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The one trained without A: its other parameters have learned to do without (wrongly, by moving things). The difference

@@ -55,6 +55,18 @@ WAITING = {
     "fitting": {"_spectral_penalty", "born", "share"},
     "golden": {"_share", "detail", "detail_saved", "lap", "share"},
     "gradcheck": {"share"},
+    "runs": {"born"},
+    "sequences": {
+        "LEAST_DEPTH_SHARE",
+        "LEAST_MISSING_SHARE",
+        "LEAST_TISSUE_SHARE",
+        "MOST_SOFT_SHARE",
+        "OPPOSITE_SHARE",
+        "check_tissue_share",
+        "share",
+        "shares",
+    },
+    "simulator": {"share"},
     "tradeoff": {"share"},
 }
 

@@ -87,7 +87,7 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
     """The settings that show in the arrays themselves."""
     from endotsr.fitting.schedules import residuals_active
 
-    gaussians, active = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
+    gaussians, born = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
     yield "training.precision", gaussians.position.dtype.name
     yield "model.harmonics_degree", math.isqrt(len(gaussians.harmonics)) - 1
     yield "model.deformation", gaussians.fdm_weight is not None
@@ -95,7 +95,7 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
         yield "model.bases", gaussians.fdm_weight.shape[1]
     residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}
     for name, coefficients in residuals.items():
-        if active or coefficients is not None:  # before activation they are missing in any model
+        if born or coefficients is not None:  # before their birth they are missing in any model
             yield f"model.{name}", coefficients is not None
         if coefficients is not None:
             yield "model.frequencies", coefficients.shape[1] // 2
