@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.golden.cases import all_operations
 from endotsr.golden.format import SCHEMAS, Rule, schema_text
 from endotsr.golden.generate import check, moved, solve_all
-from endotsr.golden.generator import fnv1a, single, words
+from endotsr.golden.generator import single
 from endotsr.golden.npy import npy_bytes
-from endotsr.golden.operations_splatting import raster_of
 from endotsr.golden.solve import MARGIN, reference
 from endotsr.golden.store import golden_folder, read_golden
 from endotsr.gradcheck import all_pairs
 from endotsr.splatting.fast.blocks import supports
+from endotsr.stages.registry import all_stages
+from endotsr.stages.requests import raster_of
+from endotsr.stages.words import fnv1a, words
 
 FOLDER = golden_folder()
 
@@ -50,7 +51,7 @@ def test_no_case_names_a_pair_that_does_not_exist(golden):
 
 
 def test_every_operation_and_level_has_a_case(golden):
-    assert {case.operation for case in golden.cases} == set(all_operations())
+    assert {case.operation for case in golden.cases} == set(all_stages())
     assert {o.level for case in golden.cases for o in case.outputs.values()} == {0, 1, 2, 3, 4, 5}
 
 
@@ -153,7 +154,7 @@ RASTERISED = ("composite", "render", "objective")
 
 def test_no_decision_hangs_on_rounding(golden):
     """Thresholds moved by 1e-5 either way leave every image as it is, but in the case that stands on the cutoff."""
-    operations = all_operations()
+    operations = all_stages()
     for case in golden.cases:
         if case.operation not in RASTERISED or case.case in ("on_the_cutoff", "one_on_the_cutoff"):
             continue
@@ -170,7 +171,7 @@ def test_no_decision_hangs_on_rounding(golden):
 
 def test_no_densification_hangs_on_rounding(golden):
     """Thresholds moved by 1e-5 leave every decision as it is; what stands exactly on one counts, as it should."""
-    operation = all_operations()["density"]
+    operation = all_stages()["density"]
     for case in golden.cases:
         if case.operation != "density":
             continue
@@ -188,7 +189,7 @@ def test_the_contract_explains_every_operation_and_rule(golden):
     text = (FOLDER / "README.md").read_text()
     kinds = {o.compare.kind for case in golden.cases for o in case.outputs.values()}
     assert kinds == set(get_args(get_type_hints(Rule)["kind"]))
-    assert [word for word in kinds | set(all_operations()) if f"`{word}`" not in text] == []
+    assert [word for word in kinds | set(all_stages()) if f"`{word}`" not in text] == []
 
 
 def test_schemas_describe_the_files():
@@ -252,8 +253,8 @@ def test_the_reference_answers_by_two_paths(golden, operation):
     case = next(case for case in cases if supports(raster_of(case.settings)))
     inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
     answers = [
-        reference(all_operations()[operation], inputs, case.settings, "float32", p) for p in ("definition", "blocks")
+        reference(all_stages()[operation], inputs, case.settings, "float32", p) for p in ("definition", "blocks")
     ]
     assert any(answers[0][name].tobytes() != answers[1][name].tobytes() for name in answers[0])
     with pytest.raises(ValueError, match="'rows' is not known; allowed: definition, blocks"):
-        reference(all_operations()[operation], inputs, case.settings, "float32", "rows")
+        reference(all_stages()[operation], inputs, case.settings, "float32", "rows")

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 from _pytest.runner import runtestprotocol
 
-from endotsr.golden.cases import all_operations
 from endotsr.golden.compare import judged
 from endotsr.golden.format import Case
 from endotsr.golden.solve import reference, stored
 from endotsr.golden.store import Golden
 from endotsr.gradcheck import Pair
+from endotsr.stages.registry import all_stages
 from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")
@@ -125,7 +125,7 @@ def forward_only(pair: Pair, recorded: Recorded) -> Check:
 
 def of_case(golden: Golden, case: Case) -> list[Check]:
     """The reference against the stored answer, both paths, and in float32."""
-    operation = all_operations()[case.operation]
+    operation = all_stages()[case.operation]
     inputs = {name: golden.array(case, a.file) for name, a in case.inputs.items()}
     expected = {name: golden.array(case, o.file) for name, o in case.outputs.items()}
 

@@ -4,15 +4,7 @@ import importlib
 from typing import Any, NamedTuple
 
 from endotsr.golden.generator import Made, uniform
-from endotsr.golden.operation import Operation
 
-OPERATION_MODULES = (
-    "operations_equations",
-    "operations_losses",
-    "operations_splatting",
-    "operations_fitting",
-    "operations_scene",
-)
 CASE_MODULES = ("cases_equations", "cases_losses", "cases_splatting", "cases_fitting", "cases_scene", "cases_edges")
 
 
@@ -51,15 +43,6 @@ class Seeds:
     def uniform(self, array: str, low: float, high: float, *shape: int, unit: str = "1") -> Made:
         """See `generator.uniform`."""
         return uniform(self.seed(array), low, high, shape, unit)
-
-
-def all_operations() -> dict[str, Operation]:
-    """Every operation by name."""
-    found: dict[str, Operation] = {}
-    for module in OPERATION_MODULES:
-        for operation in importlib.import_module(f"endotsr.golden.{module}").OPERATIONS:
-            found[operation.name] = operation
-    return found
 
 
 def all_specs() -> list[Spec]:

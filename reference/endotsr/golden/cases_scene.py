@@ -19,7 +19,7 @@ from endotsr.golden.cases import Seeds, Spec
 from endotsr.golden.cases_equations import stamps, tissue, train_index
 from endotsr.golden.cases_splatting import PRESETS, pose, scene_inputs
 from endotsr.golden.generator import Made, changed, given
-from endotsr.golden.operations_splatting import raster_dict
+from endotsr.stages.requests import raster_dict
 
 COUNT, BASES, FREQUENCIES, FRAMES = 12, 3, 2, 12
 LENS = {"fx": 24.0, "fy": 24.0, "cx": 12.0, "cy": 10.0, "width": 25, "height": 21}

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import msgspec
 
-from endotsr.golden.cases import all_operations, all_specs
+from endotsr.golden.cases import all_specs
 from endotsr.golden.compare import judged
 from endotsr.golden.format import Case, Manifest, read_struct
 from endotsr.golden.negative import all_negatives
 from endotsr.golden.solve import Solved, solve
 from endotsr.golden.store import machine_class, plain_or_none, rendered_files
+from endotsr.stages.registry import all_stages
 
 GENERATED = ("cases", "schemas")
 
@@ -22,8 +23,8 @@ def solve_all() -> list[Solved]:
 
     Raises: ValueError where a case does not show the mistakes it was made for.
     """
-    operations, negatives = all_operations(), all_negatives()
-    return [solve(spec, operations[spec.operation], negatives) for spec in all_specs()]
+    stages, negatives = all_stages(), all_negatives()
+    return [solve(spec, stages[spec.operation], negatives) for spec in all_specs()]
 
 
 def check(folder: Path, *, bitwise: bool = True) -> tuple[list[str], str]:

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.golden.negative import Negative, Request, Wrong, setting
-from endotsr.golden.operations_splatting import camera_of, raster_of
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
+from endotsr.stages.requests import camera_of, raster_of
 
 # ---- losses and stages ----
 

@@ -11,7 +11,7 @@ from endotsr.kernels.constants import Y00
 
 def _signed_words(request: Request) -> dict[str, NDArray]:
     """A signed right shift smears the sign bit."""
-    from endotsr.golden.generator import GAMMA, MIX_1, MIX_2, fnv1a
+    from endotsr.stages.words import GAMMA, MIX_1, MIX_2, fnv1a
 
     count = request.settings["count"]
     with np.errstate(over="ignore"):

@@ -9,8 +9,8 @@ from endotsr.equations.deformation import deformation_forward
 from endotsr.equations.dictionary import normalised_atoms
 from endotsr.equations.motion import motion_forward
 from endotsr.golden.negative import Negative, Request, Wrong, setting, swapped
-from endotsr.golden.operations_scene import gaussians_of, model_of, spectral_of
 from endotsr.kernels.constants import Y00
+from endotsr.stages.requests import gaussians_of, model_of, spectral_of
 
 
 def _loss(**changes: Any) -> dict[str, Wrong]:

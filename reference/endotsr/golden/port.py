@@ -11,14 +11,14 @@ import msgspec
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.golden.cases import all_operations
 from endotsr.golden.format import Case, Precision, Request, RequestOutput, Requests, read_struct, to_json
 from endotsr.golden.negative import Negative, answer
 from endotsr.golden.negative import Request as WrongRequest
 from endotsr.golden.npy import Refused, read_plain, write_npy
-from endotsr.golden.operation import Outputs
 from endotsr.golden.solve import reference, stored
 from endotsr.golden.store import Golden
+from endotsr.stages.registry import all_stages
+from endotsr.stages.stage import Outputs
 
 KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golden run`
 
@@ -124,7 +124,7 @@ def answer_wrongly(golden: Golden, outputs: Path, negative: Negative, *, spoiled
 
     spoiled_only   write no case that the mistake leaves alone
     """
-    operations, spoiled = all_operations(), 0
+    operations, spoiled = all_stages(), 0
     for case in golden.cases:
         operation, inputs = operations[case.operation], _inputs(golden, case)
         right: Outputs = {name: golden.array(case, o.file) for name, o in case.outputs.items()}
@@ -147,7 +147,7 @@ def _inputs(golden: Golden, case: Case) -> dict[str, np.ndarray]:
 
 def _answer(operation: str, inputs: dict, settings: dict[str, Any], precision: str) -> Outputs:
     """With the fast compositing where it applies: the expected values come from the other path."""
-    return reference(all_operations()[operation], inputs, settings, precision, "blocks")
+    return reference(all_stages()[operation], inputs, settings, precision, "blocks")
 
 
 def _write(folder: Path, found: Outputs, names: list[str], precision: str) -> None:

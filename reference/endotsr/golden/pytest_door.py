@@ -12,8 +12,8 @@ from endotsr.errors import InputError
 from endotsr.golden.format import Case, Precision
 from endotsr.golden.judge import CaseReport, judge_case
 from endotsr.golden.npy import write_npy
-from endotsr.golden.operation import in_precision
 from endotsr.golden.store import Golden, golden_folder, read_golden
+from endotsr.stages.stage import in_precision
 
 Answer = Callable[[str, dict[str, NDArray], dict[str, Any]], Mapping[str, NDArray | float] | None]
 

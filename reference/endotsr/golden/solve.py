@@ -11,8 +11,8 @@ from endotsr.golden.compare import distances, fingerprint, largest, misses
 from endotsr.golden.format import Array, Because, Case, Mistake, Output, Rule, Truth
 from endotsr.golden.generator import signs
 from endotsr.golden.negative import Negative, Request, answer
-from endotsr.golden.operation import Asked, Inputs, Operation, Outputs, in_precision, tidy
 from endotsr.splatting.render import Compositor
+from endotsr.stages.stage import Asked, Inputs, Outputs, Stage, in_precision
 
 MARGIN = 10.0  # a mistake counts as caught when it is this many tolerances large
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
@@ -36,9 +36,9 @@ class Solved(NamedTuple):
         return found
 
 
-def reference(operation: Operation, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
+def reference(operation: Stage, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
     """The reference's own answer in one precision; compositor `blocks` takes its fast compositing where it can."""
-    return tidy(operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor}))
+    return operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor})
 
 
 def stored(array: NDArray) -> NDArray:
@@ -53,7 +53,7 @@ def kind_of(array: NDArray) -> str:
     return {"f": "real", "b": "boolean"}.get(array.dtype.kind, "integer")
 
 
-def solve(spec: Spec, operation: Operation, negatives: dict[str, Negative]) -> Solved:
+def solve(spec: Spec, operation: Stage, negatives: dict[str, Negative]) -> Solved:
     """Raises ValueError if a flag of the case names a mistake that the case does not show."""
     inputs = {name: stored(made.array) for name, made in spec.inputs.items()}
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
@@ -82,7 +82,7 @@ def solve(spec: Spec, operation: Operation, negatives: dict[str, Negative]) -> S
     }  # fmt: skip
     case = Case(
         family=spec.family, case=spec.case, operation=operation.name, equation=operation.equation,
-        pairs=operation.pairs(spec.settings), title=spec.title, level=min(o.level for o in outputs.values()),
+        pairs=operation.checks(spec.settings), title=spec.title, level=min(o.level for o in outputs.values()),
         flags=spec.flags, settings=spec.settings, inputs=arrays, outputs=outputs, mistakes=mistakes,
     )  # fmt: skip
     return Solved(case, inputs, answers)
@@ -126,7 +126,7 @@ def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDA
 
 
 def _spreads(
-    spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
+    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
 ) -> dict[str, tuple[float, float]]:
     def run(arrays: Inputs, precision: str, compositor: Compositor = "definition") -> Outputs:
         return reference(operation, arrays, spec.settings, precision, compositor)
@@ -159,7 +159,7 @@ def _finite(value: float) -> float:
     return value
 
 
-def _bands(spec: Spec, operation: Operation, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
+def _bands(spec: Spec, operation: Stage, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
     """Flip budgets: entries that change when the cutoff moves by BAND, and by how much."""
     raster, found = spec.settings["raster"], {}
     cut = raster["alpha_cutoff"]
@@ -181,7 +181,7 @@ def _bands(spec: Spec, operation: Operation, inputs: Inputs, expected: Outputs, 
 
 
 def _mistakes(
-    spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
+    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
     asked: dict[str, Asked], negatives: dict[str, Negative],
 ) -> dict[str, Mistake]:  # fmt: skip
     """What every wrong port does to this case, as far as it shows."""
