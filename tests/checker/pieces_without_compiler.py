@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from test_ranges import PAIRS, both_passes, case, share_one_by_one
+from test_ranges import PAIRS, both_passes, case, run_one_by_one
 
 from endotsr.equations.deformation import CHANNELS, deformation_forward, deformation_reverse
 from endotsr.fitting.adam import adam_state, adam_update
@@ -47,7 +47,7 @@ def test_pieces_of_any_length_give_the_same_numbers(name, length, monkeypatch):
         whole = both_passes(*chosen)
         shorten(monkeypatch, length)
         cut = both_passes(*chosen)
-        share_one_by_one(monkeypatch)
+        run_one_by_one(monkeypatch)
         alone = both_passes(*chosen)
     for key, value in whole.items():
         largest = np.abs(value).max(initial=0.0)
@@ -81,7 +81,7 @@ def test_adam_and_the_fused_step_in_pieces(length, count, ranges, monkeypatch):
         whole = stepped(False)
         shorten(monkeypatch, length)
         if ranges == "one by one":
-            share_one_by_one(monkeypatch)
+            run_one_by_one(monkeypatch)
         for fused in (False, True):
             for one, two in zip(stepped(fused), whole, strict=True):
                 np.testing.assert_array_equal(one, two)
@@ -105,6 +105,6 @@ def test_the_fused_step_of_coefficients_in_pieces(length, count, ranges, monkeyp
         whole = stepped()
         shorten(monkeypatch, length)
         if ranges == "one by one":
-            share_one_by_one(monkeypatch)
+            run_one_by_one(monkeypatch)
         for one, two in zip(stepped(), whole, strict=True):
             np.testing.assert_array_equal(one, two)
