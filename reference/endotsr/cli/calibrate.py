@@ -43,7 +43,7 @@ class CalibrateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.fitting.trainer import calibrate_on
+    from endotsr.fitting.objective import calibrate_on
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence

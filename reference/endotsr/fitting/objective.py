@@ -107,9 +107,11 @@ def depth_term(rendered: RenderOut, target: DepthTarget, weight: float) -> Term:
     return Term(value, None, normalised_depth_reverse(weight, saved))
 
 
-def smoothness_term(rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float) -> Term:
-    """Smooth depth away from its edges, and total variation."""
-    edges = canny_edges(rendered.depth)
+def smoothness_term(
+    rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float, edges: NDArray[np.bool_] | None = None
+) -> Term:
+    """Smooth depth away from its edges (detected unless given), and total variation."""
+    edges = canny_edges(rendered.depth) if edges is None else edges
     value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
     smooth = smoothness_reverse(weight, saved)
     return Term(value, smooth.rendered, smooth.rendered_depth)
@@ -124,10 +126,17 @@ def laplacian_term(
 
 
 def image_loss(
-    rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig, timer: Timer = NO_TIMER
+    rendered: RenderOut,
+    targets: Targets,
+    weights: LossWeights,
+    config: LossConfig,
+    edges: NDArray[np.bool_] | None = None,
+    *,
+    timer: Timer = NO_TIMER,
 ) -> ImageLoss:
     """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
 
+    edges   (H, W) True = edge of the rendered depth; None = detected
     timer   told of the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
@@ -138,7 +147,7 @@ def image_loss(
         calls["depth"] = lambda: depth_term(rendered, depth, weights.depth)
     if weights.smoothness > 0:
         factor = config.total_variation_factor
-        calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
+        calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor, edges)
     if weights.laplacian > 0 and supports is not None:
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
     photometric, *others = parallel_calls(

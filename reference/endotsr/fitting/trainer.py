@@ -187,7 +187,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     settings = raster_settings(config)
     degree = active_degree(iteration, config)
     rendered, render_saved = render_forward(scene, camera, settings, degree=degree, timer=timer)
-    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer)
+    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
     grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved, timer=timer)
     watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(

@@ -13,7 +13,6 @@ from endotsr.golden.judge.format import FLIP_BUDGET, SCHEMAS, Rule, schema_text
 from endotsr.golden.judge.npy import npy_bytes
 from endotsr.golden.judge.store import golden_folder, read_golden
 from endotsr.golden.judge.words import fnv1a, words
-from endotsr.golden.operations_splatting import raster_of
 from endotsr.golden.vectors.generate import check, moved, solve_all
 from endotsr.golden.vectors.making import single
 from endotsr.golden.vectors.reference import reference
@@ -21,6 +20,7 @@ from endotsr.golden.vectors.registry import all_operations
 from endotsr.golden.vectors.solve import MARGIN
 from endotsr.gradcheck import all_pairs
 from endotsr.splatting.fast.blocks import supports
+from endotsr.stages.requests import raster_of
 
 FOLDER = golden_folder()
 

@@ -30,6 +30,11 @@ def words(seed: int, count: int) -> NDArray[np.uint64]:
         return z ^ (z >> np.uint64(31))
 
 
+def unit_numbers(found: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """The top 24 bits of each word over 2^24: numbers in [0, 1)."""
+    return (found >> np.uint64(40)).astype(np.float64) / 2.0**24
+
+
 def signs(seed: str, count: int) -> NDArray[np.float64]:
     """+1 or -1 from the highest bit of the words of a seed; what the fingerprints of outputs are summed with."""
     return 1.0 - 2.0 * (words(fnv1a(seed), count) >> np.uint64(63)).astype(np.float64)

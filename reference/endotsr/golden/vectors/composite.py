@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.operations_splatting import raster_of
 from endotsr.golden.vectors.making import Seeds, Spec, given
 from endotsr.golden.vectors.screens import flat_covariance, raster_settings, screen_inputs
 from endotsr.golden.vectors.views import PRESETS, logit_of
 from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, setting, swapped
 from endotsr.golden.vectors.wrong_raster import Screen, composited, deviating, opacity_of
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
+from endotsr.stages.requests import raster_of
 
 OPERATIONS = ("composite",)
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.operations_splatting import raster_dict
 from endotsr.golden.vectors.images import tissue
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.moving import LENS, TIME, model_settings, moving_inputs
 from endotsr.golden.vectors.views import PRESETS
 from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, swapped, within
 from endotsr.kernels.constants import Y00
+from endotsr.stages.requests import raster_dict
 
 OPERATIONS = ("objective", "determinism")
 HEIGHT, WIDTH = int(LENS["height"]), int(LENS["width"])

@@ -11,16 +11,16 @@ from endotsr.errors import InputError
 from endotsr.golden.judge.format import Precision, Request, Requests, read_struct
 from endotsr.golden.judge.npy import Refused, read_plain, write_npy
 from endotsr.golden.judge.store import Golden, in_precision
-from endotsr.golden.operation import Inputs, Operation, Outputs, tidy
 from endotsr.golden.vectors.registry import all_operations
 from endotsr.golden.vectors.wrong import Request as WrongRequest
 from endotsr.golden.vectors.wrong import WrongPort, answer
 from endotsr.splatting.render import Compositor
+from endotsr.stages.stage import Inputs, Outputs, Stage
 
 
-def reference(operation: Operation, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
+def reference(operation: Stage, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
     """The reference's own answer in one precision; compositor `blocks` takes its fast compositing where it can."""
-    return tidy(operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor}))
+    return operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor})
 
 
 def stored(array: NDArray) -> NDArray:

@@ -7,17 +7,12 @@ port stands beside the rule that it breaks; where it spoils cases of later famil
 import importlib
 from types import ModuleType
 
-from endotsr.golden.operation import Operation
+from endotsr.golden.vectors import contract
 from endotsr.golden.vectors.making import Spec
 from endotsr.golden.vectors.wrong import WrongPort
+from endotsr.stages.registry import all_stages
+from endotsr.stages.stage import Stage
 
-OPERATION_MODULES = (
-    "operations_equations",
-    "operations_losses",
-    "operations_splatting",
-    "operations_fitting",
-    "operations_scene",
-)
 FAMILIES = (
     "reading",
     "dictionary",
@@ -52,13 +47,9 @@ def families() -> list[ModuleType]:
     return [importlib.import_module(f"endotsr.golden.vectors.{name}") for name in FAMILIES]
 
 
-def all_operations() -> dict[str, Operation]:
-    """Every operation by name."""
-    found: dict[str, Operation] = {}
-    for module in OPERATION_MODULES:
-        for operation in importlib.import_module(f"endotsr.golden.{module}").OPERATIONS:
-            found[operation.name] = operation
-    return found
+def all_operations() -> dict[str, Stage]:
+    """Every operation by name: those of the contract alone, then the stages of the method."""
+    return {stage.name: stage for stage in contract.STAGES} | all_stages()
 
 
 def all_specs() -> list[Spec]:

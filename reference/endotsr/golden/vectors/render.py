@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.operations_splatting import camera_of, raster_of
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
 from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, within
@@ -19,6 +18,7 @@ from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.projection import projection_forward
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from endotsr.stages.requests import camera_of, raster_of
 
 OPERATIONS = ("render",)
 

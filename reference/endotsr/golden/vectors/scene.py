@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from endotsr.equations.deformation import deformation_forward
 from endotsr.equations.dictionary import normalised_atoms
 from endotsr.equations.motion import motion_forward
-from endotsr.golden.operations_scene import gaussians_of, model_of, spectral_of
 from endotsr.golden.vectors.making import Seeds, Spec
 from endotsr.golden.vectors.moving import TIME, model_settings, moving_inputs
 from endotsr.golden.vectors.wrong import Request, WrongPort
+from endotsr.stages.requests import gaussians_of, model_of, spectral_of
 
 OPERATIONS = ("scene",)
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from endotsr.golden.operations_splatting import raster_dict
 from endotsr.golden.vectors.making import Made, Seeds, given, permutation
 from endotsr.splatting.settings import RasterSettings
+from endotsr.stages.requests import raster_dict
 
 WIDTH, HEIGHT = 18, 13
 

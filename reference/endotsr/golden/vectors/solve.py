@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from endotsr.golden.judge.compare import distances, fingerprint, largest, misses
 from endotsr.golden.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Truth
 from endotsr.golden.judge.words import signs
-from endotsr.golden.operation import Asked, Inputs, Operation, Outputs
 from endotsr.golden.vectors.making import Spec
 from endotsr.golden.vectors.reference import reference, stored
 from endotsr.golden.vectors.wrong import Request, WrongPort, answer
 from endotsr.splatting.render import Compositor
+from endotsr.stages.stage import Asked, Inputs, Outputs, Stage
 
 MARGIN = 10.0  # a mistake counts as caught when it is this many tolerances large
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
@@ -41,7 +41,7 @@ def kind_of(array: NDArray) -> str:
     return {"f": "real", "b": "boolean"}.get(array.dtype.kind, "integer")
 
 
-def solve(spec: Spec, operation: Operation, wrong_ports: dict[str, WrongPort]) -> Solved:
+def solve(spec: Spec, operation: Stage, wrong_ports: dict[str, WrongPort]) -> Solved:
     """Raises ValueError if a flag of the case names a mistake that the case does not show."""
     inputs = {name: stored(made.array) for name, made in spec.inputs.items()}
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
@@ -70,7 +70,7 @@ def solve(spec: Spec, operation: Operation, wrong_ports: dict[str, WrongPort]) -
     }  # fmt: skip
     case = Case(
         family=spec.family, case=spec.case, operation=operation.name, equation=operation.equation,
-        pairs=operation.pairs(spec.settings), title=spec.title, level=min(o.level for o in outputs.values()),
+        pairs=operation.checks(spec.settings), title=spec.title, level=min(o.level for o in outputs.values()),
         flags=spec.flags, settings=spec.settings, inputs=arrays, outputs=outputs, mistakes=mistakes,
     )  # fmt: skip
     return Solved(case, inputs, answers)
@@ -114,7 +114,7 @@ def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDA
 
 
 def _spreads(
-    spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
+    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
 ) -> dict[str, tuple[float, float]]:
     def run(arrays: Inputs, precision: str, compositor: Compositor = "definition") -> Outputs:
         return reference(operation, arrays, spec.settings, precision, compositor)
@@ -147,7 +147,7 @@ def _finite(value: float) -> float:
     return value
 
 
-def _flip_budgets(spec: Spec, operation: Operation, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
+def _flip_budgets(spec: Spec, operation: Stage, inputs: Inputs, expected: Outputs, rules: dict[str, Rule]):
     """Flip budgets: entries that change when the cutoff moves by FLIP_STEP, and by how much."""
     raster, found = spec.settings["raster"], {}
     cut = raster["alpha_cutoff"]
@@ -169,7 +169,7 @@ def _flip_budgets(spec: Spec, operation: Operation, inputs: Inputs, expected: Ou
 
 
 def _mistakes(
-    spec: Spec, operation: Operation, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
+    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
     asked: dict[str, Asked], wrong_ports: dict[str, WrongPort],
 ) -> dict[str, Mistake]:  # fmt: skip
     """What every wrong port does to this case, as far as it shows."""

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.golden.operations_splatting import raster_dict
 from endotsr.golden.vectors.making import Made, Seeds, changed, given, permutation, single
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from endotsr.stages.requests import raster_dict
 
 PRESETS = {"exact": EXACT, "paper": PAPER, "legacy": LEGACY}
 LENS = {"fx": 19.0, "fy": 23.0, "cx": 9.5, "cy": 9.25, "width": 21, "height": 17}

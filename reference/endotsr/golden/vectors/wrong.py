@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.operation import Inputs, Outputs, Settings, tidy
+from endotsr.stages.stage import Inputs, Outputs, Settings, tidy
 
 Run = Callable[[Inputs, Settings], Outputs]
 

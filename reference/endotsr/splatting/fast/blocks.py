@@ -38,13 +38,17 @@ from endotsr.splatting.fast.tiles import (
     FORWARD_NUMBERS,
     PLANE,
     REVERSE_NUMBERS,
-    TILE_HEIGHT,
-    TILE_WIDTH,
     block_height,
     clear,
     finished,
     read_tile,
     write_tile,
+)
+from endotsr.splatting.fast.tiles import (
+    TILE_HEIGHT as TILE_HEIGHT,
+)
+from endotsr.splatting.fast.tiles import (
+    TILE_WIDTH as TILE_WIDTH,
 )
 from endotsr.splatting.records import (
     BLUE,

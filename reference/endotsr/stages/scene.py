@@ -1,0 +1,260 @@
+"""Stages of the whole method: the moving scene, the objective (6) with every gradient, and the same twice."""
+
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import LossConfig, ModelConfig
+from endotsr.equations.deformation import deformation_reverse
+from endotsr.equations.laplacian import LEVELS, laplacian_levels, support_masks
+from endotsr.equations.matern import MaternSaved, matern_penalty_forward, matern_penalty_reverse
+from endotsr.fitting.model import SceneSaved, scene_at, scene_reverse
+from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, image_loss
+from endotsr.losses.depth import depth_target
+from endotsr.losses.masked_ssim import ssim_target
+from endotsr.opencv import canny_edges
+from endotsr.scene.gaussians import Gaussians
+from endotsr.splatting.render import RenderOut, RenderSaved, render_forward, render_reverse
+from endotsr.stages.compositing import POSE_UNITS, RAW_UNITS, render_decisions
+from endotsr.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
+from endotsr.stages.requests import (
+    camera_of,
+    compositor_of,
+    gaussians_of,
+    model_of,
+    raster_dict,
+    raster_of,
+    spectral_of,
+)
+from endotsr.stages.stage import Asked, Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
+
+BASES, FREQUENCIES = 3, 2
+
+
+# ---- the moving scene ----
+
+
+def _scene(inputs: Inputs, settings: Settings) -> tuple[Found, SceneSaved]:
+    model = model_of(settings)
+    scene, saved = scene_at(gaussians_of(inputs), spectral_of(inputs, settings), model, settings["t"])
+    names = ("position", "quaternion", "log_scale", "residual")
+    return {f"{name}_at_t": getattr(scene, name) for name in names}, saved
+
+
+# ---- the objective (6) ----
+
+
+class ObjectiveSaved(NamedTuple):
+    """What the reverse pass and the trace need."""
+
+    rendered: RenderOut
+    targets: Targets
+    loss: ImageLoss
+    penalty: float | None  # None without a spectral motion
+    lambda_msp: float
+    render: RenderSaved
+    scene: SceneSaved
+    matern: MaternSaved | None
+
+
+def _targets(inputs: Inputs, settings: Settings) -> Targets:
+    ssim = ssim_target(inputs["observed"], inputs["mask"])
+    supports = support_masks(ssim.mask, LEVELS, settings["loss"]["upsampling"])
+    return Targets(ssim.image, ssim.mask, ssim, depth_target(inputs["prior_depth"], ssim.mask), supports)
+
+
+def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSaved]:
+    """Equation (6) of one view. Edges of the smoothness term are detected unless the request holds them."""
+    given, gaussians, spectral = settings["loss"], gaussians_of(inputs), spectral_of(inputs, settings)
+    scene, scene_saved = scene_at(gaussians, spectral, model_of(settings), settings["t"])
+    camera, raster, degree = camera_of(inputs, settings), raster_of(settings), settings["degree"]
+    rendered, saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor_of(settings))
+    names = ("ssim_weight", "depth_weight", "smoothness_weight", "lambda_lap")
+    weights = LossWeights(*(given[name] for name in names))
+    targets, config = _targets(inputs, settings), msgspec.convert(given, LossConfig)
+    image = image_loss(rendered, targets, weights, config, inputs.get("edges"))
+    value, penalty, matern = image.loss, None, None
+    if gaussians.motion_coefficients is not None:
+        penalty, matern = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
+        value += config.lambda_msp * penalty
+    return {"objective": value}, ObjectiveSaved(
+        rendered, targets, image, penalty, config.lambda_msp, saved, scene_saved, matern
+    )
+
+
+def _objective_reverse(cotangents: Inputs, saved: ObjectiveSaved) -> Found:
+    up = float(cotangents["objective"])
+    real = saved.loss.d_colour.dtype.type
+    grads = render_reverse(saved.loss.d_colour * real(up), saved.loss.d_depth * real(up), None, saved.render)
+    back = scene_reverse(grads, saved.scene)
+    found: dict[str, Any] = dict(back.by_field)
+    if saved.matern is not None:
+        found["motion_coefficients"] = found["motion_coefficients"] + matern_penalty_reverse(
+            up * saved.lambda_msp, saved.matern
+        )
+    if saved.scene.deformation is not None:
+        assert back.offsets is not None
+        fdm = deformation_reverse(back.offsets, saved.scene.deformation)
+        found |= {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
+    return found
+
+
+def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> Found:
+    """Images and unweighted terms; a term of weight 0 is not evaluated."""
+    found: dict[str, Any] = {f"term_{name}": value for name, value in saved.loss.terms.items()}
+    images = {"colour_image": saved.rendered.colour, "depth_image": saved.rendered.depth}
+    return found | images | {"term_penalty": saved.penalty}
+
+
+def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> dict[str, NDArray]:
+    """Signs of every absolute value, the depth maximum and the edges, beside the decisions of the render."""
+    (colour, depth, _), targets = saved.rendered, saved.targets
+    assert targets.depth is not None
+    difference = np.where(targets.mask, colour - targets.image, 0)
+    residual = np.where(targets.depth.valid, depth / depth.max() - targets.depth.normalised, 0)
+    outside = np.where(targets.mask, 0, np.concatenate([colour, depth[None]]))
+    signed = {"l1": difference, "depth": residual}
+    signed |= {f"band {j}": band for j, band in enumerate(laplacian_levels(difference).bands)}
+    signed |= {f"steps {axis}": np.diff(outside, axis=axis) for axis in (1, 2)}
+    return render_decisions(saved.render) | {
+        "edges": canny_edges(depth).astype(int),
+        "peak": np.array(depth.argmax()),
+        **{name: np.sign(array).astype(int) for name, array in signed.items()},
+    }
+
+
+def _objective_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
+    """Every component off zero, so that no gradient vanishes for want of a coefficient."""
+    scene = raw_gaussians(rng)
+    del scene["residual"]
+    shape = (10, BASES, COUNT)
+    centres = np.linspace(0.1, 0.7, BASES)[None, :, None] + rng.uniform(-0.05, 0.05, shape)
+    return scene | {
+        "fdm_weight": rng.normal(0, 0.05, shape),
+        "fdm_centre": centres,
+        "fdm_width": rng.uniform(0.3, 0.5, shape),
+        "appearance_coefficients": rng.normal(0, 0.3, (3, 2 * FREQUENCIES, COUNT)),
+        "motion_coefficients": rng.normal(0, 0.03, (3, 2 * FREQUENCIES, COUNT)),
+    }
+
+
+def _frame(dtype: np.dtype) -> dict[str, NDArray]:
+    """A fixed observed frame with an excluded corner and two pixels without depth; twelve stamps; the camera."""
+    rng = np.random.default_rng(5)
+    mask = np.ones((HEIGHT, WIDTH), bool)
+    mask[:3, :4] = False
+    depth = rng.uniform(2.0, 5.0, (HEIGHT, WIDTH)).astype(dtype)
+    depth[8, 8] = depth[9, 3] = 0
+    image = rng.uniform(0.1, 0.9, (3, HEIGHT, WIDTH)).astype(dtype)
+    stamps = {"times": np.arange(12) / 12, "train_index": np.arange(12)}
+    return {"observed": image, "mask": mask, "prior_depth": depth} | stamps | pose()
+
+
+def _objective_blocks(inputs: Inputs) -> Blocks:
+    """Channels of the deformation, frequencies of the residuals, every other array whole."""
+    channels = {"position": slice(0, 3), "quaternion": slice(3, 7), "log-scale": slice(7, 10)}
+    parts = {f"fdm_{part}": {f"fdm {part} {name}": index for name, index in channels.items()}
+             for part in ("weight", "centre", "width")}  # fmt: skip
+    for name in ("appearance_coefficients", "motion_coefficients"):
+        parts[name] = {f"{name} frequency {f}": np.s_[:, [f, f + FREQUENCIES]] for f in range(FREQUENCIES)}  # type: ignore[misc]
+    return split_blocks(parts)(inputs)
+
+
+CHECKED = {
+    "t": 0.37,
+    "degree": 3,
+    "camera": LENS,
+    "raster": raster_dict(WIDE),
+    "model": msgspec.to_builtins(ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.2)),
+    "loss": {
+        "ssim_weight": 0.3,
+        "depth_weight": 1.0,
+        "smoothness_weight": 0.05,
+        "total_variation_factor": 2.0,
+        "lambda_msp": 1.0,
+        "lambda_lap": 0.8,
+        "upsampling": "co_sited",
+    },
+    "_compositor": "blocks",
+}
+
+
+# ---- determinism ----
+
+
+def _twice(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """The objective twice: the second answer must have the bits of the first."""
+    first, second = (OBJECTIVE.compute(inputs, settings) for _ in range(2))
+    return {f"{name}_1": first[name] for name in TWICE} | {f"{name}_2": second[name] for name in TWICE}, None
+
+
+TWICE = ("objective", "d_position", "d_harmonics")
+GRADIENT_UNITS = {"position": "loss per scene unit", "motion_coefficients": "loss per scene unit"}
+COMPONENT_UNITS = {
+    "fdm_weight": "raw parameter",
+    "fdm_centre": "1",
+    "fdm_width": "1",
+    "appearance_coefficients": "1",
+    "motion_coefficients": "scene unit",
+    "times": "1",
+    "train_index": "frame",
+}
+VIEW_UNITS = {"observed": "display", "mask": "1", "prior_depth": "scene unit", "edges": "1"}
+
+OBJECTIVE = Stage(
+    name="objective",
+    equation="6",
+    text="moving scene, render, full loss, every gradient",
+    function="endotsr.fitting.objective.image_loss",
+    inputs={**RAW_UNITS, **COMPONENT_UNITS, **VIEW_UNITS, **POSE_UNITS},
+    forward=_objective,
+    asked={
+        "colour_image": Asked(3, "display", oracle="splatting_oracle.render"),
+        "depth_image": Asked(3, "scene unit", oracle="splatting_oracle.render"),
+        "term_l1": Asked(3, "display", oracle="losses.masked_l1"),
+        "term_ssim": Asked(3, oracle="losses.masked_ssim"),
+        "term_depth": Asked(3, oracle="losses.normalised_depth"),
+        "term_smoothness": Asked(3, "scene unit^2", oracle="losses.smoothness"),
+        "term_laplacian": Asked(3, "display", oracle="laplacian_oracle.loss"),
+        "term_penalty": Asked(3, "scene unit^2", oracle="matern_oracle.penalty"),
+        "objective": Asked(3, "loss", oracle="losses.masked_l1"),
+        **{f"d_{name}": Asked(3, GRADIENT_UNITS.get(name, "loss"), "last") for name in Gaussians._fields},
+    },
+    reverse=_objective_reverse,
+    extra=_images_and_terms,
+    trace=_objective_trace,
+    variants=(Variant("objective", _objective_inputs, CHECKED, _frame, _objective_blocks),),
+    is_loss=True,
+)
+
+STAGES = [
+    Stage(
+        name="scene",
+        equation="2",
+        text="raw parameters at time t, every component applied",
+        function="endotsr.fitting.model.scene_at",
+        inputs={**RAW_UNITS, **COMPONENT_UNITS},
+        forward=_scene,
+        asked={
+            "position_at_t": Asked(1, "scene unit", "last", "residuals_oracle.linear"),
+            "quaternion_at_t": Asked(1, "1", "last", "deformation.offsets"),
+            "log_scale_at_t": Asked(1, "1", "last", "deformation.offsets"),
+            "residual_at_t": Asked(1, "display / Y00", "last", "residuals_oracle.colour_residual"),
+        },
+    ),
+    OBJECTIVE,
+    Stage(
+        name="determinism",
+        equation="6",
+        text="the objective computed twice",
+        function="endotsr.fitting.objective.image_loss",
+        inputs=OBJECTIVE.inputs,
+        forward=_twice,
+        asked={
+            **{f"{name}_1": Asked(5, "loss") for name in TWICE},
+            **{f"{name}_2": Asked(5, "loss", f"identical {name}_1") for name in TWICE},
+        },
+    ),
+]
