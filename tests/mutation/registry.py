@@ -109,7 +109,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "atom statistics from all time stamps",
-        "fitting.trainer.workshop",
+        "fitting.state.workshop",
         (("sequence.times[sequence.train_index]", "sequence.times"),),
     ),
     Defect(

@@ -45,7 +45,8 @@ def benchmark_iteration(
     returns                    JSON-able: "stages" {name: {"median_ms", "quartiles_ms"}}, "iteration" the same for the
                                sum, "first_iteration_s" (compilation or loading of compiled code included), sizes
     """
-    from endotsr.fitting.trainer import bench_state, training_step, workshop
+    from endotsr.fitting.state import bench_state, workshop
+    from endotsr.fitting.trainer import training_step
 
     iteration = representative(config)
     shop = workshop(workload.sequence(width, height), config)

@@ -38,11 +38,14 @@ def residual_decay(iteration: int, config: Config) -> float:
 
 
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
-    """Adam rates by field name of `Gaussians` at this iteration; the spectral residuals only while they are active.
+    """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
+
+    Those of the spectral residuals only while they are active, those of the exposures only if the model has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant; degree 0 and the higher degrees have their own rate
     fdm_weight        the position channels have the extra `deformation_position_factor`
+    exposure_*        decay like `position`
     *_coefficients    their factor x deformation rate x `residual_decay`
     """
     o = config.optimiser
@@ -61,6 +64,8 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
         "fdm_centre": deformation,
         "fdm_width": deformation,
     }
+    if config.model.exposure:
+        rates["exposure_log_gain"] = rates["exposure_bias"] = o.exposure * decay
     if residuals_active(iteration, config):
         residual = o.deformation * residual_decay(iteration, config)
         rates["appearance_coefficients"] = residual * o.appearance_factor

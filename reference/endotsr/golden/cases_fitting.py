@@ -17,6 +17,7 @@ from endotsr.config import (
 from endotsr.golden.cases import Seeds, Spec
 from endotsr.golden.cases_splatting import pose
 from endotsr.golden.generator import Made, changed, given, permutation
+from endotsr.golden.operation import written
 
 MILESTONES = (1, 499, 500, 501, 600, 999, 1000, 1001, 1499, 1500, 1750, 2499, 2500, 2999, 3000, 3001, 3500, 3900, 3999,
               4000, 5999, 6000)  # fmt: skip
@@ -38,7 +39,7 @@ def _schedules() -> list[Spec]:
          ("residual_rates_restarted", "position_weights_same_rate")),
     ]  # fmt: skip
     return [
-        Spec("schedule", case, "schedule", title, flags, {"config": msgspec.to_builtins(config)},
+        Spec("schedule", case, "schedule", title, flags, {"config": written(config)},
              {"iteration": given(np.array(steps), ", ".join(map(str, steps)), "iteration")})
         for case, config, steps, title, flags in rows
     ]  # fmt: skip
@@ -143,7 +144,7 @@ def _frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
 
 
 def _initialisation() -> list[Spec]:
-    model = msgspec.to_builtins(ModelConfig(bases=3, harmonics_degree=1, initial_width=0.125))
+    model = written(ModelConfig(bases=3, harmonics_degree=1, initial_width=0.125))
 
     def spec(case: str, title: str, flags: tuple[str, ...], inputs: dict[str, Made]) -> Spec:
         drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)

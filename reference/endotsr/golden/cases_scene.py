@@ -19,6 +19,7 @@ from endotsr.golden.cases import Seeds, Spec
 from endotsr.golden.cases_equations import stamps, tissue, train_index
 from endotsr.golden.cases_splatting import PRESETS, pose, scene_inputs
 from endotsr.golden.generator import Made, changed, given
+from endotsr.golden.operation import written
 from endotsr.golden.operations_splatting import raster_dict
 
 COUNT, BASES, FREQUENCIES, FRAMES = 12, 3, 2, 12
@@ -31,7 +32,7 @@ WEIGHTS = {
 
 def _model(**changes: Any) -> dict[str, Any]:
     model = ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.25)
-    return msgspec.to_builtins(msgspec.structs.replace(model, **changes))
+    return written(msgspec.structs.replace(model, **changes))
 
 
 def moving_inputs(seeds: Seeds, degree: int, static: bool, count: int = COUNT) -> dict[str, Made]:
@@ -180,7 +181,7 @@ def _training() -> list[Spec]:
                              f"{seeds.seed('frame_order')}; positions within train_index", "frame"),
         "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, 32),
     }  # fmt: skip
-    settings = {"camera": LENS, "config": msgspec.to_builtins(training_config())}
+    settings = {"camera": LENS, "config": written(training_config())}
     flags = ("skipped_step_when_densifying", "residuals_activated_late", "rates_not_decaying", "laplacian_weight_not_ramped",
              "penalty_dropped_in_training", "calibration_of_half_ratio", "densify_threshold_in_pixels")  # fmt: skip
     title = "Calibration, then twenty iterations: densification at 6 and 12, residuals from 9 on, detail ramp, degree 2"

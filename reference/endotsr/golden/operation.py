@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +11,15 @@ Inputs = Mapping[str, NDArray]
 Settings = Mapping[str, Any]
 Outputs = dict[str, NDArray]
 Compute = Callable[[Inputs, Settings], Mapping[str, NDArray | float | None]]
+
+
+def written(settings: msgspec.Struct) -> dict[str, Any]:
+    """Settings as a case writes them: without the exposure (B13), which is off in all cases but those of its own."""
+    plain = msgspec.to_builtins(settings)
+    for section in (plain, plain.get("model"), plain.get("optimiser")):
+        if section is not None:
+            section.pop("exposure", None)
+    return plain
 
 
 class Asked(NamedTuple):

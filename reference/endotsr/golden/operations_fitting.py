@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import DensityConfig, InitialisationConfig
-from endotsr.fitting.adam import adam_state
+from endotsr.fitting.adam import adam_state, regather
 from endotsr.fitting.schedules import (
     active_degree,
     densify_now,
@@ -68,7 +68,8 @@ def _density(inputs: Inputs, settings: Settings) -> Found:
     moments = adam_state(arrays(gaussians))
     moments.first["opacity_logit"][:] = 1.0
     tape: Any = Tape(np.zeros(0), inputs["split_noise"])
-    made = densify(gaussians, moments, statistics, config, tape, extent)
+    made = densify(gaussians, statistics, config, tape, extent)
+    regather(moments, arrays(gaussians), made.plan.source, made.plan.survivors)
     parent = made.gaussians.harmonics[0, 0].astype(np.int64)
     rows, survivors = np.arange(count), parent.size - made.cloned - 2 * made.split
     cloned, split = np.split(parent[survivors : survivors + made.cloned + made.split], [made.cloned])
@@ -80,7 +81,7 @@ def _density(inputs: Inputs, settings: Settings) -> Found:
         "split": np.isin(rows, split),
         "count": np.array(parent.size),
         "parent": parent,
-        "moments_kept": made.adam.first["opacity_logit"] == 1.0,
+        "moments_kept": moments.first["opacity_logit"] == 1.0,
         "position_after": made.gaussians.position,
         "log_scale_after": made.gaussians.log_scale,
     }

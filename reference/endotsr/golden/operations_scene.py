@@ -6,24 +6,19 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Config, ModelConfig, config_from_dict
-from endotsr.equations.deformation import deformation_reverse
-from endotsr.equations.laplacian import LEVELS, laplacian_loss_forward, laplacian_loss_reverse, support_masks
-from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
+from endotsr.config import Config, LossConfig, ModelConfig, config_from_dict
 from endotsr.fitting.adam import adam_state
-from endotsr.fitting.model import Spectral, scene_at, scene_reverse, spectral_from
-from endotsr.fitting.objective import Targets, calibrate_on, photometric_loss
-from endotsr.fitting.trainer import TrainingState, training_step, workshop
+from endotsr.fitting.model import Spectral, scene_at, spectral_from
+from endotsr.fitting.objective import LossWeights, calibrate_on, frame_targets
+from endotsr.fitting.state import TrainingState, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.fitting.view import view_gradients
 from endotsr.golden.operation import Asked, Inputs, Operation, Settings, real_of
 from endotsr.golden.operations_splatting import camera_of, compositor_of, raster_of
-from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
-from endotsr.losses.masked_ssim import masked_ssim_forward, ssim_target
-from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.scene.density_control import empty_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import render_forward, render_reverse
 
 Found = dict[str, NDArray | float | None]
 
@@ -52,53 +47,21 @@ def _scene(inputs: Inputs, settings: Settings) -> Found:
 
 def _objective(inputs: Inputs, settings: Settings) -> Found:
     """Equation (6) of one view; the edges of the smoothness term are an input, so that no edge detector is needed."""
-    weights, gaussians = settings["loss"], gaussians_of(inputs)
-    spectral, camera = spectral_of(inputs, settings), camera_of(inputs, settings)
-    scene, scene_saved = scene_at(gaussians, spectral, model_of(settings), settings["t"])
-    rendered, saved = render_forward(
-        scene, camera, raster_of(settings), degree=settings["degree"], compositor=compositor_of(settings)
+    loss, gaussians = msgspec.convert(settings["loss"], LossConfig), gaussians_of(inputs)
+    assert isinstance(loss.lambda_lap, float)
+    config, camera = Config(model=model_of(settings), loss=loss), camera_of(inputs, settings)
+    targets = frame_targets(
+        Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera), config
     )
-    ssim = ssim_target(inputs["observed"], inputs["mask"])
-    targets = Targets(ssim.image, ssim.mask, ssim, None, None)
-    photometric = photometric_loss(rendered.colour, targets, weights["ssim_weight"])
-    d_colour = photometric.d_colour
-    depth, depth_saved = normalised_depth_forward(rendered.depth, depth_target(inputs["prior_depth"], ssim.mask))
-    d_depth = normalised_depth_reverse(weights["depth_weight"], depth_saved)
-    smooth, smooth_saved = smoothness_forward(
-        rendered.depth, rendered.colour, ssim.mask, inputs["edges"], weights["total_variation_factor"]
-    )
-    smooth_grads = smoothness_reverse(weights["smoothness_weight"], smooth_saved)
-    supports = support_masks(ssim.mask, LEVELS, weights["upsampling"])
-    detail, detail_saved = laplacian_loss_forward(rendered.colour, ssim.image, supports, weights["upsampling"])
-    d_colour = d_colour + smooth_grads.rendered + laplacian_loss_reverse(weights["lambda_lap"], detail_saved)
-    loss = (
-        photometric.loss
-        + weights["depth_weight"] * depth
-        + weights["smoothness_weight"] * smooth
-        + weights["lambda_lap"] * detail
-    )
-    back = scene_reverse(render_reverse(d_colour, d_depth + smooth_grads.rendered_depth, None, saved), scene_saved)
-    found: Found = {f"d_{name}": value for name, value in back.by_field.items()}
-    if gaussians.motion_coefficients is not None:
-        penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
-        loss += weights["lambda_msp"] * penalty
-        found["term_penalty"] = penalty
-        extra = matern_penalty_reverse(weights["lambda_msp"], penalty_saved)
-        found["d_motion_coefficients"] = back.by_field["motion_coefficients"] + extra
-    if scene_saved.deformation is not None:
-        assert back.offsets is not None
-        fdm = deformation_reverse(back.offsets, scene_saved.deformation)
-        found |= {"d_fdm_weight": fdm.weight, "d_fdm_centre": fdm.centre, "d_fdm_width": fdm.width}
-    return found | {
-        "colour_image": rendered.colour,
-        "depth_image": rendered.depth,
-        "term_l1": photometric.terms["l1"],
-        "term_ssim": masked_ssim_forward(rendered.colour, ssim)[0],
-        "term_depth": depth,
-        "term_smoothness": smooth,
-        "term_laplacian": detail,
-        "objective": loss,
-    }
+    weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, loss.lambda_lap)
+    view = view_gradients(
+        gaussians, spectral_of(inputs, settings), targets, weights, config, camera, settings["t"], inputs["edges"],
+        raster=raster_of(settings), degree=settings["degree"], compositor=compositor_of(settings),
+    )  # fmt: skip
+    names = {"term_penalty": "matern_penalty"} | {f"term_{n}": n for n in ("l1", "ssim", *LossWeights._fields[1:])}
+    terms = {name: view.terms[term] for name, term in names.items() if term in view.terms}
+    images = {"colour_image": view.rendered.colour, "depth_image": view.rendered.depth}
+    return {f"d_{name}": g for name, g in view.gradients.items()} | images | terms | {"objective": view.loss}
 
 
 class Tape:
