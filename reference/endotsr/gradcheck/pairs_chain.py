@@ -1,20 +1,23 @@
-"""The whole chain as one pair: raw parameters of every component -> moving scene -> render -> objective (6)."""
+"""The whole chain as one pair: raw parameters of every component -> moving scene -> render -> exposure -> objective (6).
+
+Both directions are `view_gradients`: what is checked here is what training computes.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config, LossConfig, ModelConfig
-from endotsr.equations.deformation import deformation_reverse
 from endotsr.equations.laplacian import laplacian_levels
-from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
-from endotsr.fitting.model import Spectral, scene_at, scene_reverse, spectral_from
-from endotsr.fitting.objective import LossWeights, Targets, frame_targets, image_loss
+from endotsr.fitting.model import exposed, scene_at, spectral_from
+from endotsr.fitting.objective import LossWeights, Targets, frame_targets
+from endotsr.fitting.view import ViewGradients, view_gradients
 from endotsr.gradcheck.pairs_splatting import COUNT, HEIGHT, WIDE, WIDTH, _as_masks, _camera, _render_trace, _scene
 from endotsr.gradcheck.registry import Arrays, Pair
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
+from endotsr.scene.parameters import Exposure
 from endotsr.sequences.sequence import Frame
-from endotsr.splatting.render import render_forward, render_reverse
+from endotsr.splatting.render import render_forward
 
 TIME = 0.37
 BASES, FREQUENCIES = 3, 2
@@ -22,6 +25,7 @@ CONFIG = Config(
     model=ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.2),
     loss=LossConfig(ssim_weight=0.3, lambda_lap=0.8, total_variation_factor=2.0),
 )
+SPECTRAL = spectral_from(CONFIG.model, np.arange(12) / 12)
 WEIGHTS = LossWeights(ssim=0.3, depth=1.0, smoothness=0.05, laplacian=0.8)
 
 
@@ -37,6 +41,8 @@ def _inputs(rng: np.random.Generator) -> dict[str, NDArray]:
         "fdm_width": rng.uniform(0.3, 0.5, shape),
         "appearance_coefficients": rng.normal(0, 0.3, (3, 2 * FREQUENCIES, COUNT)),
         "motion_coefficients": rng.normal(0, 0.03, (3, 2 * FREQUENCIES, COUNT)),
+        "exposure_log_gain": rng.normal(0, 0.1, 3),
+        "exposure_bias": rng.normal(0, 0.05, 3),
     }
 
 
@@ -51,44 +57,37 @@ def _frame(dtype: np.dtype) -> Frame:
     return Frame(image=image, mask=mask, depth=depth, time=TIME, camera=_camera())
 
 
-def _spectral() -> Spectral:
-    return spectral_from(CONFIG.model, np.arange(12) / 12)
-
-
-def _run(inputs: Arrays):
+def _view(inputs: Arrays) -> ViewGradients:
     gaussians = Gaussians(*(inputs[name] for name in Gaussians._fields))
-    scene, scene_saved = scene_at(gaussians, _spectral(), CONFIG.model, TIME)
-    rendered, saved = render_forward(scene, _camera(), WIDE, compositor="blocks")
-    targets = frame_targets(_frame(scene.position.dtype), CONFIG)
-    loss = image_loss(rendered, targets, WEIGHTS, CONFIG.loss)
-    assert gaussians.motion_coefficients is not None
-    penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, _spectral().rho)
-    return rendered, targets, loss, penalty, saved, scene_saved, penalty_saved
+    targets = frame_targets(_frame(gaussians.position.dtype), CONFIG)
+    return view_gradients(
+        gaussians, SPECTRAL, targets, WEIGHTS, CONFIG, _camera(), TIME,
+        exposure=_exposure(inputs), raster=WIDE, compositor="blocks",
+    )  # fmt: skip
+
+
+def _exposure(inputs: Arrays) -> Exposure:
+    return Exposure(inputs["exposure_log_gain"], inputs["exposure_bias"])
 
 
 def _forward(inputs: Arrays) -> dict[str, NDArray]:
-    _, _, loss, penalty, *_ = _run(inputs)
-    return {"objective": np.array(loss.loss + CONFIG.loss.lambda_msp * penalty)}
+    return {"objective": np.array(_view(inputs).loss)}
 
 
 def _reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
-    up = float(cotangents["objective"])
-    _, _, loss, _, saved, scene_saved, penalty_saved = _run(inputs)
-    dtype = loss.d_colour.dtype.type
-    grads = render_reverse(loss.d_colour * dtype(up), loss.d_depth * dtype(up), None, saved)
-    back = scene_reverse(grads, scene_saved)
-    assert scene_saved.deformation is not None and back.offsets is not None
-    fdm = deformation_reverse(back.offsets, scene_saved.deformation)
-    out = dict(back.by_field)
-    out["motion_coefficients"] = out["motion_coefficients"] + matern_penalty_reverse(
-        up * CONFIG.loss.lambda_msp, penalty_saved
-    )
-    return out | {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
+    view = _view(inputs)
+    assert view.exposure is not None
+    gradients = view.gradients | {f"exposure_{name}": g for name, g in view.exposure._asdict().items()}
+    return {name: g * g.dtype.type(cotangents["objective"]) for name, g in gradients.items()}
 
 
 def _trace(inputs: Arrays) -> dict[str, NDArray]:
     """Signs of every absolute value, the depth maximum and the edges, beside the decisions of the render."""
-    rendered, targets, _, _, saved, *_ = _run(inputs)
+    gaussians = Gaussians(*(inputs[name] for name in Gaussians._fields))
+    scene, _ = scene_at(gaussians, SPECTRAL, CONFIG.model, TIME)
+    rendered, saved = render_forward(scene, _camera(), WIDE, compositor="blocks")
+    rendered, _ = exposed(rendered, _exposure(inputs))
+    targets = frame_targets(_frame(scene.position.dtype), CONFIG)
     difference = np.where(targets.mask, rendered.colour - targets.image, 0)
     out = _render_trace(saved) | {
         "l1": np.sign(difference).astype(int),
