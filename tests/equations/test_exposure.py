@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from oracle import exposure_oracle
 
 from endotsr.equations.exposure import exposure_forward, exposure_reverse
+from oracle import exposure_oracle
 
 
 @pytest.fixture

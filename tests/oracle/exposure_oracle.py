@@ -17,9 +17,9 @@ def gradients(colour, log_gain, d_exposed):
     for plane, g, weights in zip(colour, log_gain, d_exposed, strict=True):
         gain = math.exp(g)
         d_colour.append([[gain * w for w in row] for row in weights])
-        pairs = [(w, value) for row, line in zip(weights, plane, strict=True) for w, value in zip(row, line, strict=True)]
-        d_log_gain.append(math.fsum(w * gain * value for w, value in pairs))
-        d_bias.append(math.fsum(w for w, _ in pairs))
+        flat, values = [w for row in weights for w in row], [value for row in plane for value in row]
+        d_log_gain.append(math.fsum(w * gain * v for w, v in zip(flat, values, strict=True)))
+        d_bias.append(math.fsum(flat))
     return d_colour, d_log_gain, d_bias
 
 

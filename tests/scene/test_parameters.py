@@ -2,11 +2,18 @@
 
 import numpy as np
 import pytest
-from oracle import exposure_oracle
 
 from endotsr.config import ModelConfig
-from endotsr.scene.parameters import Exposure, FrameParameters, column_gradients, exposure_at, exposure_of
-from endotsr.scene.parameters import frame_parameters, trained
+from endotsr.scene.parameters import (
+    Exposure,
+    FrameParameters,
+    column_gradients,
+    exposure_at,
+    exposure_of,
+    frame_parameters,
+    trained,
+)
+from oracle import exposure_oracle
 
 TIMES = np.array([0.0, 0.2, 0.3, 0.7])
 

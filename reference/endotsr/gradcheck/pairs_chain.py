@@ -1,4 +1,4 @@
-"""The whole chain as one pair: raw parameters of every component -> moving scene -> render -> exposure -> objective (6).
+"""The whole chain as one pair: raw parameters -> moving scene -> render -> exposure -> objective (6).
 
 Both directions are `view_gradients`: what is checked here is what training computes.
 """

@@ -16,7 +16,14 @@ from endotsr.errors import InputError
 
 Arrays = Mapping[str, NDArray]
 
-PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses", "pairs_exposure", "pairs_chain")
+PAIR_MODULES = (
+    "pairs_equations",
+    "pairs_deformation",
+    "pairs_splatting",
+    "pairs_losses",
+    "pairs_exposure",
+    "pairs_chain",
+)
 
 
 class Pair(NamedTuple):
