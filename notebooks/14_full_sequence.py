@@ -36,7 +36,8 @@ from endotsr.config import DEMO, with_iterations
 from endotsr.evaluation.baselines import BASELINES
 from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
 from endotsr.fitting.model import render_at
-from endotsr.fitting.trainer import new_training, training_step, workshop
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 

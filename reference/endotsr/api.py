@@ -50,7 +50,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 
 if TYPE_CHECKING:
-    from endotsr.fitting.trainer import TrainingState
+    from endotsr.fitting.state import TrainingState
 
 Component = Literal["appearance", "spectral_motion"]
 RENDERING = ("names", "times", "train_index", "cameras", "static_camera")  # keys of sequence.json that it reads
@@ -148,7 +148,7 @@ def train(
     Raises: InputError for settings or a sequence that cannot be used; FloatingPointError naming iteration, frame and
             terms if the loss is not finite; CalibrationError if equation (7) has no answer.
     """
-    from endotsr.fitting.trainer import new_training
+    from endotsr.fitting.state import new_training
     from endotsr.kernels.threads import use_threads
 
     if not isinstance(sequence, Sequence):

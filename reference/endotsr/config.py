@@ -59,6 +59,8 @@ class ModelConfig(_Section, frozen=True, kw_only=True):
     """component L: mask-propagating Laplacian detail loss, eq. (5)"""
     deformation: bool = True
     """flexible deformation model; off = a rigid scene"""
+    exposure: bool = False
+    """gain and bias of each colour channel for every training frame, eq. (B13)"""
     basis: Literal["quartic", "gaussian"] = "quartic"
     """FDM time basis: `quartic` is what the released code computes"""
     bases: PositiveCount = 17
@@ -142,6 +144,8 @@ class OptimiserConfig(_Section, frozen=True, kw_only=True):
     """log-scale"""
     rotation: NonNegative = 0.001
     """quaternion"""
+    exposure: NonNegative = 1e-3
+    """log gain and bias of the exposures, decaying"""
     spectral_motion_factor: NonNegative = 0.1
     """translation residual C, times `deformation`, decaying"""
     appearance_factor: NonNegative = 31.25 / 16.0

@@ -192,12 +192,12 @@ def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_r
 
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
     from endotsr.errors import CalibrationError
-    from endotsr.fitting import trainer
+    from endotsr.fitting import objective
 
     def no_answer(*_):
         raise CalibrationError("calibration: none of the 2 views is valid\nview a\nview b")
 
-    monkeypatch.setattr(trainer, "calibrate_on", no_answer)
+    monkeypatch.setattr(objective, "calibrate_on", no_answer)
     assert main(["calibrate", str(finished_run)]) == 2
     said = capsys.readouterr()
     assert said.err == "endotsr: error: calibration: none of the 2 views is valid\n"

@@ -22,20 +22,12 @@ from endotsr.config import (
 from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
-from endotsr.fitting.checkpoint import load_checkpoint
+from endotsr.fitting.checkpoint import check_lengths, load_checkpoint
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
 from endotsr.fitting.schedules import densify_now
-from endotsr.fitting.trainer import (
-    calibrated_weight,
-    new_training,
-    save_state,
-    state_from_checkpoint,
-    train,
-    training_step,
-    workshop,
-)
-from endotsr.scene.density_control import check_lengths
+from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, workshop
+from endotsr.fitting.trainer import calibrated_weight, train, training_step
 from endotsr.scene.gaussians import arrays
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate

@@ -10,7 +10,8 @@ from endotsr.cli.parts.options import base_settings, parse
 from endotsr.cli.train import TrainOptions
 from endotsr.config import DEMO, InitialisationConfig, with_iterations
 from endotsr.errors import InputError
-from endotsr.fitting.trainer import new_training, train
+from endotsr.fitting.state import new_training
+from endotsr.fitting.trainer import train
 from endotsr.runs.sources import load_sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.tradeoff import training

@@ -92,7 +92,7 @@ def measure(case: Case) -> dict[str, Any]:
 def prepare(case: Case, config: Config) -> tuple[Any, Any]:
     """State and workshop of a case, at the iteration that is timed, every target made."""
     from endotsr.bench.trained import trained_gaussians
-    from endotsr.fitting.trainer import bench_state, workshop
+    from endotsr.fitting.state import bench_state, workshop
 
     shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in shop.sequence.train_index:

@@ -51,7 +51,8 @@ def _first_iterations() -> None:
     from endotsr.bench.case import representative
     from endotsr.config import PAPER
     from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.trainer import new_training, training_step, workshop
+    from endotsr.fitting.state import new_training, workshop
+    from endotsr.fitting.trainer import training_step
     from endotsr.scene import workload
 
     say = lambda moment: print(json.dumps(moment), flush=True)

@@ -61,7 +61,7 @@ def run(words: list[str]) -> int:
     model = load_model(folder)
     use_threads(config.training.threads)
     sequence = load_run_sequence(folder, options.sequence)
-    found = calibrate_on(model.gaussians, model.spectral, sequence, config)
+    found = calibrate_on(model.gaussians, model.spectral, sequence, config, model.frames)
     for line in replaced:
         print(f"setting replaced: {line}")
     print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")

@@ -75,7 +75,7 @@ def evaluate_run(
     def render(index: int, taken_out: str = "") -> Any:
         shown = without(model.gaussians, **({taken_out: False} if taken_out else {}))
         camera, time = sequence.cameras[index], float(sequence.times[index])
-        return render_at(shown, model.spectral, model.config, camera, time)
+        return render_at(shown, model.spectral, model.config, camera, time, frames=model.frames)
 
     held_out = {int(i): render(int(i)) for i in sequence.test_index}
     metrics = evaluate_model(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)

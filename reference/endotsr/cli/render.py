@@ -103,7 +103,14 @@ def renderer(folder: RunFolder, without: tuple[str, ...] = ()):
 
     def render(time: float, camera):
         return render_at(
-            model.gaussians, model.spectral, model.config, camera, time, appearance=appearance, spectral_motion=motion
+            model.gaussians,
+            model.spectral,
+            model.config,
+            camera,
+            time,
+            frames=model.frames,
+            appearance=appearance,
+            spectral_motion=motion,
         )
 
     return render

@@ -107,7 +107,7 @@ def train_new(
     out: Path, source: str, config: Config, simulator: SimulatorSettings, words: list[str], schedule_note: str = ""
 ) -> tuple[RunFolder, "Sequence"]:
     """Check everything, create the run folder, train to the end."""
-    from endotsr.fitting.trainer import new_training
+    from endotsr.fitting.state import new_training
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.record import new_record
     from endotsr.runs.sources import input_record, load_sequence, sequence_record
@@ -134,7 +134,7 @@ def train_new(
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
-    from endotsr.fitting.trainer import new_training
+    from endotsr.fitting.state import new_training
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.model import load_training
     from endotsr.runs.sources import check_same_input, load_sequence, run_source

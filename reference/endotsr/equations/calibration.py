@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from endotsr.errors import CalibrationError
 
 
-class ViewGradients(NamedTuple):
+class ViewRms(NamedTuple):
     """Gradient sizes of one calibration view."""
 
     name: str  # frame name, for the table
@@ -51,7 +51,7 @@ def calibration_views(n_train: int, count: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(np.int64))
 
 
-def _verdict(view: ViewGradients) -> str:
+def _verdict(view: ViewRms) -> str:
     """The reason why a view cannot be used, or an empty string."""
     if not (math.isfinite(view.photometric) and math.isfinite(view.laplacian)):
         return "gradient not finite"
@@ -64,7 +64,7 @@ def _verdict(view: ViewGradients) -> str:
     return ""
 
 
-def calibrate(views: Iterable[ViewGradients | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
+def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
     """Equation (7): lambda_lap = r / median_v(g_lap,v / g_rgb,v).
 
     views           per view its name, g_rgb and g_lap (loss per display unit)
@@ -79,7 +79,7 @@ def calibrate(views: Iterable[ViewGradients | tuple[str, float, float]], gradien
         raise ValueError(f"gradient ratio {gradient_ratio}; allowed: finite, > 0")
     ratios = []
     lines = [f"{'view':<24} {'g_rgb':>12} {'g_lap':>12}  g_lap/g_rgb"]
-    for view in (ViewGradients(*v) for v in views):
+    for view in (ViewRms(*v) for v in views):
         dropped = _verdict(view)
         ratio = "" if dropped else f"{view.laplacian / view.photometric:.6g}"
         lines.append(f"{view.name:<24} {view.photometric:>12.5g} {view.laplacian:>12.5g}  {ratio or dropped}")

@@ -89,7 +89,7 @@ def rehearse(config: Config) -> None:
 
 def _small(config: Config) -> tuple[Any, Any]:
     """Workshop and state of a few Gaussians and pixels: types and layouts as in any training, and nothing else."""
-    from endotsr.fitting.trainer import bench_state, workshop
+    from endotsr.fitting.state import bench_state, workshop
     from endotsr.scene import workload
 
     shop = workshop(workload.sequence(64, 48, frames=3), config)
@@ -173,12 +173,14 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
 
 
 def rehearse_densification(shop: Any, state: Any) -> None:
-    """The gather of every array."""
+    """The gather of every array and of its moments."""
+    from endotsr.fitting.adam import regather
     from endotsr.scene.density_control import densify
 
     state.statistics.gradient_sum[:] = 1.0
     state.statistics.visits[:] = 1
-    densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
+    made = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
+    regather(state.adam, list(state.adam.first), made.plan.source, made.plan.survivors)
 
 
 def _second_process() -> None:

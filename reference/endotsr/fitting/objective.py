@@ -2,7 +2,7 @@
 
 L = (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_msp L_msp + lambda_lap(iteration) L_lap
 
-The spectral penalty acts on coefficients, not on images, and is added by the trainer.
+The Matern penalty acts on coefficients, not on images, and is added in `view_gradients` and by the trainer.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config, LossConfig
-from endotsr.equations.calibration import Calibration, ViewGradients, calibrate, calibration_views, rms
+from endotsr.equations.calibration import Calibration, ViewRms, calibrate, calibration_views, rms
 from endotsr.equations.laplacian import (
     LEVELS,
     SupportMasks,
@@ -30,6 +30,7 @@ from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_s
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
+from endotsr.scene.parameters import FrameParameters
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
 
@@ -108,9 +109,9 @@ def depth_term(rendered: RenderOut, target: DepthTarget, weight: float) -> Term:
 
 
 def smoothness_term(
-    rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float, edges: NDArray[np.bool_] | None = None
+    rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float, edges: NDArray[np.bool_] | None
 ) -> Term:
-    """Smooth depth away from its edges (detected unless given), and total variation."""
+    """Smooth depth away from its edges (None = Canny edges of this depth), and total variation."""
     edges = canny_edges(rendered.depth) if edges is None else edges
     value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
     smooth = smoothness_reverse(weight, saved)
@@ -136,7 +137,8 @@ def image_loss(
 ) -> ImageLoss:
     """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
 
-    edges   (H, W) True = edge of the rendered depth; None = detected
+    edges   (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth. A constant of
+            the loss either way: no gradient flows through it.
     timer   told of the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
@@ -166,10 +168,17 @@ def image_loss(
     return ImageLoss(loss, terms, d_colour, d_depth)
 
 
-def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, config: Config) -> Calibration:
+def calibrate_on(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    sequence: Sequence,
+    config: Config,
+    frames: FrameParameters | None = None,
+) -> Calibration:
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
-    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model.
+    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model. The
+    exposures of `frames` belong to the base model.
 
     Raises: CalibrationError with a per-view table when no view gives a ratio.
     """
@@ -177,13 +186,12 @@ def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, c
     views = []
     for index in chosen:
         frame = sequence.frame(int(index), gaussians.position.dtype)
-        rendered = render_at(
-            gaussians, spectral, config, frame.camera, frame.time, appearance=False, spectral_motion=False
-        )
+        at = (frame.camera, frame.time)
+        rendered = render_at(gaussians, spectral, config, *at, frames=frames, appearance=False, spectral_motion=False)
         targets = frame_targets(frame, config)
         supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)
         photometric = photometric_loss(rendered.colour, targets, config.loss.ssim_weight)
         _, saved = laplacian_loss_forward(rendered.colour, targets.image, supports, config.loss.upsampling)
         laplacian = laplacian_loss_reverse(1.0, saved)
-        views.append(ViewGradients(sequence.names[int(index)], rms(photometric.d_colour), rms(laplacian)))
+        views.append(ViewRms(sequence.names[int(index)], rms(photometric.d_colour), rms(laplacian)))
     return calibrate(views, config.loss.gradient_ratio)

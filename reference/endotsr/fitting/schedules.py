@@ -13,8 +13,8 @@ def exponential_decay(step: int, steps: int, initial: float, final: float) -> fl
     """initial^(1 - tau) final^tau, tau = clip(step / steps, 0, 1), 1 if steps = 0; 0 if an end is not positive."""
     if initial <= 0.0 or final <= 0.0:
         return 0.0
-    share = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
-    return initial * (final / initial) ** share
+    fraction = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
+    return initial * (final / initial) ** fraction
 
 
 def residuals_active(iteration: int, config: Config) -> bool:
@@ -34,16 +34,19 @@ def residual_decay(iteration: int, config: Config) -> float:
     With `restart_residual_schedule` the decay runs over the steps K_s .. iterations; otherwise it is that of the base
     model.
     """
-    born = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
-    return exponential_decay(iteration - born, config.training.iterations - born, 1.0, config.optimiser.final_factor)
+    start = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
+    return exponential_decay(iteration - start, config.training.iterations - start, 1.0, config.optimiser.final_factor)
 
 
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
-    """Adam rates by field name of `Gaussians` at this iteration; spectral residuals only while they are active.
+    """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
+
+    Those of the spectral residuals only while they are active, those of the exposures only if the model has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant; degree 0 and the higher degrees have their own rate
     fdm_weight        the position channels have the extra `deformation_position_factor`
+    exposure_*        decay like `position`
     *_coefficients    their factor x deformation rate x `residual_decay`
     """
     o = config.optimiser
@@ -62,6 +65,8 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
         "fdm_centre": deformation,
         "fdm_width": deformation,
     }
+    if config.model.exposure:
+        rates["exposure_log_gain"] = rates["exposure_bias"] = o.exposure * decay
     if residuals_active(iteration, config):
         residual = o.deformation * residual_decay(iteration, config)
         rates["appearance_coefficients"] = residual * o.appearance_factor

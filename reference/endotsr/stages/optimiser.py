@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, InitialisationConfig
-from endotsr.fitting.adam import AdamState, adam_state, adam_update
+from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
 from endotsr.fitting.objective import calibrate_on
 from endotsr.fitting.schedules import (
     active_degree,
@@ -20,7 +20,8 @@ from endotsr.fitting.schedules import (
     smoothness_active,
     statistics_active,
 )
-from endotsr.fitting.trainer import TrainingState, training_step, workshop
+from endotsr.fitting.state import TrainingState, workshop
+from endotsr.fitting.trainer import training_step
 from endotsr.scene.density_control import densify, empty_statistics, gather_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
@@ -80,7 +81,8 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     moments = adam_state(arrays(gaussians))
     moments.first["opacity_logit"][:] = 1.0
     tape: Any = Tape(np.zeros(0), inputs["split_noise"])
-    made = densify(gaussians, moments, statistics, config, tape, extent)
+    made = densify(gaussians, statistics, config, tape, extent)
+    regather(moments, arrays(gaussians), made.plan.source, made.plan.survivors)
     parent = made.gaussians.harmonics[0, 0].astype(np.int64)
     rows, survivors = np.arange(count), parent.size - made.cloned - 2 * made.split
     cloned, split = np.split(parent[survivors : survivors + made.cloned + made.split], [made.cloned])
@@ -92,7 +94,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
         "split": np.isin(rows, split),
         "count": np.array(parent.size),
         "parent": parent,
-        "moments_kept": made.adam.first["opacity_logit"] == 1.0,
+        "moments_kept": moments.first["opacity_logit"] == 1.0,
         "position_after": made.gaussians.position,
         "log_scale_after": made.gaussians.log_scale,
     }, None

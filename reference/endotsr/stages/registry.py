@@ -11,6 +11,7 @@ STAGE_MODULES = (
     "projection",
     "compositing",
     "losses",
+    "exposure",
     "scene",
     "optimiser",
 )

@@ -1,22 +1,21 @@
 """Stages of the whole method: the moving scene, the objective (6) with every gradient, and the same twice."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import LossConfig, ModelConfig
-from endotsr.equations.deformation import deformation_reverse
-from endotsr.equations.laplacian import LEVELS, laplacian_levels, support_masks
-from endotsr.equations.matern import MaternSaved, matern_penalty_forward, matern_penalty_reverse
-from endotsr.fitting.model import SceneSaved, scene_at, scene_reverse
-from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, image_loss
-from endotsr.losses.depth import depth_target
-from endotsr.losses.masked_ssim import ssim_target
+from endotsr.config import Config, LossConfig, ModelConfig
+from endotsr.equations.laplacian import laplacian_levels
+from endotsr.fitting.model import SceneSaved, scene_at
+from endotsr.fitting.objective import LossWeights, Targets, frame_targets
+from endotsr.fitting.view import ViewGradients, view_gradients
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
-from endotsr.splatting.render import RenderOut, RenderSaved, render_forward, render_reverse
+from endotsr.scene.parameters import Exposure
+from endotsr.sequences.sequence import Frame
+from endotsr.splatting.render import render_forward
 from endotsr.stages.compositing import POSE_UNITS, RAW_UNITS, render_decisions
 from endotsr.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
 from endotsr.stages.requests import (
@@ -47,70 +46,57 @@ def _scene(inputs: Inputs, settings: Settings) -> tuple[Found, SceneSaved]:
 
 
 class ObjectiveSaved(NamedTuple):
-    """What the reverse pass and the trace need."""
+    """What the reverse pass, the further outputs and the trace need."""
 
-    rendered: RenderOut
+    view: ViewGradients
     targets: Targets
-    loss: ImageLoss
-    penalty: float | None  # None without a spectral motion
-    lambda_msp: float
-    render: RenderSaved
-    scene: SceneSaved
-    matern: MaternSaved | None
-
-
-def _targets(inputs: Inputs, settings: Settings) -> Targets:
-    ssim = ssim_target(inputs["observed"], inputs["mask"])
-    supports = support_masks(ssim.mask, LEVELS, settings["loss"]["upsampling"])
-    return Targets(ssim.image, ssim.mask, ssim, depth_target(inputs["prior_depth"], ssim.mask), supports)
 
 
 def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSaved]:
     """Equation (6) of one view. Edges of the smoothness term are detected unless the request holds them."""
-    given, gaussians, spectral = settings["loss"], gaussians_of(inputs), spectral_of(inputs, settings)
-    scene, scene_saved = scene_at(gaussians, spectral, model_of(settings), settings["t"])
-    camera, raster, degree = camera_of(inputs, settings), raster_of(settings), settings["degree"]
-    rendered, saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor_of(settings))
-    names = ("ssim_weight", "depth_weight", "smoothness_weight", "lambda_lap")
-    weights = LossWeights(*(given[name] for name in names))
-    targets, config = _targets(inputs, settings), msgspec.convert(given, LossConfig)
-    image = image_loss(rendered, targets, weights, config, inputs.get("edges"))
-    value, penalty, matern = image.loss, None, None
-    if gaussians.motion_coefficients is not None:
-        penalty, matern = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
-        value += config.lambda_msp * penalty
-    return {"objective": value}, ObjectiveSaved(
-        rendered, targets, image, penalty, config.lambda_msp, saved, scene_saved, matern
-    )
+    loss, camera = msgspec.convert(settings["loss"], LossConfig), camera_of(inputs, settings)
+    assert isinstance(loss.lambda_lap, float)
+    config = Config(model=model_of(settings), loss=loss)
+    frame = Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
+    targets = frame_targets(frame, config)
+    weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, loss.lambda_lap)
+    view = view_gradients(
+        gaussians_of(inputs), spectral_of(inputs, settings), targets, weights, config, camera, settings["t"],
+        inputs.get("edges"), exposure=_exposure(inputs), raster=raster_of(settings), degree=settings["degree"],
+        compositor=compositor_of(settings),
+    )  # fmt: skip
+    return {"objective": view.loss}, ObjectiveSaved(view, targets)
+
+
+def _exposure(inputs: Inputs) -> Exposure | None:
+    """That of the frame, if the request holds one."""
+    given = "exposure_log_gain" in inputs
+    return Exposure(inputs["exposure_log_gain"], inputs["exposure_bias"]) if given else None
 
 
 def _objective_reverse(cotangents: Inputs, saved: ObjectiveSaved) -> Found:
-    up = float(cotangents["objective"])
-    real = saved.loss.d_colour.dtype.type
-    grads = render_reverse(saved.loss.d_colour * real(up), saved.loss.d_depth * real(up), None, saved.render)
-    back = scene_reverse(grads, saved.scene)
-    found: dict[str, Any] = dict(back.by_field)
-    if saved.matern is not None:
-        found["motion_coefficients"] = found["motion_coefficients"] + matern_penalty_reverse(
-            up * saved.lambda_msp, saved.matern
-        )
-    if saved.scene.deformation is not None:
-        assert back.offsets is not None
-        fdm = deformation_reverse(back.offsets, saved.scene.deformation)
-        found |= {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
-    return found
+    """The gradients of the view, times the cotangent of the loss."""
+    view, up = saved.view, float(cotangents["objective"])
+    exposure = {} if view.exposure is None else view.exposure._asdict()
+    gradients = view.gradients | {f"exposure_{name}": array for name, array in exposure.items()}
+    return {name: array * array.dtype.type(up) for name, array in gradients.items()}
 
 
 def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> Found:
     """Images and unweighted terms; a term of weight 0 is not evaluated."""
-    found: dict[str, Any] = {f"term_{name}": value for name, value in saved.loss.terms.items()}
-    images = {"colour_image": saved.rendered.colour, "depth_image": saved.rendered.depth}
-    return found | images | {"term_penalty": saved.penalty}
+    names = {"matern_penalty": "penalty"}
+    terms = {f"term_{names.get(name, name)}": value for name, value in saved.view.terms.items()}
+    return terms | {"colour_image": saved.view.rendered.colour, "depth_image": saved.view.rendered.depth}
 
 
 def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> dict[str, NDArray]:
     """Signs of every absolute value, the depth maximum and the edges, beside the decisions of the render."""
-    (colour, depth, _), targets = saved.rendered, saved.targets
+    (colour, depth, _), targets = saved.view.rendered, saved.targets
+    scene, _ = scene_at(gaussians_of(inputs), spectral_of(inputs, settings), model_of(settings), settings["t"])
+    _, render = render_forward(
+        scene, camera_of(inputs, settings), raster_of(settings), degree=settings["degree"],
+        compositor=compositor_of(settings),
+    )  # fmt: skip
     assert targets.depth is not None
     difference = np.where(targets.mask, colour - targets.image, 0)
     residual = np.where(targets.depth.valid, depth / depth.max() - targets.depth.normalised, 0)
@@ -118,7 +104,7 @@ def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) 
     signed = {"l1": difference, "depth": residual}
     signed |= {f"band {j}": band for j, band in enumerate(laplacian_levels(difference).bands)}
     signed |= {f"steps {axis}": np.diff(outside, axis=axis) for axis in (1, 2)}
-    return render_decisions(saved.render) | {
+    return render_decisions(render) | {
         "edges": canny_edges(depth).astype(int),
         "peak": np.array(depth.argmax()),
         **{name: np.sign(array).astype(int) for name, array in signed.items()},
@@ -137,6 +123,8 @@ def _objective_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
         "fdm_width": rng.uniform(0.3, 0.5, shape),
         "appearance_coefficients": rng.normal(0, 0.3, (3, 2 * FREQUENCIES, COUNT)),
         "motion_coefficients": rng.normal(0, 0.03, (3, 2 * FREQUENCIES, COUNT)),
+        "exposure_log_gain": rng.normal(0, 0.1, 3),
+        "exposure_bias": rng.normal(0, 0.05, 3),
     }
 
 
@@ -198,6 +186,8 @@ COMPONENT_UNITS = {
     "fdm_width": "1",
     "appearance_coefficients": "1",
     "motion_coefficients": "scene unit",
+    "exposure_log_gain": "1",
+    "exposure_bias": "display",
     "times": "1",
     "train_index": "frame",
 }

@@ -65,7 +65,8 @@ def simulated_scene(
     step   is called after every iteration
     """
     from endotsr.fitting.model import spectral_from
-    from endotsr.fitting.trainer import new_training, train
+    from endotsr.fitting.state import new_training
+    from endotsr.fitting.trainer import train
     from endotsr.simulator.settings import SimulatorSettings
     from endotsr.simulator.simulate import simulate
 

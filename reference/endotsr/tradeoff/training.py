@@ -21,7 +21,8 @@ from endotsr.evaluation.evaluate import evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.fitting.compile_ahead import rehearse
 from endotsr.fitting.model import render_at, spectral_from
-from endotsr.fitting.trainer import TrainingState, new_training, train, training_step, workshop
+from endotsr.fitting.state import TrainingState, new_training, workshop
+from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.sequences.sequence import Sequence
@@ -121,7 +122,8 @@ def measured(
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
 
     def render(index: int) -> Any:
-        return render_at(state.gaussians, spectral, config, full.cameras[index], float(full.times[index])).colour
+        at = (full.cameras[index], float(full.times[index]))
+        return render_at(state.gaussians, spectral, config, *at, frames=state.frames).colour
 
     found = evaluate_frames(full, full.test_index, render, weights).mean
     return {name: found[name] for name in METRICS}

@@ -27,6 +27,7 @@ FAMILIES = (
     "masked_ssim",
     "depth",
     "smoothness",
+    "exposure",
     "covariance",
     "projection",
     "harmonics",
