@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import AdamState, adam_state, add_array
-from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
+from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import OffsetsAhead, Spectral, raster_settings, scene_at, scene_reverse, spectral_from
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
@@ -138,9 +138,8 @@ def save_state(path: Path, state: TrainingState, config: Config) -> None:
 
 
 def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
-    """The state as it was saved."""
-    rng = np.random.default_rng()
-    rng.bit_generator.state = checkpoint.rng_state
+    """The state as it was saved. Raises InputError if its random state is not that of this generator."""
+    rng = restore_rng(checkpoint.rng_state)
     weight = checkpoint.header.get("lambda_lap")
     if weight is None and config.loss.lambda_lap != "auto":
         weight = float(config.loss.lambda_lap)

@@ -89,7 +89,7 @@ def _density(inputs: Inputs, settings: Settings) -> Found:
 def _initialisation(inputs: Inputs, settings: Settings) -> Found:
     """Every candidate is taken, so that no random number is drawn."""
     config = msgspec.convert(settings["initialisation"], InitialisationConfig)
-    sequence, no_draw = sequence_of(inputs, settings["camera"], 0.2), None
+    sequence, no_draw = sequence_of(inputs, settings["camera"]), None
     found = initialise(sequence, config, model_of(settings), no_draw, real_of(inputs))  # type: ignore[arg-type]
     return {"count": np.array(found.count), **arrays(found)}
 

@@ -119,7 +119,7 @@ class Tape:
         return np.ascontiguousarray(self.noise[:, :, : shape[2]], np.float64)
 
 
-def sequence_of(inputs: Inputs, lens: dict[str, float], near: float) -> Sequence:
+def sequence_of(inputs: Inputs, lens: dict[str, float]) -> Sequence:
     """The frames of a request; without stamps, frame k of n is at k / n."""
     poses = zip(inputs["rotation_matrices"], inputs["translations"])
     count = len(inputs["images"])
@@ -131,7 +131,6 @@ def sequence_of(inputs: Inputs, lens: dict[str, float], near: float) -> Sequence
         times=np.asarray(inputs.get("times", np.arange(count) / count), np.float64),
         cameras=[Camera(r.astype(np.float64), d.astype(np.float64), **lens) for r, d in poses],  # type: ignore[arg-type]
         names=[str(k) for k in range(count)],
-        near=near,
         unit="scene unit",
         static_camera=False,
         train_index=train,
@@ -150,7 +149,7 @@ def _training(inputs: Inputs, settings: Settings) -> Found:
     """Calibrate on the first Gaussians, then train; component A and S are born on the way, densification happens."""
     dtype = real_of({"position": inputs["position"]})
     config = config_of(settings, dtype)
-    sequence = sequence_of(inputs, settings["camera"], config.raster.near)
+    sequence = sequence_of(inputs, settings["camera"])
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
     shop = workshop(sequence, config)
     weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap

@@ -37,12 +37,6 @@ class Gaussians(NamedTuple):
         return self.position.shape[-1]
 
 
-def gather(gaussians: Gaussians, index: NDArray[np.integer]) -> Gaussians:
-    """The Gaussians named by `index` (in that order, repeats allowed), every array copied."""
-    taken = {name: np.ascontiguousarray(a[..., index]) for name, a in arrays(gaussians).items()}
-    return gaussians._replace(**taken)
-
-
 def arrays(gaussians: Gaussians) -> dict[str, FloatArray]:
     """The arrays that exist, by field name, in field order."""
     return {name: a for name, a in gaussians._asdict().items() if a is not None}

@@ -71,7 +71,7 @@ def select_files(folder: Path, config: SequenceConfig) -> Folder:
 def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> Sequence:
     """Read the frames that `config` selects.
 
-    near     near plane in millimetres, stored with the sequence
+    near     near plane, scene units: depth that lies wholly in front of it is refused
 
     Order of the steps: frame range, split and t = i / n over the selected frames; masks thresholded and turned to
     True = tissue; depth clipped per frame to percentiles of its non-zero values (0 stays 0); then everything is
@@ -92,7 +92,7 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     share = check_tissue_share(masks, where, config.excluded_value, config.allow_tissue_fraction)
     evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_tissue_fraction)
     notes += [
-        f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
+        f"{config.masks}: {config.excluded_value} = excluded; tissue fraction {share:.4f}; {evidence}",
         _depth_note(depth, near, files.depth),
     ]
     mask_names = [str(file) for file in files.masks]
@@ -104,7 +104,7 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         height, width = images.shape[2:]
         scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
         cameras = [scaled[id(camera)] for camera in cameras]
-        notes.append(f"scaled to {width}x{height}; tissue share {masks.mean():.4f}")
+        notes.append(f"scaled to {width}x{height}; tissue fraction {masks.mean():.4f}")
         check_tissue_share(
             masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_tissue_fraction
         )
@@ -118,7 +118,6 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         times=time_stamps(len(images)),
         cameras=cameras,
         names=[file.stem for file in files.images],
-        near=near,
         unit=UNIT,
         static_camera=static,
         train_index=train,

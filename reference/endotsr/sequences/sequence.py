@@ -27,7 +27,7 @@ class Frame(NamedTuple):
 class Sequence:
     """n frames of H x W pixels with masks, depth prior, cameras and a split.
 
-    The notes say in full sentences what the reader assumed and found: polarity, shares, thresholds, repairs.
+    The notes say in full sentences what the reader assumed and found: polarity, fractions, thresholds, repairs.
     """
 
     images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
@@ -36,7 +36,6 @@ class Sequence:
     times: NDArray[np.float64]  # (n,)         normalised, in [0, 1)
     cameras: list[Camera]  # n entries; one and the same object when the camera is static
     names: list[str]  # n names, for messages and written pictures
-    near: float  # near plane, scene units
     unit: str  # the scene unit, in words
     static_camera: bool
     train_index: NDArray[np.intp]  # ascending
@@ -78,7 +77,7 @@ class Sequence:
 
     @property
     def tissue_fraction(self) -> float:
-        """Share of all pixels of all frames that are tissue."""
+        """Fraction of all pixels of all frames that are tissue."""
         return float(self.masks.mean())
 
     def frame(self, index: int, dtype: DTypeLike = np.float32) -> Frame:

@@ -155,5 +155,5 @@ def _vessel_paths(a: Array, b: Array, rng: np.random.Generator, count: int, widt
     return np.concatenate(points, axis=1), np.concatenate(radii)
 
 
-def _mix(under: Array, over: Array, share: Array) -> Array:
-    return under * (1 - share) + over * share
+def _mix(under: Array, over: Array, fraction: Array) -> Array:
+    return under * (1 - fraction) + over * fraction
