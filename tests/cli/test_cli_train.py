@@ -16,10 +16,11 @@ import pytest
 from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
 
 from endotsr.cli.main import main
-from endotsr.cli.parts import progress, stopping
+from endotsr.cli.parts import progress
 from endotsr.config import load_config
 from endotsr.fitting import state as training_state
 from endotsr.fitting import trainer
+from endotsr.runs import stopping
 from endotsr.runs.folder import RunFolder
 
 LAST = 30
@@ -368,7 +369,7 @@ def test_resume_may_repeat_the_command_line(finished_run, tmp_path):
 def test_resume_compares_only_what_was_asked_for(tmp_path, capsys):
     out = tmp_path / "run"
     file = tmp_path / "mine.toml"
-    file.write_text("[model]\nbeta = 0.4\n[loss]\ndetail_from = 600\n")
+    file.write_text("[model]\nbeta = 0.4\n[loss]\nlaplacian_from = 600\n")
     words = ["--scale", "0.75", "--initialisation.motion-threshold", "30", "--iterations", "6"]
     assert main(train_only(out, "--config", str(file), *words)) == 0
     kept = (out / "config.toml").read_bytes()

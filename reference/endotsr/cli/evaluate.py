@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.progress import duration
 from endotsr.runs.files import replace_file, replacing_folder, write_json
 from endotsr.runs.folder import RunFolder, open_run
+from endotsr.runs.log import duration
 
 if TYPE_CHECKING:
     from endotsr.runs.model import Model

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.tradeoff_train import TRAINING
+from endotsr.cli.tradeoff_train import run as run_training
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder, write_json
 
@@ -13,7 +16,7 @@ if TYPE_CHECKING:
     from endotsr.tradeoff.budget import Budget
     from endotsr.tradeoff.scenes import StudyScene
 
-RESULT, TRAINING = "tradeoff.json", "training.json"
+RESULT = "tradeoff.json"  # in the folder of the measurement
 LEAST_REPEATS = 7
 
 
@@ -47,8 +50,6 @@ class TradeoffOptions:
 def run(words: list[str]) -> int:
     """The command."""
     if words[:1] == ["train"]:
-        from endotsr.cli.tradeoff_train import run as run_training
-
         return run_training(words[1:])
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
@@ -135,35 +136,3 @@ def _say_training(out: Path, budget: "Budget") -> int:
         raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
     print("\n".join(training_advice(read_result(file, Trainings), budget).lines))
     return 0
-
-
-class StepBar:
-    """A progress bar on a terminal; one line at the beginning elsewhere."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._bar: Any = None
-
-    def __enter__(self) -> "StepBar":
-        return self
-
-    def begin(self, steps: int) -> None:
-        """The number of steps is known."""
-        from tqdm import tqdm
-
-        self._bar = tqdm(total=steps, desc=self._name, disable=None, dynamic_ncols=True)
-        if self._bar.disable:
-            print(f"{self._name}: {steps} steps", flush=True)
-
-    def step(self, count: int = 1) -> None:
-        """So many more are done."""
-        self._bar.update(count)
-
-    def say(self, message: str) -> None:
-        """A line that does not disturb the bar."""
-        self._bar.clear()
-        print(message, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()

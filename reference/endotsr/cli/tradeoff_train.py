@@ -8,10 +8,12 @@ import msgspec
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.tradeoff import TRAINING, StepBar
+from endotsr.cli.parts.progress import StepBar
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder
 from endotsr.runs.sources import SIMULATED
+
+TRAINING = "training.json"  # in the folder of the measurement
 
 
 @dataclass

@@ -60,7 +60,11 @@ def load_training(folder: RunFolder, config: Config) -> Any:
     """The training at its last checkpoint. Raises InputError if it is damaged or of other settings."""
     from endotsr.fitting.state import state_from_checkpoint
 
-    return state_from_checkpoint(_checkpoint_of(folder, config), config)
+    checkpoint = _checkpoint_of(folder, config)
+    try:
+        return state_from_checkpoint(checkpoint, config)
+    except InputError as error:
+        raise InputError(f"{folder.checkpoint}: {error}") from None
 
 
 def _checkpoint_of(folder: RunFolder, config: Config) -> "Checkpoint":
@@ -89,7 +93,7 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
     """The settings that show in the arrays themselves."""
     from endotsr.fitting.schedules import residuals_active
 
-    gaussians, born = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
+    gaussians, active = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
     yield "training.precision", gaussians.position.dtype.name
     yield "model.harmonics_degree", math.isqrt(len(gaussians.harmonics)) - 1
     yield "model.deformation", gaussians.fdm_weight is not None
@@ -98,7 +102,7 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
         yield "model.bases", gaussians.fdm_weight.shape[1]
     residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}
     for name, coefficients in residuals.items():
-        if born or coefficients is not None:  # before their birth they are missing in any model
+        if active or coefficients is not None:  # before their activation they are missing in any model
             yield f"model.{name}", coefficients is not None
         if coefficients is not None:
             yield "model.frequencies", coefficients.shape[1] // 2

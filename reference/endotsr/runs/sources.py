@@ -113,7 +113,6 @@ def sequence_record(sequence: Sequence) -> dict[str, Any]:
     cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras
     return {
         "unit": sequence.unit,
-        "near": sequence.near,
         "largest_depth": float(sequence.depth.max()),
         "static_camera": sequence.static_camera,
         "names": sequence.names,

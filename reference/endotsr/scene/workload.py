@@ -129,7 +129,6 @@ def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11, frames: i
         times=index / frames,
         cameras=[view] * frames,
         names=[f"{i:06d}" for i in index],
-        near=0.2,
         unit="scene units",
         static_camera=True,
         train_index=np.delete(index, 1),

@@ -77,7 +77,7 @@ def select_files(folder: Path, config: SequenceConfig) -> Folder:
 def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> Sequence:
     """Read the frames that `config` selects.
 
-    near     near plane in millimetres, stored with the sequence
+    near     near plane, scene units: depth that lies wholly in front of it is refused
 
     Order of the steps: frame range, split and t = i / n over the selected frames; masks thresholded and turned to
     True = tissue; depth clipped per frame to percentiles of its non-zero values (0 stays 0); then everything is
@@ -124,7 +124,6 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         times=time_stamps(len(images)),
         cameras=cameras,
         names=[file.stem for file in files.images],
-        near=near,
         unit=UNIT,
         static_camera=static,
         train_index=train,

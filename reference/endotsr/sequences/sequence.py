@@ -36,7 +36,6 @@ class Sequence:
     times: NDArray[np.float64]  # (n,)         normalised, in [0, 1)
     cameras: list[Camera]  # n entries; one and the same object when the camera is static
     names: list[str]  # n names, for messages and written pictures
-    near: float  # near plane, scene units
     unit: str  # the scene unit, in words
     static_camera: bool
     train_index: NDArray[np.intp]  # ascending

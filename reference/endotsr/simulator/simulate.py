@@ -19,7 +19,6 @@ from endotsr.simulator.surface import Surface, View, make_surface, see, surface_
 from endotsr.simulator.texture import Texture, make_texture
 from endotsr.splatting.camera import Camera
 
-NEAR = 0.2  # mm
 UNIT = "mm"
 
 
@@ -90,12 +89,11 @@ def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
         times=times,
         cameras=cameras,
         names=[f"simulated-{i:06d}" for i in range(n)],
-        near=NEAR,
         unit=UNIT,
         static_camera=not settings.camera_motion.on,
         train_index=train,
         test_index=test,
-        notes=[f"simulated with seed {settings.seed}; tissue share {tissue.mean():.4f}"],
+        notes=[f"simulated with seed {settings.seed}; tissue fraction {tissue.mean():.4f}"],
     )
     return SimulatedSequence(sequence, Truth(depth, material, covered, surface), settings)
 

@@ -103,7 +103,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     """Every candidate is taken, so that no random number is drawn."""
     config = msgspec.convert(settings["initialisation"], InitialisationConfig)
-    sequence, no_draw = sequence_of(inputs, settings["camera"], 0.2), None
+    sequence, no_draw = sequence_of(inputs, settings["camera"]), None
     found = initialise(sequence, config, model_of(settings), no_draw, real_of(inputs))  # type: ignore[arg-type]
     return {"count": np.array(found.count), **arrays(found)}, None
 
@@ -112,7 +112,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     """Calibrate on the first Gaussians, then train; components A and S are activated, densification happens."""
     dtype = real_of({"position": inputs["position"]})
     config = config_of(settings, dtype)
-    sequence = sequence_of(inputs, settings["camera"], config.raster.near)
+    sequence = sequence_of(inputs, settings["camera"])
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
     shop = workshop(sequence, config)
     weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap

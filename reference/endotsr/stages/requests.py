@@ -85,7 +85,7 @@ def config_of(settings: Settings, dtype: np.dtype) -> Config:
     return config_from_dict(data, "golden case")
 
 
-def sequence_of(inputs: Inputs, lens: dict[str, float], near: float) -> Sequence:
+def sequence_of(inputs: Inputs, lens: dict[str, float]) -> Sequence:
     """The frames of a request; without stamps, frame k of n is at k / n."""
     poses = zip(inputs["rotation_matrices"], inputs["translations"])
     count = len(inputs["images"])
@@ -97,7 +97,6 @@ def sequence_of(inputs: Inputs, lens: dict[str, float], near: float) -> Sequence
         times=np.asarray(inputs.get("times", np.arange(count) / count), np.float64),
         cameras=[Camera(r.astype(np.float64), d.astype(np.float64), **lens) for r, d in poses],  # type: ignore[arg-type]
         names=[str(k) for k in range(count)],
-        near=near,
         unit="scene unit",
         static_camera=False,
         train_index=train,

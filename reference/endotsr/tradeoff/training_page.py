@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from endotsr.cli.parts.progress import duration
+from endotsr.runs.log import duration
 from endotsr.tradeoff.figures import BLUE, GREEN, GREY, INK, ORANGE, PINK, empty_figure, plain_axes, save
 from endotsr.tradeoff.labels import Label, place_labels
 

@@ -1,10 +1,11 @@
 """Signals that stop a command: raised as KeyboardInterrupt, and remembered.
 
-Python raises the exception at whatever the main thread is doing. Within a callback of compiled code (the loader of a
-kernel) nobody can catch it: Python drops it there, and the command goes on or fails of something else. Whoever works
-for long therefore asks `stop_asked` now and then, and calls an error after a signal an interruption.
+Python raises the exception wherever the main thread happens to be. Inside a callback of compiled code (the loader of a
+kernel) the exception cannot be caught: Python drops it there, and the command continues or fails with another error.
+Long work therefore calls `stop_asked` from time to time, and treats an error after a signal as an interruption.
 
-Work that would be lost half-done is put into `finishing`: there the first signal is only remembered for a moment.
+Work that must not be lost half-done runs inside `finishing`: there the first signal is only remembered, for PATIENCE
+seconds.
 """
 
 import _thread
@@ -13,7 +14,7 @@ import signal
 import threading
 from collections.abc import Iterator
 
-PATIENCE = 0.7  # seconds that work inside `finishing` has to come to an end after the first signal
+PATIENCE = 0.7  # seconds that work inside `finishing` has to end after the first signal
 
 _asked = threading.Event()
 _finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blocks, started by the first signal
@@ -46,9 +47,9 @@ def signals_stop() -> Iterator[None]:
 
 @contextlib.contextmanager
 def finishing() -> Iterator[None]:
-    """Inside, the first signal raises nothing for PATIENCE seconds; whoever works there looks at `stop_asked`.
+    """Inside, the first signal raises nothing for PATIENCE seconds; the work there calls `stop_asked`.
 
-    When they are over, or at a second signal, KeyboardInterrupt comes as everywhere else.
+    After that time, or at a second signal, KeyboardInterrupt is raised as elsewhere.
     """
     clock = threading.Timer(PATIENCE, _thread.interrupt_main)
     clock.daemon = True
