@@ -95,7 +95,7 @@ def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
         static_camera=not settings.camera_motion.on,
         train_index=train,
         test_index=test,
-        notes=[f"simulated with seed {settings.seed}; tissue share {tissue.mean():.4f}"],
+        notes=[f"simulated with seed {settings.seed}; tissue fraction {tissue.mean():.4f}"],
     )
     return SimulatedSequence(sequence, Truth(depth, material, covered, surface), settings)
 
