@@ -56,7 +56,7 @@ Component = Literal["appearance", "spectral_motion"]
 RENDERING = ("names", "times", "train_index", "cameras", "static_camera")  # keys of sequence.json that it reads
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
 OnIteration = Callable[[dict[str, Any]], object]
-OnMessage = Callable[[str], object]
+OnMessage = Callable[[str], None]
 
 
 class StopTraining(Exception):
@@ -154,7 +154,7 @@ def train(
     if not isinstance(sequence, Sequence):
         raise InputError(f"train: sequence is {type(sequence).__name__}; allowed: a Sequence, as from load_sequence")
     if config is None:
-        config = make_config(preset, iterations=iterations, **sections)
+        config = make_config(preset, file=None, iterations=iterations, **sections)
     elif preset is not None:
         raise InputError(f"train: preset = {preset!r} beside a config is not allowed; allowed: one of the two")
     else:
@@ -247,9 +247,16 @@ class Run:
         for name in without:
             if name not in COMPONENTS:
                 raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
-        parts = {name: name not in without for name in COMPONENTS}
         gaussians, spectral, config, _ = self.model
-        return render_at(gaussians, spectral, config, self._camera(time, camera), float(time), **parts)
+        return render_at(
+            gaussians,
+            spectral,
+            config,
+            self._camera(time, camera),
+            float(time),
+            appearance="appearance" not in without,
+            spectral_motion="spectral_motion" not in without,
+        )
 
     def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
         """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
