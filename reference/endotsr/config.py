@@ -35,7 +35,7 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     excluded_value: Literal["white", "black"] = "white"
     """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
     allow_tissue_fraction: bool = False
-    """accept a tissue fraction below 5 % or of exactly 100 %, and masks that the pictures or the other masks contradict"""
+    """accept a tissue fraction below 5 % or of exactly 100 %, and masks that pictures or other masks contradict"""
     frames: str = ""
     """frame range start:stop[:step] in Python slice notation; empty = all"""
     scale: Positive = 1.0
