@@ -12,7 +12,7 @@ import json
 import sys
 from pathlib import Path
 
-from endotsr.cli.evaluate import PUBLISHED
+from endotsr.evaluation.run import PUBLISHED
 from endotsr.runs.files import write_json
 
 FOLDER = Path(__file__).parent

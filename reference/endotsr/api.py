@@ -56,7 +56,7 @@ Component = Literal["appearance", "spectral_motion"]
 RENDERING = ("names", "times", "train_index", "cameras", "static_camera")  # keys of sequence.json that it reads
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
 OnIteration = Callable[[dict[str, Any]], object]
-OnMessage = Callable[[str], None]
+OnMessage = Callable[[str], object]
 
 
 class StopTraining(Exception):
@@ -247,13 +247,14 @@ class Run:
         for name in without:
             if name not in COMPONENTS:
                 raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
-        gaussians, spectral, config, _ = self.model
+        model = self.model
         return render_at(
-            gaussians,
-            spectral,
-            config,
+            model.gaussians,
+            model.spectral,
+            model.config,
             self._camera(time, camera),
             float(time),
+            frames=model.frames,
             appearance="appearance" not in without,
             spectral_motion="spectral_motion" not in without,
         )
@@ -271,12 +272,10 @@ class Run:
         from endotsr.evaluation.lpips import load_lpips_weights
 
         weights = load_lpips_weights(None if lpips is None else Path(lpips))
-        gaussians, spectral, config, _ = self.model
         sequence = self.sequence
 
         def render_frame(index: int):
-            time = float(sequence.times[index])
-            return render_at(gaussians, spectral, config, sequence.cameras[index], time).colour
+            return self.render(float(sequence.times[index]), sequence.cameras[index]).colour
 
         return evaluate_model(sequence, render_frame, weights)
 

@@ -9,11 +9,11 @@ import pytest
 from tiny import SEQUENCE, SETTINGS, assert_refused
 
 from endotsr.bench.clock import REST, STAGES
-from endotsr.cli.evaluate import held_out_table
 from endotsr.cli.main import main
-from endotsr.cli.parts.pictures import depth_bytes, depth_step
 from endotsr.kernels.threads import use_threads
 from endotsr.opencv import read_png
+from endotsr.report.pictures import depth_bytes, depth_step
+from endotsr.report.run_text import held_out_table
 from endotsr.runs.files import os_error_line, write_json
 
 

@@ -120,8 +120,8 @@ def write_views(target: Path, folder: RunFolder, views: list[View], render, npy:
     """Render and write every view below `target`, then render.json."""
     import numpy as np
 
-    from endotsr.cli.parts.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
     from endotsr.opencv import write_png
+    from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
     from endotsr.runs.sources import remembered_cameras
 
     record = folder.sequence_record("names", "cameras", "static_camera", "unit")

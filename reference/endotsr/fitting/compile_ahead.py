@@ -24,7 +24,7 @@ READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # referred to until this process ends: nobody waits for their last kernels
 
 
-def compile_ahead(config: Config, say: Callable[[str], None] = lambda line: None) -> bool:
+def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: None) -> bool:
     """Compile what a training with these settings calls, on two cores, if the folder of kernels does not hold it yet.
 
     say      takes a line for the user when something is compiled

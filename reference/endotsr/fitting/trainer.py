@@ -61,7 +61,7 @@ def train(
     on_iteration: OnIteration,
     on_checkpoint: Callable[[TrainingState], None],
     *,
-    on_message: Callable[[str], None] = print,
+    on_message: Callable[[str], object] = print,
 ) -> TrainingState:
     """Run to `config.training.iterations`; the state is changed in place and returned.
 

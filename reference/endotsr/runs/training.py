@@ -15,13 +15,14 @@ from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
-from endotsr.runs.machine import machine, now, peak_memory_bytes, versions
+from endotsr.runs.machine import now, peak_memory_bytes
+from endotsr.runs.record import new_record
 from endotsr.runs.stopping import finishing, stop_asked
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from endotsr.fitting.trainer import TrainingState
+    from endotsr.fitting.state import TrainingState
     from endotsr.sequences.sequence import Sequence
     from endotsr.simulator.settings import SimulatorSettings
 
@@ -52,29 +53,15 @@ def start_record(
     """run.json at the start of a run."""
     from endotsr.runs.sources import input_record
 
-    return {
-        "status": "running",
-        "command": command,
-        "started": now(),
-        "finished": None,
-        "seconds": 0.0,
-        "iterations_done": 0,
-        "lambda_lap": None,
-        "peak_memory_bytes": None,
-        "seed": config.training.seed,
-        "threads": threads,
-        "versions": versions(),
-        "machine": machine(),
-        "input": input_record(source, sequence, config, simulator),
-        "resumed": [],
-    }
+    about = input_record(source, sequence, config, simulator)
+    return new_record(command, config, threads, about)
 
 
 def train_new_run(
     out: "Path", record: dict[str, Any], sequence: "Sequence", config: Config, observer: Observer
 ) -> RunFolder:
     """A new run folder, trained to the end. A folder that got no checkpoint is removed; errors as in `train_run`."""
-    from endotsr.fitting.trainer import new_training
+    from endotsr.fitting.state import new_training
     from endotsr.runs.sources import sequence_record
 
     state = new_training(sequence, config)
@@ -92,7 +79,7 @@ def train_new_run(
 
 def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: Observer) -> None:
     """Train a run from its last checkpoint to the end, with the settings of its config.toml."""
-    from endotsr.fitting.trainer import new_training
+    from endotsr.fitting.state import new_training
     from endotsr.runs.model import load_training
 
     config = folder.config()
