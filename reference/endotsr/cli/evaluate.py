@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from endotsr.cli.parts.options import parse
-from endotsr.cli.parts.progress import duration
+from endotsr.report.words import duration
 from endotsr.runs.files import replace_file, replacing_folder, write_json
 from endotsr.runs.folder import RunFolder, open_run
 

@@ -5,6 +5,8 @@ import sys
 import time
 from typing import Any
 
+from endotsr.report.words import duration
+
 QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
 
@@ -58,10 +60,3 @@ class Progress:
     def _state(self, entry: dict[str, Any]) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
         return f"{shown}, {entry.get('gaussians', 0)} Gaussians"
-
-
-def duration(seconds: float) -> str:
-    """1:02:03 or 2:03."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
