@@ -87,16 +87,16 @@ def legend(owner: Any, theme: Theme = LIGHT, sizes: Sizes = NORMAL, **where: Any
 
 
 def encoded(figure: Any, kind: str = "png", dots: int = DOTS_PER_INCH, *, transparent: bool = False) -> bytes:
-    """The bytes of a picture file; `kind` is "png", "svg" or another ending that matplotlib knows."""
+    """The bytes of a picture file; `kind` is "png" or "svg"."""
     import matplotlib as mpl
 
     buffer = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": HASH_SALT, "svg.fonttype": "path"}):
-        figure.savefig(buffer, format=kind, dpi=dots, transparent=transparent, metadata=METADATA.get(kind))
+        figure.savefig(buffer, format=kind, dpi=dots, transparent=transparent, metadata=METADATA[kind])
     return buffer.getvalue()
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write the picture, of the kind that the ending of `path` names, complete or not at all."""
-    content = encoded(figure, path.suffix.removeprefix(".").lower() or "png")
+    """Write the picture, png or svg by the ending of `path`, complete or not at all."""
+    content = encoded(figure, path.suffix.removeprefix(".").lower())
     replace_file(path, lambda temporary: temporary.write_bytes(content))
