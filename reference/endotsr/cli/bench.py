@@ -32,8 +32,8 @@ def run(words: list[str]) -> int:
     options, measure = MEASURES[what]
     chosen = parse(options, rest, f"bench {what}")
     _refuse_nothing(what, chosen)
-    _refuse_other_pictures(getattr(chosen, "plot", None))
     refuse_unwritable(getattr(chosen, "json", None), getattr(chosen, "plot", None))
+    _refuse_other_pictures(getattr(chosen, "plot", None))
     measure(chosen)
     return 0
 
