@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 from endotsr.bench import peers as peer_results
 from endotsr.bench.clock import REST
-from endotsr.bench.stages import memory
 from endotsr.errors import InputError
 from endotsr.report.tables import markdown
+from endotsr.report.words import memory
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of

@@ -72,6 +72,7 @@ def test_grid_is_every_combination():
     [
         (["everything"], "allowed: iteration, stages, scaling, peers, start, all"),
         (["stages", "--gaussians", "3"], "--gaussians 3 is not allowed"),
+        (["stages", "--plot", "bars.pdf"], "--plot bars.pdf is not allowed; allowed: a file whose name ends in .png"),
         (["scaling", "--largest", "10"], "--largest 10 is not allowed"),
         (["start", "--repeats", "0"], "--repeats 0 is not allowed"),
         (["stages", "--precisions", "float16"], "float16"),

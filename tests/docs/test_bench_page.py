@@ -32,9 +32,8 @@ def test_command_fills_a_page_and_keeps_its_words(found, tmp_path):
     changed = found | {"start": found["start"] | {"warm": dict.fromkeys(start.MOMENTS, 123.4)}}
     for name, file in bench.FILES.items():
         (folder / file).write_text(json.dumps(changed[name]), encoding="utf-8")
-    page.write_text(
-        "before <!-- bench:start:start -->\nto be replaced\n<!-- bench:start:end --> after", encoding="utf-8"
-    )
+    marked = "<!-- bench:start:start -->\nto be replaced\n<!-- bench:start:end -->"
+    page.write_text(f"before {marked} after", encoding="utf-8")
     bench.main([str(folder)], page)
     once = page.read_text(encoding="utf-8")
     assert once.startswith("before ") and once.endswith(" after") and "123.4" in once and "to be replaced" not in once

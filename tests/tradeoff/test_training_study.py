@@ -49,7 +49,7 @@ def numbers(result):
 def test_every_question_is_answered(whole):
     result, file = whole
     asked = {c["dial"] for c in result["configurations"]}
-    assert asked == {"base", "residuals", "detail loss", "image scale", "Gaussians", "cutoffs", "precision"}
+    assert asked == {"base", "residuals", "Laplacian loss", "image scale", "Gaussians", "cutoffs", "precision"}
     assert json.loads(file.read_text()) == json.loads(json.dumps(result))
     for c in result["configurations"]:
         iterations = [row["iteration"] for row in c["milestones"]]

@@ -10,6 +10,7 @@ from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
 from endotsr.bench.trained import read_arrays
 from endotsr.report.tables import plain
+from endotsr.report.words import memory
 
 Say = Callable[[str], None]
 
@@ -82,11 +83,6 @@ def line(result: dict[str, Any]) -> str:
         f"{name_of(result['case'])}: iteration {result['iteration']['median_ms']:.1f} ms, splat "
         f"{result['splat']['median_ms']:.1f} ms, {pairs / 1e6:.2f} M pairs, {memory(result['peak_memory_bytes'])}"
     )
-
-
-def memory(found: int | None) -> str:
-    """Peak memory in words."""
-    return f"{found / 1e9:.2f} GB" if found else "memory not known"
 
 
 def table(result: dict[str, Any]) -> str:

@@ -33,6 +33,7 @@ def run(words: list[str]) -> int:
     chosen = parse(options, rest, f"bench {what}")
     _refuse_nothing(what, chosen)
     refuse_unwritable(getattr(chosen, "json", None), getattr(chosen, "plot", None))
+    _refuse_other_pictures(getattr(chosen, "plot", None))
     measure(chosen)
     return 0
 
@@ -48,6 +49,12 @@ def _refuse_nothing(what: str, options: Any) -> None:
         if getattr(options, name, None) == () and not (name == "gaussians" and scenes):
             other = ", or none with --scenes" if name == "gaussians" and what == "stages" else ""
             raise InputError(f"bench: --{name} is empty, which leaves nothing to time; allowed: one or more{other}")
+
+
+def _refuse_other_pictures(plot: Path | None) -> None:
+    """Raises: InputError for a picture of a kind that is not drawn, before the measurement."""
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg"):
+        raise InputError(f"bench: --plot {plot} is not allowed; allowed: a file whose name ends in .png or .svg")
 
 
 def _overview() -> str:

@@ -124,15 +124,15 @@ def render_forward(
     Edges:   N = 0 or nothing visible gives the background and zero depth.
     Oracle:  tests/oracle/splatting_oracle.py.
     """
-    dtype = scene.position.dtype
     width, height = camera.width, camera.height
-    back = np.zeros(3, dtype) if background is None else np.ascontiguousarray(background, dtype)
+    back = np.ascontiguousarray(np.zeros(3) if background is None else background, scene.position.dtype)
     (tile_width, tile_height), composite = _forward_compositor(settings, compositor)
     with timer.stage("projection"):
         shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
         projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
-        centre = camera_centre(camera)
-        colour, harmonics_saved = harmonics_forward(scene.harmonics, scene.residual, scene.position, centre, degree)
+        colour, harmonics_saved = harmonics_forward(
+            scene.harmonics, scene.residual, scene.position, camera_centre(camera), degree
+        )
     with timer.stage("binning"):
         log_alpha = log_opacity(scene.opacity_logit)
         box, visible = screen_boxes(projected, log_alpha, settings, width, height)
@@ -163,14 +163,8 @@ def render_reverse(
     composite = saved.composite
     with timer.stage("blend reverse"):
         pairs = _composite_reverse(d_colour, d_depth, d_opacity, composite)
-    deviations = saved.settings.deviations
     with timer.stage("binning"):
-        d_mean2d, d_footprint, d_logit, d_rgb, d_z = gather_footprint_gradients(
-            saved.order, composite.records, composite.lists, pairs, saved.projected.determinant,
-            saved.scene.opacity_logit,
-            conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
-            keep_depth=not deviations.drop_depth_to_z,
-        )  # fmt: skip
+        d_mean2d, d_footprint, d_logit, d_rgb, d_z = _gather(pairs, saved)
     with timer.stage("projection"):
         harmonics = harmonics_reverse(d_rgb, saved.harmonics)
         projection = projection_reverse_footprint(
@@ -212,6 +206,16 @@ def _composite_reverse(
         return compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, saved)
     d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
     return compositing.composite_reverse(d_colour, d_depth, d_opacity, saved)
+
+
+def _gather(pairs: FloatArray, saved: RenderSaved) -> tuple[FloatArray, ...]:
+    """Gradients of the pairs added up by Gaussian: by mean, footprint, opacity logit, colour and depth."""
+    composite, deviations = saved.composite, saved.settings.deviations
+    return gather_footprint_gradients(
+        saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
+        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
+        keep_depth=not deviations.drop_depth_to_z,
+    )  # fmt: skip
 
 
 def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera: Camera) -> CameraGrads:

@@ -74,8 +74,8 @@ def simulated_scene(
     simulator = SimulatorSettings(width=width, height=height, seed=seed)
     sequence = simulate(simulator).sequence
     config = with_iterations(DEMO, iterations)
-    share = (width / SIMULATED_WIDTH) ** 2  # points by the pixel
-    points = {name: max(4, round(count * share)) for name, count in POINTS.items()}
+    fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
+    points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}
     config = msgspec.structs.replace(config, initialisation=msgspec.structs.replace(config.initialisation, **points))
     state = new_training(sequence, config)
     train(state, sequence, config, lambda entry: step(), lambda reached: None)

@@ -29,7 +29,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.tradeoff.results import FORMAT, read_result
 
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
-MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # shares of the iterations
+MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations
 LPIPS_FROM = 1 / 2  # it takes as long as all other metrics several times over
 PROBE_WARM, PROBE = 5, 15  # iterations
 GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
@@ -68,7 +68,7 @@ def configurations(base: Config) -> list[Configuration]:
     return [
         Configuration("base", "base", {}, 1.0),
         Configuration("no residuals", "residuals", {"model": {"appearance": False, "spectral_motion": False}}, 0.85),
-        Configuration("no detail loss", "detail loss", {"model": {"laplacian": False}}, 0.9),
+        Configuration("no Laplacian loss", "Laplacian loss", {"model": {"laplacian": False}}, 0.9),
         Configuration("half size", "image scale", {"sequence": {"scale": base.sequence.scale / 2}}, 0.5),
         Configuration("N / 2", "Gaussians", points(1 / 2), 0.75),
         Configuration("cutoff 1/64", "cutoffs", {"raster": {"alpha_cutoff": 1 / 64}}, 0.9),
@@ -103,9 +103,9 @@ def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights
     iteration = (time.monotonic() - began) / PROBE * GROWTH
     chosen = configurations(base)
     left = seconds
-    for share in MILESTONES:
+    for fraction in MILESTONES:
         began = time.monotonic()
-        measured(state, base, sequence, sequence, weights if share >= LPIPS_FROM else None)
+        measured(state, base, sequence, sequence, weights if fraction >= LPIPS_FROM else None)
         left -= (time.monotonic() - began) * len(chosen)
     trainings = sum(c.cost for c in chosen)
     return int(np.clip(left / (iteration * trainings), 16, base.training.iterations))
@@ -143,7 +143,7 @@ def run_configuration(
     """
     rehearse(config)
     total = config.training.iterations
-    stops = {max(1, round(share * total)) for share in MILESTONES}
+    stops = {max(1, round(fraction * total)) for fraction in MILESTONES}
     rows: list[dict[str, Any]] = []
     began, away = time.monotonic(), 0.0
     state = new_training(sequence, config)
@@ -194,15 +194,12 @@ def run_training_study(
     file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a sequence that is refused leaves nothing
     base = with_iterations(base, result["iterations"])
     done = {entry["name"]: entry for entry in result["configurations"]}
-    chosen = configurations(base)
-    left = [c for c in chosen if c.name not in done]
+    left = [c for c in configurations(base) if c.name not in done]
     begin(len(left) * base.training.iterations)
     ends = time.monotonic() + 60 * minutes
     result["left_out"] = {}
     for configuration in left:
-        like = done.get("base", {"seconds": 0.0, "evaluation_seconds": 0.0})
-        expected = configuration.cost * like["seconds"] + like["evaluation_seconds"]
-        if time.monotonic() + expected > ends:
+        if time.monotonic() + _expected_seconds(configuration, done.get("base")) > ends:
             result["left_out"][configuration.name] = "no time left for it"
             continue
         config = changed(base, configuration)
@@ -214,6 +211,11 @@ def run_training_study(
         say(summary_line(entry))
     write_json(file, result)
     return result
+
+
+def _expected_seconds(configuration: Configuration, base: dict[str, Any] | None) -> float:
+    """Training and evaluation of a configuration, from those of the base training; 0 before it was measured."""
+    return configuration.cost * base["seconds"] + base["evaluation_seconds"] if base else 0.0
 
 
 def _begun(
