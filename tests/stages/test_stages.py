@@ -5,15 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from endotsr.golden.store import golden_folder, read_golden
 
+from endotsr.golden.judge.store import golden_folder, read_golden
+from endotsr.golden.vectors.registry import all_operations
 from endotsr.gradcheck import all_pairs, pair_of
 from endotsr.stages import registry
 from endotsr.stages.registry import all_stages
 from endotsr.stages.stage import Asked, Stage, Variant, real_of, split_blocks
 
 STAGES = all_stages()
-STORED = [(case, STAGES[case.operation]) for case in read_golden(golden_folder()).cases]
+OPERATIONS = all_operations()
+STORED = [(case, OPERATIONS[case.operation]) for case in read_golden(golden_folder()).cases]
 
 
 def cubed(inputs, settings):
