@@ -5,15 +5,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from endotsr.golden.store import golden_folder, read_golden
 
+from endotsr.golden.judge.store import golden_folder, read_golden
+from endotsr.golden.vectors.registry import all_operations
 from endotsr.gradcheck import all_pairs, pair_of
 from endotsr.stages import registry
 from endotsr.stages.registry import all_stages
 from endotsr.stages.stage import Asked, Stage, Variant, real_of, split_blocks
 
 STAGES = all_stages()
-STORED = [(case, STAGES[case.operation]) for case in read_golden(golden_folder()).cases]
+OPERATIONS = all_operations()
+STORED = [(case, OPERATIONS[case.operation]) for case in read_golden(golden_folder()).cases]
 
 
 def cubed(inputs, settings):
@@ -132,7 +134,7 @@ def test_a_name_is_registered_once(monkeypatch, other, message):
 def test_the_checks_are_the_variants_in_the_order_of_the_specification():
     assert list(all_pairs()) == [variant.name for stage in STAGES.values() for variant in stage.variants]
     labels = [pair.equation for pair in all_pairs().values()]
-    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "6"]
+    order = ["1", "1b", "2", "3", "4", "5", *(f"B{k}" for k in range(1, 10)), "B13", "6"]
     assert list(dict.fromkeys(labels)) == order
 
 

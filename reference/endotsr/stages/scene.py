@@ -211,6 +211,8 @@ OBJECTIVE = Stage(
         "term_penalty": Asked(3, "scene unit^2", oracle="matern_oracle.penalty"),
         "objective": Asked(3, "loss", oracle="losses.masked_l1"),
         **{f"d_{name}": Asked(3, GRADIENT_UNITS.get(name, "loss"), "last") for name in Gaussians._fields},
+        "d_exposure_log_gain": Asked(3, "loss"),
+        "d_exposure_bias": Asked(3, "loss per display unit"),
     },
     reverse=_objective_reverse,
     extra=_images_and_terms,
