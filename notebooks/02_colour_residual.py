@@ -41,9 +41,9 @@ statistics = atom_statistics(stamps, omega)
 # \Delta h_{0,ci}(t) = \frac{\beta}{Y_{00}}\tanh x_{ci}(t),\qquad Y_{00}=\frac{1}{\sqrt{4\pi}} .
 # $$
 #
-# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0 harmonic
-# coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$ makes the
-# change of the **displayed** colour exactly $\beta\tanh x$.
+# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0
+# harmonic coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$
+# makes the change of the **displayed** colour exactly $\beta\tanh x$.
 
 
 # %% tags=["transcription"]

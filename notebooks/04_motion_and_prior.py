@@ -117,8 +117,8 @@ penalty, saved_penalty = matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, penalty_text(C, rho), rtol=1e-13)
 
 # %% [markdown]
-# **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale $1/\ell$,
-# evaluated at $2\pi\omega$. The Student-t density of an independent library gives the same weights:
+# **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale
+# $1/\ell$, evaluated at $2\pi\omega$. The Student-t density of an independent library gives the same weights:
 
 # %%
 density = stats.t(df=5, scale=1 / length).pdf(2 * np.pi * omega)

@@ -13,8 +13,8 @@
 # %% [markdown]
 # # 6. Perspective projection of a Gaussian
 #
-# The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the projection at
-# the centre (EWA). The result is an ellipse on the screen.
+# The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the
+# projection at the centre (EWA). The result is an ellipse on the screen.
 #
 # The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`.
 
@@ -237,7 +237,7 @@ for settings in (PAPER, EXACT):
     grads = projection_reverse(g_uv, g_abc, g_z, saved, pose_gradient=True)
     g_d, g_W = np.zeros(3), np.zeros((3, 3))
     for i in range(N):
-        g_mu, g_R, g_S, g_xyz, share = reverse_text(
+        g_mu, g_R, g_S, g_xyz, part = reverse_text(
             g_uv[:, i],
             g_abc[:, i],
             g_z[i],
@@ -250,7 +250,7 @@ for settings in (PAPER, EXACT):
         np.testing.assert_allclose(grads.position[:, i], g_mu, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(grads.rotation[:, :, i], g_R, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(grads.scale[:, i], g_S, rtol=1e-9, atol=1e-10)
-        g_d, g_W = g_d + g_xyz, g_W + share
+        g_d, g_W = g_d + g_xyz, g_W + part
     np.testing.assert_allclose(grads.camera.translation, g_d, rtol=1e-10)
     np.testing.assert_allclose(grads.camera.rotation, g_W, rtol=1e-10)
 

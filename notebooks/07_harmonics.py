@@ -136,9 +136,10 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# The colour is linear in the coefficients. The clamp passes the gradient where the value before it is $\ge0$. The direction is
-# $\mathbf n=\mathbf v/\|\mathbf v\|$: only the part of $g_{\mathbf n}$ that is perpendicular to $\mathbf n$ remains,
-# divided by the distance. This is the rule of the quaternion, because the normalisation is the same.
+# The colour is linear in the coefficients. The clamp passes the gradient where the value before it is $\ge0$. The
+# direction is $\mathbf n=\mathbf v/\|\mathbf v\|$: only the part of $g_{\mathbf n}$ that is perpendicular to
+# $\mathbf n$ remains, divided by the distance. This is the rule of the quaternion, because the normalisation is the
+# same.
 #
 # $$
 # \begin{aligned}

@@ -166,7 +166,7 @@ for k, (i, alpha, T) in enumerate(contributors):
     axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
     axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=8)
 axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
-axes[0].set(title="pixel (9, 7): $T_k$, and the share $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
+axes[0].set(title="pixel (9, 7): $T_k$, and the fraction $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
 axes[0].set_xticklabels([f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"])
 camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 37.5, 26.5, 72, 56)
 splat = Scene(
@@ -229,10 +229,11 @@ plt.show()
 # $$
 #
 # **Line 6. From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
-# $\alpha=o\,e^{-q/2}$, so
-# $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
+# $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and
+# $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
 #
-# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$, $\mathrm d d_y=-\mathrm dv$:
+# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
+# $\mathrm d d_y=-\mathrm dv$:
 #
 # $$
 # \begin{aligned}
@@ -243,7 +244,8 @@ plt.show()
 # $$
 #
 # **Line 8. Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
-# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$; $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
+# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
+# $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
 # $$
 # g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .

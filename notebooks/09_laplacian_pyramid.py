@@ -31,8 +31,8 @@ rng = np.random.default_rng(9)
 # %% [markdown]
 # ## Down and up
 #
-# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The border is reflected
-# without repeating the edge sample:
+# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The
+# border is reflected without repeating the edge sample:
 #
 # $$
 # (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
@@ -117,7 +117,8 @@ for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
         np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
 
 # %% [markdown]
-# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with `half_pixel`.
+# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with
+# `half_pixel`.
 
 # %%
 ramp = np.broadcast_to(np.arange(96.0), (1, 96, 96)).copy()
@@ -142,7 +143,8 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 #
 # ## The loss
 #
-# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$ the number of valid values:
+# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$
+# the number of valid values:
 #
 # $$
 # \begin{aligned}

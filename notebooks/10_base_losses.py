@@ -221,8 +221,8 @@ plt.show()
 # $$
 #
 # **SSIM.** $s$ depends on $x$ through three windowed images, $k*x$, $k*x^2$ and $k*(xy)$; call the derivatives by them
-# $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric, so the reverse of $k*$ is $k*$
-# itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
+# $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric, so the reverse
+# of $k*$ is $k*$ itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
 #
 # $$
 # \begin{aligned}

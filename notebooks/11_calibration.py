@@ -38,8 +38,9 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # %% [markdown]
 # ## The equation
 #
-# The views are spread over the training frames: positions $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered
-# by the base model. Here a blurred frame replaces the base render, because base renders look like blurred frames.
+# The views are spread over the training frames: positions
+# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered by the base model. Here a
+# blurred frame replaces the base render, because base renders look like blurred frames.
 #
 # $$
 # \begin{aligned}
@@ -122,7 +123,7 @@ rgb, lap = views[8]
 top = np.quantile(np.abs(rgb), 0.99)
 for panel, values, title in (
     (axes[1], rgb, "$|g|$ photometric"),
-    (axes[2], calibration.lambda_lap * lap / r, "$|g|/r$ detail, calibrated"),
+    (axes[2], calibration.lambda_lap * lap / r, "$|g|/r$ Laplacian, calibrated"),
 ):
     panel.imshow(np.abs(values).mean(axis=0), cmap="magma", vmin=0, vmax=top)
     panel.set_title(title)

@@ -41,9 +41,9 @@ camera = sequence.cameras[0]
 # ## The sheet
 #
 # A material point has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
-# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane waves and, for each motion $k$, a time
-# course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction $\mathbf v_k$. Which point a pixel shows is found by Newton's method,
-# to $10^{-10}$ mm.
+# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane
+# waves and, for each motion $k$, a time course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction
+# $\mathbf v_k$. Which point a pixel shows is found by Newton's method, to $10^{-10}$ mm.
 
 
 # %% tags=["transcription"]
@@ -148,7 +148,8 @@ plt.show()
 # $$
 #
 # with the colour of the pixel, $h_0=(rgb-\tfrac12)/Y_{00}$, opacity 0.1, no rotation, and three equal log-scales
-# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest other points.
+# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest
+# other points.
 
 
 # %% tags=["transcription"]

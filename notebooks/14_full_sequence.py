@@ -141,7 +141,7 @@ others = sequence.train_index[len(sequence.train_index) // 2 :]
 print(
     f"the fitted frame: {score(one_state, one_shop, [first]):.1f} dB; later frames: {score(one_state, one_shop, others):.1f} dB"
 )
-assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, "it knows one moment only"
+assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, "it was fitted to one time only"
 
 # %% [markdown]
 # ## The full sequence
@@ -150,8 +150,8 @@ assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) 
 state, shop, log = train(sequence, config)
 for entry in log:
     np.testing.assert_allclose(entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12)
-born = config.training.residual_activation
-assert "matern_penalty" not in log[born - 1] and log[born]["matern_penalty"] == 0.0, (
+activation = config.training.residual_activation
+assert "matern_penalty" not in log[activation - 1] and log[activation]["matern_penalty"] == 0.0, (
     "the residuals start at zero, one iteration after K_s"
 )
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
@@ -170,7 +170,7 @@ for name, label in (
     there = [e for e in log if name in e]
     values = np.array([1 - e[name] if name == "ssim" else e[name] for e in there])
     axes[0].semilogy([e["iteration"] for e in there][4:-4], np.maximum(smooth(values), 1e-9)[4:-4], label=label)
-for milestone, label in ((config.loss.laplacian_from, "detail begins"), (born, "A and S are born")):
+for milestone, label in ((config.loss.laplacian_from, "Laplacian loss begins"), (activation, "A and S activated")):
     axes[0].axvline(milestone, color="0.7", lw=1)
     axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
