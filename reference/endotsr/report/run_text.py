@@ -7,7 +7,7 @@ from typing import Any
 
 from endotsr.evaluation.evaluate import left_out
 from endotsr.report.data import FreeTable
-from endotsr.runs.log import duration
+from endotsr.report.words import duration
 
 SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
 TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))

@@ -54,10 +54,3 @@ def _entry(line: bytes) -> dict[str, Any] | None:
         if line.endswith(b"\n") and isinstance(entry, dict) and "iteration" in entry:
             return entry
     return None
-
-
-def duration(seconds: float) -> str:
-    """Seconds as h:mm:ss, or m:ss below an hour: `1:02:03`, `2:03`."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

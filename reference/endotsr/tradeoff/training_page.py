@@ -5,7 +5,7 @@ from typing import Any
 
 from endotsr.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
 from endotsr.report.tables import plain
-from endotsr.runs.log import duration
+from endotsr.report.words import duration
 from endotsr.tradeoff.figures import logarithmic_axes, save_pictures
 from endotsr.tradeoff.labels import Label, place_labels
 

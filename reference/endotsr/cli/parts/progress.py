@@ -5,7 +5,7 @@ import sys
 import time
 from typing import Any
 
-from endotsr.runs.log import duration
+from endotsr.report.words import duration
 
 QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
