@@ -59,9 +59,10 @@ def _objective(inputs: Inputs, settings: Settings) -> Found:
         raster=raster_of(settings), degree=settings["degree"], compositor=compositor_of(settings),
     )  # fmt: skip
     names = {"term_penalty": "matern_penalty"} | {f"term_{n}": n for n in ("l1", "ssim", *LossWeights._fields[1:])}
-    terms = {name: view.terms[term] for name, term in names.items() if term in view.terms}
+    terms: Found = {name: view.terms[term] for name, term in names.items() if term in view.terms}
     images = {"colour_image": view.rendered.colour, "depth_image": view.rendered.depth}
-    return {f"d_{name}": g for name, g in view.gradients.items()} | images | terms | {"objective": view.loss}
+    gradients: Found = {f"d_{name}": gradient for name, gradient in view.gradients.items()}
+    return gradients | images | terms | {"objective": view.loss}
 
 
 class Tape:
