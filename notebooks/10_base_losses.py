@@ -19,11 +19,14 @@
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
 # {doc}`/specification/b09_smoothness`.
+# The optional exposure of a frame, {eq}`eq-b13` of {doc}`/specification/b13_exposure`, acts on the render before the
+# losses do.
 
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.equations.exposure import exposure_forward, exposure_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
@@ -305,11 +308,33 @@ for found, text in zip(smoothness_reverse(0.5, saved_smooth), smoothness_reverse
     np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-18)
 
 # %% [markdown]
+# ## The exposure of a frame
+#
+# $$
+# \tilde I_{cp}=e^{\gamma_c}\,\hat I_{cp}+b_c .
+# $$
+#
+# The colour of every pixel of a channel goes through the same two numbers. So their gradients are sums over the pixels, and that
+# of $\gamma_c$ has the factor $e^{\gamma_c}$ of the exponential.
+
+# %%
+gamma, b = rng.normal(0, 0.3, 3), rng.normal(0, 0.1, 3)
+exposed, saved_exposure = exposure_forward(I_hat, gamma, b)
+g_I = rng.normal(size=I_hat.shape)
+found = exposure_reverse(g_I, saved_exposure)
+for c in range(3):
+    gain = np.exp(gamma[c])
+    np.testing.assert_allclose(exposed[c], gain * I_hat[c] + b[c], rtol=1e-14)
+    np.testing.assert_allclose(found.colour[c], gain * g_I[c], rtol=1e-14)
+    np.testing.assert_allclose(found.log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11)
+    np.testing.assert_allclose(found.bias[c], g_I[c].sum(), rtol=1e-11)
+
+# %% [markdown]
 # ## The gradient check
 
 # %%
 with one_thread():
-    names = ("masked_l1", "masked_ssim", "normalised_depth", "smoothness")
+    names = ("masked_l1", "masked_ssim", "normalised_depth", "smoothness", "exposure")
     reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in names]
 print(table(reports))
 assert all(report.passed for report in reports)

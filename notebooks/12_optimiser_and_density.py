@@ -25,7 +25,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.config import PAPER, DensityConfig
-from endotsr.fitting.adam import adam_state, adam_step, adam_update
+from endotsr.fitting.adam import adam_state, adam_step, adam_update, regather
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.scene.density_control import DensityStatistics, densify, empty_statistics, gather_statistics
@@ -188,8 +188,7 @@ np.testing.assert_allclose(statistics.gradient_sum / np.maximum(statistics.visit
 # %%
 rule = DensityConfig(gradient_threshold=float(np.quantile(steep, 0.6)))
 extent, p = 10.0, rule.dense_fraction
-adam = adam_state(arrays(gaussians))
-after = densify(gaussians, adam, statistics, rule, np.random.default_rng(5), extent)
+after = densify(gaussians, statistics, rule, np.random.default_rng(5), extent)
 alive = 1 / (1 + np.exp(-gaussians.opacity_logit)) >= rule.prune_opacity
 candidate = alive & (steep >= rule.gradient_threshold)
 small = np.exp(gaussians.log_scale).max(axis=0) <= p * extent
@@ -197,6 +196,12 @@ to_clone, to_split = np.flatnonzero(candidate & small), np.flatnonzero(candidate
 assert (after.pruned, after.cloned, after.split) == (np.sum(~alive), len(to_clone), len(to_split))
 assert min(after.pruned, after.cloned, after.split) > 0, "the example shows all three"
 survivors = np.flatnonzero(alive & ~np.isin(np.arange(N), to_split))
+adam = adam_state(arrays(gaussians))
+adam.first["position"] += np.arange(1.0, N + 1)
+regather(adam, arrays(gaussians), after.plan.source, after.plan.survivors)  # moments follow; fresh ones start at 0
+np.testing.assert_array_equal(
+    adam.first["position"][0], [*(survivors + 1.0), *np.zeros(len(to_clone) + 2 * len(to_split))]
+)
 np.testing.assert_array_equal(after.gaussians.position[:, : len(survivors)], gaussians.position[:, survivors])
 np.testing.assert_array_equal(
     after.gaussians.position[:, len(survivors) :][:, : len(to_clone)], gaussians.position[:, to_clone]
