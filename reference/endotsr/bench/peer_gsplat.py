@@ -14,11 +14,10 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 ALPHA_MAX = 0.999  # a constant inside gsplat's Python reference
 JACOBIAN_CLAMP = 1.3  # likewise; measured from the image border, so it equals ours for a centred principal point only

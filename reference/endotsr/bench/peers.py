@@ -13,15 +13,13 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.bench.case import Case, Precision, apart
 from endotsr.bench.timing import repeated, spread
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.report.tables import plain
 from endotsr.scene import workload
-
-FloatArray = NDArray[np.floating]
 
 Found = tuple[dict[str, FloatArray], list[float]]
 

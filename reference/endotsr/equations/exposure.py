@@ -9,9 +9,8 @@ number and no time.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 
 class ExposureSaved(NamedTuple):

@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.gather import gather_columns
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Rate = float | tuple[tuple[slice, float], ...]
 """One learning rate, or one per part of the leading axis: ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))."""
 

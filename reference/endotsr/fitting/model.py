@@ -25,6 +25,7 @@ from endotsr.equations.dictionary import (
 from endotsr.equations.exposure import ExposureSaved, exposure_forward, exposure_reverse
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
@@ -32,8 +33,6 @@ from endotsr.scene.parameters import Exposure, FrameParameters, exposure_at
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 
 class Spectral(NamedTuple):

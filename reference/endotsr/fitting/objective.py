@@ -22,6 +22,7 @@ from endotsr.equations.laplacian import (
 )
 from endotsr.equations.pyramid import Upsampling
 from endotsr.fitting.model import Spectral, render_at
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
@@ -33,9 +34,6 @@ from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import FrameParameters
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
-
-FloatArray = NDArray[np.floating]
-
 
 TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothness", "laplacian": "pyramid"}
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
@@ -38,6 +37,7 @@ from endotsr.fitting.schedules import (
     statistics_active,
 )
 from endotsr.fitting.state import TrainingState, Workshop, check_state, new_training, workshop
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.density_control import densify, gather_statistics
@@ -48,7 +48,6 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
 
-FloatArray = NDArray[np.floating]
 OnIteration = Callable[[dict[str, Any]], None]
 
 PSNR_EVERY = 10  # iterations between training PSNRs in the log: the figure costs a pass over the image

@@ -18,13 +18,12 @@ from endotsr.equations.deformation import deformation_reverse
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
 from endotsr.fitting.model import Spectral, exposed, exposed_reverse, raster_settings, scene_at, scene_reverse
 from endotsr.fitting.objective import LossWeights, Targets, image_loss
+from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import Exposure
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Compositor, RenderOut, render_forward, render_reverse
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 
 class ViewGradients(NamedTuple):

@@ -7,10 +7,9 @@ what the columns mean.
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 
 def gather_columns(array: FloatArray, source: NDArray[np.intp], kept: int) -> FloatArray:

@@ -1,12 +1,10 @@
 """Sums over all Gaussians whose order depends on nothing: not on the threads, not on what is drawn."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 
 def _block_sums(first, stop, rows, length, sums):

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
+
 DEPTH_LEVELS = 65535
 DEPTH_HEADROOM = 1.5  # over the largest depth prior: renders may lie a little behind it
 

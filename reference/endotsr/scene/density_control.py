@@ -20,12 +20,10 @@ from numpy.typing import NDArray
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray, IndexArray
 from endotsr.kernels.gather import gather_columns
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera, camera_centre
-
-FloatArray = NDArray[np.floating]
-IndexArray = NDArray[np.intp]
 
 CHILDREN = 2  # of a split Gaussian
 SHRINK = 0.8 * CHILDREN  # the children's semi-axes are 1/1.6 of the parent's

@@ -6,10 +6,7 @@ last axis) clone, split, prune and permute every array, its optimiser moments in
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 POSITION_CHANNELS = slice(0, 3)  # of the ten deformation channels
 QUATERNION_CHANNELS = slice(3, 7)

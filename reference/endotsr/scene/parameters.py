@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from endotsr.config import ModelConfig
+from endotsr.kernels.arrays import FloatArray
 
-FloatArray = NDArray[np.floating]
 CHANNELS = 3
 
 

@@ -6,14 +6,12 @@ each border. Every draw is seeded, so the same arguments give the same arrays. S
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import Config
+from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
-
-FloatArray = NDArray[np.floating]
 
 WIDTH, HEIGHT, FOCAL = 640, 512, 570.0
 SIGMA_PIXELS = {20_000: 3.6, 60_000: 2.4, 150_000: 1.7}

@@ -8,14 +8,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.groups import GROUP, column, keep, write_group
 from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import local_array
-
-FloatArray = NDArray[np.floating]
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
 ROTATION, GRADIENTS = 9 * GROUP, 7 * GROUP  # numbers that the results of a group take

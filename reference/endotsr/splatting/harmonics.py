@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.kernels.groups import GROUP, column, keep, keep_where, kept, write_group
 from endotsr.kernels.jit import jit, jit_inline
@@ -16,8 +17,6 @@ from endotsr.kernels.sums import sum_columns
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import local_array
 from endotsr.splatting.harmonics_formulas import direction, direction_reverse, harmonic_basis, harmonic_basis_reverse
-
-FloatArray = NDArray[np.floating]
 
 _U64 = np.uint64  # no index may count from the end
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.sums import sum_columns
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.camera import Camera, CameraGrads
@@ -19,8 +20,6 @@ from endotsr.splatting.covariance import Shape
 from endotsr.splatting.projection_formulas import Pose, Rules
 from endotsr.splatting.projection_kernels import WITH_POSE, WITHOUT_POSE, project_kernel, project_reverse_kernel
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 POSES_PER_SUM = 256  # Gaussians whose pose gradients are added up together
 

@@ -7,14 +7,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import DEMO, ModelConfig, with_iterations
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, scale_camera
-
-FloatArray = NDArray[np.floating]
 
 SIMULATED_WIDTH, SIMULATED_HEIGHT = 128, 96
 ITERATIONS = 150  # of the training that gives the simulated scene its Gaussians
