@@ -46,7 +46,7 @@ def turn(x, y, shift):
 
 
 def _turned(first, stop, points, valid, kept_pairs, out):
-    """The driver of `turn`; where not valid zeros. The first two numbers of each item also by way of `keep` and `kept`."""
+    """The driver of `turn`, zeros where not valid; and the first two numbers of an item by way of `keep` and `kept`."""
     results, pairs = local_array(THREE, points), local_array(TWO, points)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
