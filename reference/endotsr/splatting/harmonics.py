@@ -134,7 +134,7 @@ def _colour_reverse(
             )
         for item in range(count):
             x, y, z, inverse = kept(directions, 4, item)
-            d_direction = harmonic_basis_reverse(x, y, z, kept(d_basis, 15, item))
+            d_direction = harmonic_basis_reverse(degree, x, y, z, kept(d_basis, 15, item))
             keep_where(degree > 0, results, item, direction_reverse(x, y, z, inverse, d_direction))
         write_group(results, start, count, d_position)
 
@@ -185,4 +185,5 @@ def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsG
         d_colour, d_harmonics, d_residual, d_position,
     )  # fmt: skip
     residual = None if saved.residual is None else d_residual
-    return HarmonicsGrads(d_harmonics, residual, d_position, -sum_columns(d_position, DIRECTIONS_PER_SUM))
+    d_centre = 0 - sum_columns(d_position, DIRECTIONS_PER_SUM)
+    return HarmonicsGrads(d_harmonics, residual, d_position, d_centre)
