@@ -54,7 +54,7 @@ def _turned(first, stop, points, valid, kept_pairs, out):
             i = start + item
             x, y = column(points, 2, i)
             keep(pairs, item, (y, x))
-            keep_where(valid[i], results, item, turn(*column(points, 2, i), points[2, i]))
+            keep_where(valid[i], results, item, turn(x, y, points[2, i]))
         write_group(results, start, count, out)
         for item in range(count):
             kept_pairs[0, start + item], kept_pairs[1, start + item] = kept(pairs, 2, item)

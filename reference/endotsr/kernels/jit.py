@@ -1,7 +1,8 @@
 """How kernels are compiled: the only module that calls `numba.njit`.
 
 Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or
-`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools.
+`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools. The formulas that they
+carry to all items are compiled by the decorator `jit_formula`.
 
 No fast-math: sums keep the order they are written in. The fast path may contract a*b+c into one fused
 multiply-add (`contract=True`), which stays bitwise reproducible on one machine.

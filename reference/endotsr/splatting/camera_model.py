@@ -18,13 +18,13 @@ from endotsr.splatting.settings import RasterSettings
 class Pinhole(NamedTuple):
     """Numbers of the pinhole model, all of the dtype of the Gaussians."""
 
-    fx: np.floating  # px
-    fy: np.floating
-    cx: np.floating  # px from the left edge of column 0
-    cy: np.floating
-    limit_x: np.floating  # L_x: beyond this |x/z| the Jacobian is that of the limit; infinite: no clamp
-    limit_y: np.floating
-    clamp_factor: np.floating  # of the clamped term of dJ/dz: 1; 2 in `legacy`
+    fx: float  # px
+    fy: float
+    cx: float  # px from the left edge of column 0
+    cy: float
+    limit_x: float  # L_x: beyond this |x/z| the Jacobian is that of the limit; infinite: no clamp
+    limit_y: float
+    clamp_factor: float  # of the clamped term of dJ/dz: 1; 2 in `legacy`
 
 
 def intrinsics_of(camera: Camera, settings: RasterSettings, dtype: np.dtype) -> Pinhole:

@@ -90,19 +90,15 @@ def _colour_channel_reverse(harmonics, channel, start, count, terms, basis, d_su
 
 
 _fill_basis_kernel = jit_inline(_fill_basis)
-_colour_channel_kernel, _colour_channel_reverse_kernel = (
-    jit_inline(_colour_channel),
-    jit_inline(_colour_channel_reverse),
-)
+_colour_channel_kernel = jit_inline(_colour_channel)
+_colour_channel_reverse_kernel = jit_inline(_colour_channel_reverse)
 
 
 def _colour(first, stop, harmonics, residual, position, centre, degree, colour, clamped):
+    """A channel is clamped where the sum is below zero."""
     zero, terms = position.dtype.type(0), (degree + 1) * (degree + 1)
-    directions, basis, sums = (
-        local_array(DIRECTION, position),
-        local_array(BASIS, position),
-        local_array(GROUP, position),
-    )
+    directions, basis = local_array(DIRECTION, position), local_array(BASIS, position)
+    sums = local_array(GROUP, position)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
         if degree > 0:
@@ -117,6 +113,7 @@ def _colour(first, stop, harmonics, residual, position, centre, degree, colour, 
 def _colour_reverse(
     first, stop, harmonics, position, centre, degree, clamped, d_colour, d_harmonics, d_residual, d_position
 ):
+    """A clamped channel sends no gradient; degree 0 sends none to the position."""
     zero, terms = position.dtype.type(0), (degree + 1) * (degree + 1)
     directions, basis = local_array(DIRECTION, position), local_array(BASIS, position)
     d_basis, d_sums = local_array(BASIS, position), local_array(GROUP, position)
@@ -136,7 +133,7 @@ def _colour_reverse(
             )
         for item in range(count):
             x, y, z, inverse = kept(directions, 4, item)
-            d_direction = harmonic_basis_reverse(x, y, z, kept(d_basis, 15, item))
+            d_direction = harmonic_basis_reverse(degree, x, y, z, kept(d_basis, 15, item))
             keep_where(degree > 0, results, item, direction_reverse(x, y, z, inverse, d_direction))
         write_group(results, start, count, d_position)
 
@@ -187,4 +184,5 @@ def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsG
         d_colour, d_harmonics, d_residual, d_position,
     )  # fmt: skip
     residual = None if saved.residual is None else d_residual
-    return HarmonicsGrads(d_harmonics, residual, d_position, -sum_columns(d_position, DIRECTIONS_PER_SUM))
+    d_centre = 0 - sum_columns(d_position, DIRECTIONS_PER_SUM)
+    return HarmonicsGrads(d_harmonics, residual, d_position, d_centre)

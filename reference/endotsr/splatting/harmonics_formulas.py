@@ -59,21 +59,26 @@ def harmonic_basis(x, y, z):
 
 
 @jit_formula
-def harmonic_basis_reverse(x, y, z, d_basis):
-    """By x, y, z, taken as independent, from the gradients by Y_1 ... Y_15; added up degree by degree."""
+def harmonic_basis_reverse(degree, x, y, z, d_basis):
+    """By x, y, z, taken as independent, from the gradients by Y_1 ... Y_15 up to the active degree, 1 to 3."""
     real = type(x)
     c1, c2a, c2b, c2c = real(C1), real(C2A), real(C2B), real(C2C)
     c3a, c3b, c3c, c3d, c3e = real(C3A), real(C3B), real(C3C), real(C3D), real(C3E)
     two, three, four, six, eight = real(2), real(3), real(4), real(6), real(8)
     g1, g2, g3, g4, g5, g6, g7, g8, g9, g10, g11, g12, g13, g14, g15 = d_basis
     xx, yy, zz = x * x, y * y, z * z
+    g_x, g_y, g_z = -c1 * g3, -c1 * g1, c1 * g2
     x2 = c2a * (y * g4 - z * g7) - two * c2b * x * g6 + two * c2c * x * g8
     y2 = c2a * (x * g4 - z * g5) - two * c2b * y * g6 - two * c2c * y * g8
     z2 = -c2a * (y * g5 + x * g7) + four * c2b * z * g6
+    if degree > 1:
+        g_x, g_y, g_z = g_x + x2, g_y + y2, g_z + z2
     x3 = -c3a * six * x * y * g9 + c3b * y * z * g10 + c3c * two * x * y * g11 - c3d * six * x * z * g12
     x3 += -c3c * (four * zz - three * xx - yy) * g13 + c3e * two * x * z * g14 - c3a * three * (xx - yy) * g15
     y3 = -c3a * three * (xx - yy) * g9 + c3b * x * z * g10 - c3c * (four * zz - xx - three * yy) * g11
     y3 += -c3d * six * y * z * g12 + c3c * two * x * y * g13 - c3e * two * y * z * g14 + c3a * six * x * y * g15
     z3 = c3b * x * y * g10 - c3c * eight * y * z * g11 + c3d * (six * zz - three * xx - three * yy) * g12
     z3 += -c3c * eight * x * z * g13 + c3e * (xx - yy) * g14
-    return -c1 * g3 + x2 + x3, -c1 * g1 + y2 + y3, c1 * g2 + z2 + z3
+    if degree > 2:
+        g_x, g_y, g_z = g_x + x3, g_y + y3, g_z + z3
+    return g_x, g_y, g_z
