@@ -49,26 +49,6 @@ FORBIDDEN_NAMES = {
     "colour_coefficients": "appearance_coefficients",
     "position_coefficients": "motion_coefficients",
 }
-# Identifiers of rooms that are being rewritten. An entry goes when its room is done; the list may only shrink.
-WAITING = {
-    "bench": {"share"},
-    "fitting": {"_spectral_penalty", "born", "share"},
-    "golden": {"_share", "detail", "detail_saved", "lap", "share"},
-    "gradcheck": {"share"},
-    "runs": {"born"},
-    "sequences": {
-        "LEAST_DEPTH_SHARE",
-        "LEAST_MISSING_SHARE",
-        "LEAST_TISSUE_SHARE",
-        "MOST_SOFT_SHARE",
-        "OPPOSITE_SHARE",
-        "check_tissue_share",
-        "share",
-        "shares",
-    },
-    "simulator": {"share"},
-    "tradeoff": {"share"},
-}
 
 
 def rows() -> list[dict[str, str]]:
@@ -184,6 +164,5 @@ def test_a_replaced_word_is_recognised():
 @pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*.py")), ids=lambda file: str(file.relative_to(PACKAGE)))
 def test_no_identifier_uses_a_replaced_word(file):
     found = {name: forbidden(name) for name in identifiers(ast.parse(file.read_text(encoding="utf-8")))}
-    waiting = WAITING.get(file.relative_to(PACKAGE).parts[0], set())
-    wrong = {name: instead for name, instead in found.items() if instead and name not in waiting}
+    wrong = {name: instead for name, instead in found.items() if instead}
     assert not wrong, f"write instead: {wrong}"

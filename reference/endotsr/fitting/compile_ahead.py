@@ -155,8 +155,8 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
     from endotsr.fitting.fused.coefficients import coefficients_adam_step
     from endotsr.fitting.schedules import learning_rates
 
-    born = shop.config.training.residual_activation + 1
-    rates, o, rho = learning_rates(born, shop.config), shop.config.optimiser, shop.spectral.rho
+    activated = shop.config.training.residual_activation + 1
+    rates, o, rho = learning_rates(activated, shop.config), shop.config.optimiser, shop.spectral.rho
     colour, motion = state.gaussians.appearance_coefficients, state.gaussians.motion_coefficients
     for name, coefficients in (("appearance_coefficients", colour), ("motion_coefficients", motion)):
         if coefficients is None:

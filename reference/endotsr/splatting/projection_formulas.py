@@ -5,7 +5,9 @@ all Gaussians. Selects take the place of branches, so that the loop over a group
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera_model import pinhole, pinhole_reverse
@@ -14,16 +16,16 @@ from endotsr.splatting.camera_model import pinhole, pinhole_reverse
 class Pose(NamedTuple):
     """World to camera axes, each number of the dtype of the Gaussians."""
 
-    rotation: tuple[float, ...]  # W, 9
-    translation: tuple[float, ...]  # d, 3
+    rotation: tuple[Any, ...]  # W, 9 numbers
+    translation: tuple[Any, ...]  # d, 3 numbers
 
 
 class Rules(NamedTuple):
     """Constants of the projection, of the dtype of the Gaussians."""
 
-    low_pass: float  # epsilon, px^2
-    near: float  # scene units
-    axis_limit: float  # px: a longer projected semi-axis is clipped, a centre farther out is not drawn
+    low_pass: np.floating  # epsilon, px^2
+    near: np.floating  # scene units
+    axis_limit: np.floating  # px: a longer projected semi-axis is clipped, a centre farther out is not drawn
 
 
 @jit_formula
