@@ -311,7 +311,7 @@ for found, text in zip(smoothness_reverse(0.5, saved_smooth), smoothness_reverse
 # ## The exposure of a frame
 #
 # $$
-# \tilde I_{cp}=e^{\gamma_c}\,\hat I_{cp}+b_c .
+# \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
 # $$
 #
 # The colour of every pixel of a channel goes through the same two numbers. So their gradients are sums over the pixels, and that

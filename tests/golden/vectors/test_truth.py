@@ -9,6 +9,7 @@ from oracle import (
     adam,
     calibration_oracle,
     deformation,
+    exposure_oracle,
     fitting_oracle,
     fourier_oracle,
     laplacian_oracle,
@@ -113,6 +114,13 @@ def masked_ssim(i, s, right):
 def normalised_depth(i, s, right):
     loss, gradient = losses.normalised_depth(i["rendered_depth"], i["prior_depth"], i["mask"])
     return {"loss": loss, "d_rendered_depth": float(i["d_loss"]) * gradient}
+
+
+def exposure(i, s, right):
+    arrays = i["colour"], i["log_gain"]
+    gradients = exposure_oracle.gradients(*arrays, i["d_exposed"])
+    named = dict(zip(("d_colour", "d_log_gain", "d_bias"), gradients, strict=True))
+    return {"exposed": exposure_oracle.exposed(*arrays, i["bias"])} | named
 
 
 def smoothness(i, s, right):
@@ -237,6 +245,7 @@ ORACLES = {
     "frequencies": frequencies, "dictionary": dictionary, "atoms": atoms, "appearance": appearance, "motion": motion,
     "matern": matern, "laplacian": laplacian, "calibration": calibration, "deformation": deformation_case,
     "adam": adam_case, "masked_l1": masked_l1, "masked_ssim": masked_ssim, "normalised_depth": normalised_depth,
+    "exposure": exposure,
     "smoothness": smoothness, "covariance": covariance, "projection": projection, "harmonics": harmonics,
     "composite": composite, "render": render, "scene": scene, "objective": objective,
     "schedule": schedule, "density": density, "initialisation": initialisation,
@@ -263,7 +272,7 @@ def test_the_oracle_gives_the_expected_value(case):
 def test_every_named_oracle_exists():
     modules = {
         m.__name__.rsplit(".", 1)[-1]: m
-        for m in (adam, calibration_oracle, deformation, fitting_oracle, fourier_oracle, laplacian_oracle, losses,
+        for m in (adam, calibration_oracle, deformation, exposure_oracle, fitting_oracle, fourier_oracle, laplacian_oracle, losses,
                   matern_oracle, residuals_oracle, splatting_oracle)
     }  # fmt: skip
     for case in GOLDEN.cases:
