@@ -272,8 +272,8 @@ def test_the_oracle_gives_the_expected_value(case):
 def test_every_named_oracle_exists():
     modules = {
         m.__name__.rsplit(".", 1)[-1]: m
-        for m in (adam, calibration_oracle, deformation, exposure_oracle, fitting_oracle, fourier_oracle, laplacian_oracle, losses,
-                  matern_oracle, residuals_oracle, splatting_oracle)
+        for m in (adam, calibration_oracle, deformation, exposure_oracle, fitting_oracle, fourier_oracle,
+                  laplacian_oracle, losses, matern_oracle, residuals_oracle, splatting_oracle)
     }  # fmt: skip
     for case in GOLDEN.cases:
         for output in case.outputs.values():
