@@ -15,7 +15,7 @@ copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this s
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]  # in _extensions
-exclude_patterns = ["_build", "_extensions", "conf.py", "results/**"]  # results: tools and data of other pages
+exclude_patterns = ["_build", "_extensions", "conf.py", "pages/**", "results/**"]  # makers and data of other pages
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
 # The types of the package's arrays say little; shapes and units stand in the docstrings.

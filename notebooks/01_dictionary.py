@@ -13,15 +13,15 @@
 # %% [markdown]
 # # 1. Time: the Fourier dictionary and its normalised atoms
 #
-# Both residuals of Endo-TSR are driven by the same $2F$ sinusoids of time. This notebook builds them, centres and scales
-# them over the training stamps, and shows the one case in which scaling would be fatal: an atom that is
-# zero at every stamp.
+# Both residuals of Endo-TSR are functions of the same $2F$ sinusoids of time. This notebook builds them and then
+# centres and scales them over the training stamps. It also shows the one case in which scaling would be wrong: an atom
+# that is zero at every stamp.
 #
-# Equations {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such words are links.
+# The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
+# links.
 #
-# How to read these notebooks: each equation is printed as the specification prints it, then **transcribed** into
-# NumPy symbol by symbol, then compared with the compiled function by an `assert`. Change one sign in either and the
-# notebook stops.
+# In these notebooks each equation is printed as in the specification. It is then **transcribed** into NumPy symbol by
+# symbol, and compared with the compiled function by an `assert`. If one sign is changed in either, the notebook stops.
 
 # %%
 import matplotlib.pyplot as plt
@@ -47,7 +47,7 @@ from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, ta
 # \omega_f = \omega_{\min}\left(\frac{\omega_{\max}}{\omega_{\min}}\right)^{\frac{f-1}{F-1}},\qquad f = 1,\dots,F .
 # $$
 #
-# and the atoms are all sines, then all cosines:
+# The atoms are all sines, followed by all cosines:
 #
 # $$
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
@@ -65,7 +65,8 @@ def phi_text(t, omega):
 
 
 # %% [markdown]
-# The functions of the package are `frequencies` and `dictionary_forward`. They agree with the text to rounding.
+# The functions of the package are `frequencies` and `dictionary_forward`. They agree with the transcription to
+# rounding.
 
 # %%
 omega = frequencies(F, omega_min, omega_max)
@@ -77,12 +78,12 @@ for t in (0.0, 0.137, 0.37, 0.81, -0.4, 1.9):
     np.testing.assert_allclose(phi, phi_text(t, omega), atol=1e-13)
 
 # %% [markdown]
-# ### Why the phase is folded first
+# ### Why the phase is reduced first
 #
-# $\sin(2\pi\cdot16\cdot\tfrac{5}{32})$ is the sine of five half turns: exactly 0. Floating point does not know $\pi$
-# exactly, so the printed formula gives noise. The specification removes whole turns and quarter turns **before** $\pi$
-# enters; both removals are exact. With $p=\omega t$, $r = p - \operatorname{round}(p)$, $k=\operatorname{round}(4r)$ and
-# $\delta = r - k/4$:
+# $\sin(2\pi\cdot16\cdot\tfrac{5}{32})$ is the sine of five half turns, which is exactly 0. Floating point cannot
+# represent $\pi$ exactly, so the printed formula gives rounding noise. The specification removes whole turns and
+# quarter turns **before** the multiplication by $\pi$; both steps are exact. With $p=\omega t$,
+# $r = p - \operatorname{round}(p)$, $k=\operatorname{round}(4r)$ and $\delta = r - k/4$:
 #
 # $$
 # (\sin 2\pi p,\ \cos 2\pi p) =
@@ -121,8 +122,9 @@ assert phi[F - 1] == 0.0 and phi_text(5 / 32, omega)[F - 1] != 0.0
 # %% [markdown]
 # ## Centred and scaled over the training stamps
 #
-# The colour residual must not be able to change the mean colour of a Gaussian: that is the job of its base colour. So its
-# atoms have mean 0 over the training stamps $\mathcal T$; and RMS 1, so that a coefficient means the same at every frequency:
+# The base colour of a Gaussian represents its mean colour, and the colour residual should not change it. The atoms of
+# the residual therefore have mean 0 over the training stamps $\mathcal T$. They have RMS 1, so that a coefficient means
+# the same at every frequency:
 #
 # $$
 # \begin{aligned}
@@ -158,9 +160,10 @@ np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 # %% [markdown]
 # ## The dead atom
 #
-# Take a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$: the atom exists between the
-# frames, but no frame ever sees it. Its RMS is 0. Divided by computed noise, it would come back as a random
-# signal of size 1 and be trained on. The rule: RMS below $10^{-6}$, and the atom is 0 in value and in gradient.
+# Take a clip of 32 frames. At its stamps $t=k/32$ the sine of 16 cycles is $\sin(\pi k)=0$: the atom differs from 0
+# between the frames, but not at any frame. Its RMS is 0. If rounding noise were divided by its own RMS, the result
+# would be a random signal of size 1, and the model would be trained on it. The rule is therefore: if the RMS is below
+# $10^{-6}$, the atom is 0 in value and in gradient.
 
 # %%
 stamps_32 = np.arange(32) / 32
@@ -203,16 +206,17 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# $g_X$ always means $\partial\mathcal L/\partial X$. In words: a step $\mathrm d\omega_f$ moves the phase by
-# $2\pi t\,\mathrm d\omega_f$; a step of the phase moves the sine by $+\cos$ and the cosine by $-\sin$:
-# $\mathrm d\phi_f = c_f\,\mathrm d(2\pi\omega_f t)$ and $\mathrm d\phi_{F+f} = -s_f\,\mathrm d(2\pi\omega_f t)$. Collect both:
+# $g_X$ always means $\partial\mathcal L/\partial X$. A step $\mathrm d\omega_f$ changes the phase by
+# $2\pi t\,\mathrm d\omega_f$. A step of the phase changes the sine by $+\cos$ and the cosine by $-\sin$:
+# $\mathrm d\phi_f = c_f\,\mathrm d(2\pi\omega_f t)$ and $\mathrm d\phi_{F+f} = -s_f\,\mathrm d(2\pi\omega_f t)$.
+# Together:
 #
 # $$
 # g_{\omega_f} = 2\pi t\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr),\qquad
 # g_t = \sum_{f=1}^{F} 2\pi\omega_f\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr).
 # $$
 #
-# The statistics are constants of the derivative, so normalising only scales:
+# The statistics are constants of the derivative, so normalisation only scales the gradient:
 #
 # $$
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
@@ -247,8 +251,9 @@ np.testing.assert_allclose(
 # %% [markdown]
 # ## The gradient check
 #
-# No formula is believed on sight. `check_pair` compares the reverse pass with differences of the forward pass along random
-# directions and single entries. There is no absolute tolerance: a zero gradient against a non-zero difference fails.
+# Every derived formula is checked. `check_pair` compares the reverse pass with finite differences of the forward pass,
+# along random directions and single entries. There is no absolute tolerance: a zero gradient against a non-zero
+# difference fails.
 
 # %%
 with one_thread():
@@ -259,9 +264,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The dictionary has 16 atoms. Over 24 frames with three held out there are 21 stamps, more than 16. Can the stamps tell all
-# 16 atoms apart? And with 32 frames, none held out? Guess the rank of the normalised dictionary in both cases, then
-# open the answer.
+# The dictionary has 16 atoms. Over 24 frames with three held out there are 21 stamps, which is more than 16. Are all 16
+# atoms linearly independent over these stamps? Are they with 32 frames, none held out? Estimate the rank of the
+# normalised dictionary in both cases, then open the answer.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead, so at most 15 remain: that

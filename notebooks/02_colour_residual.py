@@ -13,11 +13,11 @@
 # %% [markdown]
 # # 2. The bounded colour residual (component A)
 #
-# Light changes during a clip: exposure drifts, tissue pales under pressure. Component A lets each Gaussian follow such a
-# change, by at most $\beta$ in display units, whatever its coefficients are. The bound keeps illumination change from being
-# abused as a texture.
+# The light changes during a clip: exposure drifts, and tissue becomes pale under pressure. Component A lets the colour
+# of each Gaussian follow such a change, by at most $\beta$ in display units for all values of its coefficients. The
+# bound prevents the residual, which models changes of illumination, from representing texture.
 #
-# Equation {eq}`eq-2` of {doc}`/specification/02_appearance`; the atoms come from {doc}`01_dictionary`.
+# The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` makes the atoms.
 
 # %%
 import matplotlib.pyplot as plt
@@ -41,9 +41,9 @@ statistics = atom_statistics(stamps, omega)
 # \Delta h_{0,ci}(t) = \frac{\beta}{Y_{00}}\tanh x_{ci}(t),\qquad Y_{00}=\frac{1}{\sqrt{4\pi}} .
 # $$
 #
-# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0 harmonic
-# coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$ makes the
-# change of the **displayed** colour exactly $\beta\tanh x$.
+# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0
+# harmonic coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$
+# makes the change of the **displayed** colour exactly $\beta\tanh x$.
 
 
 # %% tags=["transcription"]
@@ -66,20 +66,21 @@ for t in (0.0, 0.2, 0.77):
 assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta * (1 + 1e-15)
 
 # %% [markdown]
-# **Identity at the start.** $A=0$ gives a residual of exactly 0: a model in which the component has just been switched on
-# renders the same image, bit by bit. The gradient of $A$ there is not 0 (see below), so it can start.
+# **Identity at the start.** $A=0$ gives a residual of exactly 0. A model in which the component has just been activated
+# renders the same image, bit by bit. The gradient by $A$ is not 0 there (see below), so $A$ can be trained.
 
 # %%
 zero = np.zeros_like(A)
 assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 
 # %% [markdown]
-# ## A picture: brightening explained by colour, or by motion
+# ## Figure: brightening explained by colour, or by motion
 #
-# One patch of tissue grows paler and recovers, without moving. Component A follows with a colour curve. A model without A
-# has one other way to make a pixel brighter at one moment: it moves a brighter Gaussian there. Below, a bright
-# neighbour 4 px away is shifted so that a pixel shows the same brightness at each time. The picture at this pixel is right in both
-# cases; the geometry of the second is wrong by up to 4 px. This is why the paper separates the two.
+# A patch of tissue becomes paler and recovers, without moving. Component A represents this by a change of colour over
+# time. A model without A can make a pixel brighter at one time only by moving a brighter Gaussian there. In the figure,
+# a bright neighbour 4 px away is shifted so that the pixel has the same brightness at each time. The image at this
+# pixel is right in both cases, but the geometry of the second is wrong by up to 4 px. The paper therefore separates the
+# two.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 0.98, 197)
@@ -121,12 +122,12 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# Step by step. $\Delta h_0$ depends on $x$ through $\tanh$, so $g_x=\frac{\beta}{Y_{00}}\tanh'(x)\,g_{\Delta h_0}$. $x$ is bilinear in $A$ and
-# $\bar\phi$: each coefficient meets exactly one atom, so $g_A=g_x\,\bar\phi$; each atom meets all Gaussians and
-# channels, so $g_{\bar\phi}$ is a sum over both.
+# $\Delta h_0$ depends on $x$ through $\tanh$, so $g_x=\frac{\beta}{Y_{00}}\tanh'(x)\,g_{\Delta h_0}$. $x$ is bilinear
+# in $A$ and $\bar\phi$. Each coefficient is multiplied by exactly one atom, so $g_A=g_x\,\bar\phi$. Each atom is
+# multiplied by the coefficients of all Gaussians and channels, so $g_{\bar\phi}$ is a sum over both.
 #
-# The right panel above shows why the slope is not written $1-\tanh^2x$: in float32 that is exactly 0 from $x\approx10$ on, and a
-# saturated residual could never come back. Hence:
+# The right panel above shows why the slope is not written as $1-\tanh^2x$. In float32 that is exactly 0 from
+# $x\approx10$ on, and a saturated residual could never change again. Hence:
 #
 # $$
 # g_{x_{ci}} = \frac{\beta}{Y_{00}}\,\frac{4e_{ci}}{(1+e_{ci})^2}\;g_{\Delta h_{0,ci}},\qquad
@@ -164,7 +165,7 @@ assert np.abs(start).max() > 0
 # %% [markdown]
 # ## The gradient check
 #
-# One block per atom: a mistake in a single atom cannot hide behind the other fifteen.
+# Each atom is a block of its own, so that the other fifteen cannot mask a mistake in a single atom.
 
 # %%
 with one_thread():
@@ -175,8 +176,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# The residual has mean **argument** $x$ equal to 0 over the training stamps, because each $\bar\phi_k$ has. Is the mean of
-# $\beta\tanh x$ then 0 too? Find an $A$ for which the mean colour over the training stamps moves.
+# The **argument** $x$ of the residual has mean 0 over the training stamps, because each $\bar\phi_k$ has mean 0. Is the
+# mean of $\beta\tanh x$ also 0? Find an $A$ for which the mean colour over the training stamps changes.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for the rest saturates at the top only,

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 3. The flexible deformation model (FDM)
 #
-# The base model that Endo-TSR extends moves, turns and scales each Gaussian by ten functions of time. Each function is a
-# sum of $B$ bumps, and for every bump three numbers are learned: a weight, a centre and a width.
+# The base model of Endo-TSR moves, rotates and scales each Gaussian by ten functions of time. Each function is a sum of
+# $B$ time bases. Every basis has three learned numbers: a weight, a centre and a width.
 #
-# Equation {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
+# The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -41,18 +41,19 @@ B, N = 17, 4
 # \end{cases}
 # $$
 #
-# Channels 0-2 belong to the position, 3-6 to the raw quaternion, 7-9 to the log-scale. All are added **before** any activation:
+# Channels 0-2 belong to the position, 3-6 to the raw quaternion, 7-9 to the log-scale. All are added **before** any
+# activation:
 #
 # $$
 # \mu(t)=\mu+\psi_{0:3}\;(+\,\Delta\mu),\qquad \tilde q(t)=q+\psi_{3:7},\qquad \log S(t)=s+\psi_{7:10}.
 # $$
 #
-# `quartic` is what the released code computes: the exponent is the square of a square. `gaussian` is the textbook form.
-# They are far apart: 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
+# `quartic` is the form that the released code computes: the exponent is the square of a square. `gaussian` is the
+# textbook form. The two differ strongly: they give 0.0183 and 0.3679 at $\Delta=0.02$, $\sigma=0.01$.
 
 
 # %% tags=["transcription"]
-def bump_text(t, theta, sigma, basis):
+def basis_text(t, theta, sigma, basis):
     Delta = t - theta
     Sigma = sigma**2 + 1e-4
     if basis == "quartic":
@@ -62,7 +63,7 @@ def bump_text(t, theta, sigma, basis):
 
 
 def offsets_text(w, theta, sigma, t, basis):
-    return (w * bump_text(t, theta, sigma, basis)).sum(axis=1)
+    return (w * basis_text(t, theta, sigma, basis)).sum(axis=1)
 
 
 # %%
@@ -80,31 +81,31 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
     assert abs(found[0, 0] - value) < 1e-4
 
 # %% [markdown]
-# ## A picture: which times do the bumps reach?
+# ## Figure: which times do the bases cover?
 #
-# At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. A weight
-# feels a frame only through $e$, the height of its bump there. With the published width of 0.01 there are times at which
-# no bump is higher than 0.001: a frame that lies there hardly moves anything at first. Not an error, but slow. The preset
-# `sharp` starts at 0.05.
+# At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
+# by a weight at a frame is proportional to $e$, the value of its basis there. With the published width of 0.01 there
+# are times at which no basis exceeds 0.001. A frame at such a time changes almost nothing at first. This is not an
+# error, but it slows training down. The preset `sharp` starts at 0.05.
 
 # %% tags=["hide-input"]
 fine = np.linspace(0, 1, 1201)
 centres = np.linspace(0, 1, B)
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.4), layout="constrained")
 unit = np.zeros((10, B, B))
-unit[0] = np.eye(B)  # Gaussian j carries bump j alone: the offsets are the bumps themselves
+unit[0] = np.eye(B)  # Gaussian j has basis j alone: the offsets are the values of the bases
 spread = np.broadcast_to(centres[None, :, None], unit.shape).copy()
 for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
-    bumps = np.array([deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine])
-    np.testing.assert_allclose(bumps, bump_text(fine[:, None], centres, width, "quartic"), atol=1e-15)
-    highest = bumps.max(axis=1)
-    panel.plot(fine, bumps, lw=0.8, color="tab:blue")
+    values = np.array([deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine])
+    np.testing.assert_allclose(values, basis_text(fine[:, None], centres, width, "quartic"), atol=1e-15)
+    highest = values.max(axis=1)
+    panel.plot(fine, values, lw=0.8, color="tab:blue")
     panel.fill_between(fine, 0, 1, where=highest < 1e-3, color="tab:red", alpha=0.25, lw=0)
-    panel.set(title=f"{B} bumps, width {width}", xlabel="t", xlim=(0, 0.5), ylim=(-0.03, 1.15))
+    panel.set(title=f"{B} bases, width {width}", xlabel="t", xlim=(0, 0.5), ylim=(-0.03, 1.15))
     if width == 0.01:
         frames = np.arange(63) / 63
         assert int((np.interp(frames, fine, highest) < 1e-3).sum()) == 16
-        panel.text(0.01, 1.06, "red: no bump above 0.001 (16 of 63 frames)", fontsize=8)
+        panel.text(0.01, 1.06, "red: no basis above 0.001 (16 of 63 frames)", fontsize=8)
 learned = rng.normal(0, 1, (10, B, 1))
 curve = [deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][:3, 0] for t in fine]
 axes[2].plot(fine, np.array(curve), label=["x", "y", "z"])
@@ -115,9 +116,10 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# $\psi$ is linear in $w$, so $g_w=e\,g_\psi$. For `quartic`, $e=\exp(-u^2)$ gives $\mathrm de=-2ue\,\mathrm du$, and $u=\Delta^2/\Sigma$ gives
-# $\mathrm du=\frac{2\Delta}{\Sigma}\mathrm d\Delta-\frac{u}{\Sigma}\mathrm d\Sigma$ with $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. Multiplied out: two
-# minus signs meet in each case, and both gradients begin with $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$.
+# $\psi$ is linear in $w$, so $g_w=e\,g_\psi$. For `quartic`, $e=\exp(-u^2)$ gives $\mathrm de=-2ue\,\mathrm du$, and
+# $u=\Delta^2/\Sigma$ gives $\mathrm du=\frac{2\Delta}{\Sigma}\mathrm d\Delta-\frac{u}{\Sigma}\mathrm d\Sigma$ with
+# $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. Multiplied out: two minus signs
+# meet in each case, and both gradients begin with $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$.
 # The time enters every $\Delta$ with the opposite sign of $\theta$:
 #
 # $$
@@ -134,8 +136,8 @@ plt.show()
 
 # %% tags=["transcription"]
 def reverse_text(g_psi, w, theta, sigma, t, basis):
-    g = g_psi[:, None, :]  # broadcast over the bumps j
-    e = bump_text(t, theta, sigma, basis)
+    g = g_psi[:, None, :]  # broadcast over the bases j
+    e = basis_text(t, theta, sigma, basis)
     Delta, Sigma = t - theta, sigma**2 + 1e-4
     u = Delta**2 / Sigma
     if basis == "quartic":
@@ -156,8 +158,8 @@ for basis in ("quartic", "gaussian"):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
 
 # %% [markdown]
-# Two consequences to know. With all weights 0 the gradients of centre and width are exactly 0: only weights learn at first.
-# And a width of exactly 0 has gradient 0: it is stuck.
+# There are two consequences. While all weights are 0, the gradients by centre and width are exactly 0, so only the
+# weights change at first. A width of exactly 0 has gradient 0 and never changes.
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
@@ -178,12 +180,12 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# At which distance from its centre does a quartic bump push its centre hardest, that is, where is $|g_\theta|$ largest? Work in
-# $v=\Delta/\sqrt\Sigma$. How far out does a `gaussian` bump of equal $\Sigma$ push hardest?
+# At which distance from the centre of a quartic basis is $|g_\theta|$ largest? Work in $v=\Delta/\sqrt\Sigma$. At which
+# distance is it largest for a `gaussian` basis of equal $\Sigma$?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v = (3/4)^(1/4) = 0.931.
-# Gaussian: g_theta ~ exp(-v^2/2) v, largest at v = 1. So the reach is alike; beyond it the quartic bump is much darker.
+# Gaussian: g_theta ~ exp(-v^2/2) v, largest at v = 1. So the reach is alike; beyond it the quartic basis is much smaller.
 v = np.linspace(0, 3, 300_001)
 assert abs(v[np.argmax(np.exp(-(v**4)) * v**3)] - 0.75**0.25) < 1e-4
 assert abs(v[np.argmax(np.exp(-(v**2) / 2) * v)] - 1) < 1e-4

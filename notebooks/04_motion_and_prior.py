@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 4. The translation residual and its Matérn prior (component S)
 #
-# Component S adds a Fourier series to the path of each Gaussian. Sixteen free coefficients per axis can also draw nonsense
-# between the frames. The Matérn-5/2 penalty says which nonsense is unlikely: fast motion.
+# Component S adds a Fourier series to the path of each Gaussian. Sixteen free coefficients per axis can also produce
+# implausible motion between the frames. The Matérn-5/2 penalty states which motion is unlikely: fast motion.
 #
-# Equations {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
+# The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -41,8 +41,9 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 # \mu_i(t) = \mu_i + \psi_{0:3,i}(t) + \Delta\mu_i(t).
 # $$
 #
-# $\psi$ is the deformation model of {doc}`03_deformation`. The atoms are the **raw** ones, not the normalised: the penalty below
-# does not change when the phase of a sine and cosine pair does, and that holds only for raw pairs.
+# $\psi$ is the offset of the deformation model of {doc}`03_deformation`. The atoms are the **raw** ones, not the
+# normalised ones: the penalty below is invariant to the phase of a sine and cosine pair, and that holds only for raw
+# pairs.
 
 
 # %% tags=["transcription"]
@@ -63,9 +64,10 @@ for t in (0.0, 0.37, 0.9):
 # %% [markdown]
 # ## The weights: from a covariance to a spectrum
 #
-# A Gaussian process with Matérn-5/2 covariance $k(\tau)=\bigl(1+\sqrt5\,r+\tfrac53r^2\bigr)e^{-\sqrt5\,r}$, $r=|\tau|/\ell$, draws smooth
-# paths that forget themselves after about $\ell$. Bochner's theorem: such a covariance is the Fourier transform of a
-# non-negative spectral density, here $S(\omega)\propto\bigl(5/\ell^2+(2\pi\omega)^2\bigr)^{-3}$. We check it with a plain sum.
+# A Gaussian process with Matérn-5/2 covariance $k(\tau)=\bigl(1+\sqrt5\,r+\tfrac53r^2\bigr)e^{-\sqrt5\,r}$,
+# $r=|\tau|/\ell$, gives smooth paths whose values are almost uncorrelated after about $\ell$. By Bochner's theorem such
+# a covariance is the Fourier transform of a non-negative spectral density, here
+# $S(\omega)\propto\bigl(5/\ell^2+(2\pi\omega)^2\bigr)^{-3}$. The next cell checks this with a plain sum.
 
 # %%
 grid = np.linspace(0, 400, 400_001)
@@ -77,8 +79,9 @@ matern = (1 + np.sqrt(5) * r + 5 / 3 * r**2) * np.exp(-np.sqrt(5) * r)
 np.testing.assert_allclose(from_spectrum / from_spectrum[0], matern, atol=1e-9)
 
 # %% [markdown]
-# A coefficient at frequency $\omega_f$ therefore has prior variance proportional to $S(\omega_f)$, and the negative logarithm of the prior is
-# a sum of squares weighted by $1/S$. That is the equation, scaled so that the weights have mean 1:
+# A coefficient at frequency $\omega_f$ therefore has prior variance proportional to $S(\omega_f)$. Up to constants, the
+# negative logarithm of the prior is a sum of squares weighted by $1/S$. Scaled so that the weights have mean 1, this is
+# the equation:
 #
 # $$
 # \begin{aligned}
@@ -114,16 +117,16 @@ penalty, saved_penalty = matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, penalty_text(C, rho), rtol=1e-13)
 
 # %% [markdown]
-# **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale $1/\ell$,
-# evaluated at $2\pi\omega$. A library that knows nothing of Matérn gives the same weights:
+# **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale
+# $1/\ell$, evaluated at $2\pi\omega$. The Student-t density of an independent library gives the same weights:
 
 # %%
 density = stats.t(df=5, scale=1 / length).pdf(2 * np.pi * omega)
 np.testing.assert_allclose(rho, (1 / density) / np.mean(1 / density), rtol=1e-13)
 
 # %% [markdown]
-# **Phase does not matter.** Rotate a (sine, cosine) pair of coefficients by any angle: the path is shifted in time, the
-# penalty stays.
+# **Invariance to phase.** Rotating a (sine, cosine) pair of coefficients by any angle shifts the path in time and
+# leaves the penalty unchanged.
 
 # %%
 turn = rng.uniform(0, 2 * np.pi, (3, F, N))
@@ -134,12 +137,12 @@ turned = np.concatenate(
 np.testing.assert_allclose(matern_penalty_forward(turned, rho)[0], penalty, rtol=1e-13)
 
 # %% [markdown]
-# ## A picture: what the penalty does to a trajectory
+# ## Figure: the effect of the penalty on a trajectory
 #
-# A point moves on a smooth path. We see it with a little noise in the training frames of a short clip: 17 stamps for 16
-# coefficients. At such stamps fast atoms look almost like slow ones, and only between the frames do they differ. We fit the
-# Fourier series twice: by least squares alone, and with $\lambda\,\mathcal L_{\mathrm{msp}}$ added (the minimum of a
-# quadratic, so one linear system; its matrix is built from the reverse pass below).
+# A point moves on a smooth path. It is observed with a little noise in the training frames of a short clip: 17 stamps
+# for 16 coefficients. At such stamps fast atoms are almost equal to slow ones; they differ only between the frames. The
+# Fourier series is fitted twice: by least squares alone, and with $\lambda\,\mathcal L_{\mathrm{msp}}$ added. The
+# minimum of a quadratic is one linear system; its matrix is built from the reverse pass below.
 
 # %% tags=["hide-input"]
 stamps = np.delete(np.arange(20), np.arange(1, 20, 8)) / 20
@@ -188,7 +191,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# The translation is bilinear, like the argument of the colour residual: each coefficient meets one atom, each atom meets all.
+# The translation is bilinear, like the argument of the colour residual: each coefficient is multiplied by one atom, and
+# each atom by all coefficients of its index.
 #
 # $$
 # g_{C_{dki}} = g_{\Delta\mu_{di}}\,\phi_k,\qquad
@@ -202,7 +206,7 @@ plt.show()
 # g_{C_{d,F+f,i}} = \frac{\rho_f}{3NF}\,C_{d,F+f,i}\;g_{\mathcal L_{\mathrm{msp}}} .
 # $$
 #
-# $\rho$ depends on the settings only; it is a constant.
+# $\rho$ depends on the settings only and is a constant.
 
 
 # %% tags=["transcription"]
@@ -226,9 +230,9 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), penalty_r
 # %% [markdown]
 # ## The gradient check
 #
-# The weights span five decades, and the gradient is tiny by construction ($10^{-7}$ with 30 000 Gaussians). A check with an
-# absolute tolerance, or one norm over everything, would accept a wrong weight of a low frequency. This one looks at each atom
-# alone, and is relative.
+# The weights span five decades, and the gradient is small by construction ($10^{-7}$ with 30 000 Gaussians). A check
+# with an absolute tolerance, or with one norm over all entries, would accept a wrong weight of a low frequency. This
+# check is relative and treats each atom separately.
 
 # %%
 with one_thread():
@@ -239,9 +243,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The raw cosines are 1 at $t=0$, so $C$ may carry a constant offset of the position, which the canonical position could
-# carry for free. Does the penalty allow this? What does a slow drift $x=t$ cost, fitted by the atoms, compared with a wiggle of the
-# same size at 16 cycles?
+# The raw cosines are 1 at $t=0$, so $C$ can contain a constant offset of the position. The canonical position could
+# represent that offset at no cost. Does the penalty allow the offset in $C$? What is the penalty of a slow drift $x=t$,
+# fitted by the atoms, compared with an oscillation of the same size at 16 cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Nothing forbids it, but it costs, and the canonical position costs nothing: so training leaves the offset there.

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 5. Quaternions, scales and the covariance
 #
-# A Gaussian has a shape: three semi-axes and a rotation. Both are stored raw, so that any real numbers are allowed: the
-# quaternion of any length, the axes as logarithms.
+# The shape of a Gaussian consists of three semi-axes and a rotation. Both are stored raw, so that all real numbers are
+# allowed: the quaternion may have any length, and the axes are stored as logarithms.
 #
-# Equation {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
+# The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -69,8 +69,8 @@ np.testing.assert_allclose(shape.scale, np.exp(s), rtol=1e-14)
 np.testing.assert_allclose(covariance_matrix(shape), covariance_text(shape.rotation, s), rtol=1e-11, atol=1e-13)
 
 # %% [markdown]
-# The length of the raw quaternion does not matter, not even when its square would leave the range of numbers; $q$ and $-q$ are
-# the same rotation; and the zero quaternion, which the FDM can reach by addition, is the identity.
+# The length of the raw quaternion has no effect, even if its square would overflow or underflow. $q$ and $-q$ are the
+# same rotation. The zero quaternion, which the FDM can produce by addition, is the identity.
 
 # %%
 for factor in (1e-300, 1e-30, -1.0, 1e300):
@@ -82,16 +82,17 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # %% [markdown]
 # ## The reverse pass
 #
-# From $g_\Sigma$, all nine entries taken as independent. $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
-# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$: each entry of $M$ is met twice, once in the row and once in the column.
+# The input is $g_\Sigma$, with all nine entries taken as independent. $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
+# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$: each entry of $M$ occurs twice, once in the row and once in
+# the column.
 #
 # $$
 # g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
 # $$
 #
-# The entries of $R$ are quadratic in the unit quaternion: differentiate each and collect, with $G=g_R$. Last comes the
-# normalisation. A step of $\tilde q$ along itself changes nothing, so that part of $g_q$ is removed; a longer $\tilde q$ turns less for the
-# same step, so the rest is divided by its length.
+# The entries of $R$ are quadratic in the unit quaternion. Each is differentiated, and the terms are collected with
+# $G=g_R$. The last step is the normalisation. A step of $\tilde q$ along itself does not change the rotation, so that
+# part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
 #
 # $$
 # \begin{aligned}
@@ -149,9 +150,10 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
-# ## A picture: a shape found by its gradient
+# ## Figure: a shape found by its gradient
 #
-# Minimise $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass. $g_\Sigma=2(\Sigma-\Sigma^\star)$.
+# The next cell minimises $\|\Sigma-\Sigma^\star\|^2$ by plain gradient steps through the reverse pass, with
+# $g_\Sigma=2(\Sigma-\Sigma^\star)$.
 
 # %% tags=["hide-input"]
 q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
@@ -193,7 +195,8 @@ plt.show()
 # %% [markdown]
 # ## The gradient check
 #
-# `check_function` takes any forward and reverse. First the way through $\Sigma$ as derived above, then the registered pair.
+# `check_function` takes any forward and reverse function. The first check is the chain through $\Sigma$ as derived
+# above; the second is the registered pair.
 
 
 # %%
@@ -218,8 +221,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Swap the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place of $(s_1,s_2,s_3)$. Which quaternion gives the same
-# $\Sigma$ as before? So how many parameter sets describe one ellipsoid?
+# Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place of $(s_1,s_2,s_3)$. Which quaternion
+# gives the same $\Sigma$ as before? How many parameter sets describe one ellipsoid?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1: the quaternion product q (1, 1, 1, 1)/2. There are

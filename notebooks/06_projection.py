@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 6. Perspective projection of a Gaussian
 #
-# The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the projection at
-# the centre (EWA). The result is an ellipse on the screen.
+# The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the
+# projection at the centre (EWA). The result is an ellipse on the screen.
 #
-# Equation {eq}`eq-b3` of {doc}`/specification/b03_projection`.
+# The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -50,9 +50,10 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 # \end{aligned}
 # $$
 #
-# $W,\mathbf d$ are the camera pose, world to camera. $\kappa=1.3$ in the presets `paper` and `legacy`: far off the axis the linear
-# expansion explodes, so the slope that enters $J$ is clamped. In `exact` there is no clamp. The centre is never clamped. $\varepsilon$
-# is the low-pass of 0.3 px², so that no splat is thinner than a pixel.
+# $W,\mathbf d$ are the camera pose, world to camera. Far off the axis the linear expansion grows without bound, so the
+# slope that enters $J$ is clamped, with $\kappa=1.3$ in the presets `paper` and `legacy`. In `exact` there is no clamp.
+# The centre is never clamped. $\varepsilon$ is the low-pass of 0.3 px². It prevents a splat from being thinner than a
+# pixel.
 
 
 # %% tags=["transcription"]
@@ -92,14 +93,14 @@ for settings in (PAPER, EXACT):
 # %% [markdown]
 # ## The determinant
 #
-# $ac-b^2$ is a difference of two huge numbers for a needle seen at an angle. The specification writes the determinant
+# For a needle seen at an angle, $ac-b^2$ is a difference of two large numbers. The specification writes the determinant
 # as a sum of terms that cannot cancel:
 #
 # $$
 # \det=\varepsilon^2+\varepsilon\sum_{k=1}^{3}S_k^2\|\mathbf t_k\|^2+\sum_{k<l}\bigl(S_kS_l\,(t_{0k}t_{1l}-t_{1k}t_{0l})\bigr)^2 .
 # $$
 #
-# ## A picture: where the expansion is good, and where digits are lost
+# ## Figure: where the expansion is accurate, and where digits are lost
 
 # %% tags=["hide-input"]
 front = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 32.0, 24.0, 64, 48)
@@ -158,8 +159,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# Backwards through the display. The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$: the same step as for
-# $\Sigma$. $b$ stands for two entries of the matrix, so half of its gradient goes to each: that is $G_2$.
+# The derivation goes backwards through the display. The screen covariance is $MM^\top+\varepsilon I$ with
+# $M=T\,\mathrm{diag}(S)$, so this step is the same as for $\Sigma$. $b$ stands for two entries of the matrix, and half
+# of its gradient goes to each. This gives $G_2$.
 #
 # $$
 # \begin{aligned}
@@ -168,9 +170,9 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# In float32 this way has a hole: $g_a,g_b,g_c$ of a needle are huge and nearly cancel. The render therefore goes from the gradients of
-# the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$. It is the same chain rule, with $e_k=t_{0k}-m\,t_{1k}$
-# written so that nothing cancels:
+# In float32 this form loses digits: $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes
+# from the gradients of the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$.
+# This is the same chain rule, with $e_k=t_{0k}-m\,t_{1k}$ written so that nothing cancels:
 #
 # $$
 # \begin{aligned}
@@ -181,8 +183,9 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# Then the centre. It enters through $(u,v)$, and through $J$, whose entries depend on $z$ and on the clamped $x',y'$. Where the clamp
-# is not active, $x'=x$. Where it is active, $x'=\pm zL_x$: it no longer depends on $x$, but it does on $z$. That is the last line.
+# The centre comes next. It enters through $(u,v)$ and through $J$, whose entries depend on $z$ and on the clamped
+# $x',y'$. Where the clamp is not active, $x'=x$. Where it is active, $x'=\pm zL_x$, which does not depend on $x$ but
+# does depend on $z$. This gives the last line.
 #
 # $$
 # \begin{aligned}
@@ -194,7 +197,8 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The pose collects from all Gaussians (the terms with $g_{\mathbf o}$ come from the viewing directions and are not part of this stage):
+# The gradient by the pose is a sum over all Gaussians. (The terms with $g_{\mathbf o}$ come from the viewing directions
+# and are not part of this stage.)
 #
 # $$
 # \begin{aligned}
@@ -233,7 +237,7 @@ for settings in (PAPER, EXACT):
     grads = projection_reverse(g_uv, g_abc, g_z, saved, pose_gradient=True)
     g_d, g_W = np.zeros(3), np.zeros((3, 3))
     for i in range(N):
-        g_mu, g_R, g_S, g_xyz, share = reverse_text(
+        g_mu, g_R, g_S, g_xyz, part = reverse_text(
             g_uv[:, i],
             g_abc[:, i],
             g_z[i],
@@ -246,12 +250,13 @@ for settings in (PAPER, EXACT):
         np.testing.assert_allclose(grads.position[:, i], g_mu, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(grads.rotation[:, :, i], g_R, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(grads.scale[:, i], g_S, rtol=1e-9, atol=1e-10)
-        g_d, g_W = g_d + g_xyz, g_W + share
+        g_d, g_W = g_d + g_xyz, g_W + part
     np.testing.assert_allclose(grads.camera.translation, g_d, rtol=1e-10)
     np.testing.assert_allclose(grads.camera.rotation, g_W, rtol=1e-10)
 
 # %% [markdown]
-# The direct way gives the same gradients as the way through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in {doc}`08_compositing`:
+# The direct form gives the same gradients as the form through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in
+# {doc}`08_compositing`:
 
 
 # %% tags=["transcription"]
@@ -289,7 +294,8 @@ for name in ("position", "rotation", "scale"):
 # %% [markdown]
 # ## The gradient check
 #
-# With the clamp and without. The inputs include Gaussians beyond the clamp on all four sides and one behind the camera.
+# The check runs with the clamp and without it. The inputs include Gaussians beyond the clamp on all four sides and one
+# behind the camera.
 
 # %%
 with one_thread():
@@ -300,8 +306,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Make everything twice as large: positions, semi-axes, the camera's translation, the near plane. What happens to $(u,v)$, to
-# $(a,b,c)$, to $z$? What to the gradient of the position? Say it before you open the answer.
+# Make everything twice as large: positions, semi-axes, the translation of the camera, the near plane. What happens to
+# $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the gradient by the position? Write down your answer before you open
+# the cell.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles. The gradient of the position halves

@@ -13,11 +13,11 @@
 # %% [markdown]
 # # 7. Colour that depends on the direction: spherical harmonics
 #
-# A wet surface looks different from different sides. Each Gaussian carries up to 16 coefficients per channel of the real
-# spherical harmonics, evaluated in the direction from the camera to the deformed centre. The colour residual of
-# {doc}`02_colour_residual` is added to the first of them.
+# The colour of a wet surface depends on the viewing direction. Each Gaussian has up to 16 coefficients of the real
+# spherical harmonics per channel. They are evaluated in the direction from the camera to the deformed centre. The
+# colour residual of {doc}`02_colour_residual` is added to the first of them.
 #
-# Equation {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
+# The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -40,7 +40,8 @@ N = 9
 # \end{aligned}
 # $$
 #
-# The table of $Y_k$ and their derivatives stands in the specification. It is transcribed here with its closed-form constants.
+# The specification has the table of the $Y_k$ and their derivatives. It is transcribed here with its closed-form
+# constants.
 
 # %% tags=["transcription"]
 C_0, C_1 = np.sqrt(1 / (4 * np.pi)), np.sqrt(3 / (4 * np.pi))
@@ -89,8 +90,8 @@ for degree in range(4):
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
-# **An independent source.** The same sixteen functions from SciPy's associated Legendre functions $P_l^m$. Its sign $(-1)^m$
-# (Condon and Shortley) is that of the table.
+# **An independent source.** The associated Legendre functions $P_l^m$ of SciPy give the same sixteen functions. Their
+# sign $(-1)^m$ (Condon and Shortley) is that of the table.
 
 # %%
 direction = rng.normal(size=(3, 50))
@@ -106,10 +107,10 @@ for band in range(4):
         k += 1
 
 # %% [markdown]
-# ## A picture: the sixteen functions
+# ## Figure: the sixteen functions
 #
-# Each drawn over the whole sphere (longitude to the right, latitude upwards), red positive, blue negative. Evaluated by the
-# kernel: one Gaussian per direction, one coefficient switched on.
+# Each function is drawn over the whole sphere (longitude to the right, latitude upwards); red is positive and blue is
+# negative. The kernel evaluates them, with one Gaussian per direction and one coefficient set to 1.
 
 # %% tags=["hide-input"]
 lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37))
@@ -135,9 +136,10 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# The colour is linear in the coefficients. The clamp passes the gradient where the value before it is $\ge0$. The direction is
-# $\mathbf n=\mathbf v/\|\mathbf v\|$: of the gradient by $\mathbf n$ only the part across $\mathbf n$ survives, divided by the
-# distance. The same rule as for the quaternion, because it is the same normalisation.
+# The colour is linear in the coefficients. The clamp passes the gradient where the value before it is $\ge0$. The
+# direction is $\mathbf n=\mathbf v/\|\mathbf v\|$: only the part of $g_{\mathbf n}$ that is perpendicular to
+# $\mathbf n$ remains, divided by the distance. This is the rule of the quaternion, because the normalisation is the
+# same.
 #
 # $$
 # \begin{aligned}
@@ -200,7 +202,7 @@ for found, text in zip(grads, reverse_text(g_rgb, h, residual, mu, centre)):
 # %% [markdown]
 # ## The gradient check
 #
-# One pair per active degree.
+# There is one pair per active degree.
 
 # %%
 with one_thread():
@@ -213,8 +215,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Mirror the scene: negate $x$ of all positions and of the camera. Which coefficients must change their sign so that every Gaussian keeps
-# its colour? Read it off the table, then check it with the kernel.
+# Mirror the scene: negate $x$ of all positions and of the camera. Which coefficients must change their sign so that
+# every Gaussian keeps its colour? Find the answer in the table, then check it with the kernel.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Those whose Y_k is odd in x: k = 3, 4, 7, 10, 13, 15. (Y_14 = z (x^2 - y^2) is even.)

@@ -13,11 +13,11 @@
 # %% [markdown]
 # # 8. Compositing, and its reverse pass line by line
 #
-# At a pixel the Gaussians stand behind each other, like sheets of coloured glass. Front to back, each takes its share of the
-# light that is left. This is the heart of the renderer, and its reverse pass is the one most often got wrong: we derive it
+# At a pixel the Gaussians are ordered by depth. From front to back, each absorbs a fraction of the light that remains.
+# This is the central stage of the renderer, and its reverse pass is often implemented incorrectly. It is derived here
 # line by line.
 #
-# Equations {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
+# The equations are {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -77,8 +77,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# $o=1/(1+e^{-\mathrm{logit}})$. $q$ is the squared Mahalanobis distance, written as a sum of two squares: never negative, and
-# accurate for needles.
+# Here $o=1/(1+e^{-\mathrm{logit}})$. $q$ is the squared Mahalanobis distance. It is written as a sum of two squares, so
+# it is never negative and is accurate for needles.
 #
 # ## Forward: the blend
 #
@@ -93,8 +93,8 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # \end{aligned}
 # $$
 #
-# A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ is no contributor. Before Gaussian $k$ is blended, if
-# $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel ends.
+# A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel
+# ends before Gaussian $k$ is blended.
 
 
 # %% tags=["transcription"]
@@ -151,12 +151,12 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
         np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-13)
 
 # %% [markdown]
-# ## A picture: one ray, and the support of a splat under each preset
+# ## Figure: one ray, and the support of a splat under each preset
 #
-# Left: what one pixel sees. Height of the bar: what is left of the light, $T_k$; filled: the share that the Gaussian takes.
-# Right: one Gaussian under the three presets. `exact` reaches everywhere. `paper` ends on the ellipse at which $\alpha$ has
-# fallen to 1/255. `legacy` takes the tiles within three standard deviations: here that cuts a strip at the
-# bottom, values that can be seen.
+# Left: the contributors of one pixel. The height of a bar is the remaining light, $T_k$; the filled part is the
+# fraction that the Gaussian absorbs. Right: one Gaussian under the three presets. The support of `exact` is the whole
+# image. The support of `paper` ends on the ellipse at which $\alpha$ has fallen to 1/255. `legacy` uses the tiles
+# within three standard deviations; here this removes a strip of visible values at the bottom.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1])
@@ -166,7 +166,7 @@ for k, (i, alpha, T) in enumerate(contributors):
     axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
     axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=8)
 axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
-axes[0].set(title="pixel (9, 7): $T_k$, and the share $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
+axes[0].set(title="pixel (9, 7): $T_k$, and the fraction $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
 axes[0].set_xticklabels([f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"])
 camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 37.5, 26.5, 72, 56)
 splat = Scene(
@@ -194,23 +194,28 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss sends $g_{\hat I},g_{\hat D},g_{\hat O}$ to each pixel. We want the gradients of every $\alpha_k$, colour and depth.
+# A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. The gradients by every $\alpha_k$, colour and depth are
+# wanted.
 #
-# **Line 1. What is behind.** Let $R_k$ be the colour that one would see if the Gaussians $0,\dots,k-1$ were taken away. Then
-# $\hat I=R_0$, and Gaussian $k$ covers the share $\alpha_k$ of what is behind it: $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
+# **Line 1. The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
+# $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it:
+# $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
 #
-# **Line 2. How much of it arrives.** Unrolling line 1 from the front, $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So
-# $\partial\hat I/\partial R_k=T_k$: whatever happens behind is seen through the transmittance in front.
+# **Line 2. Its weight in the pixel.** Unrolling line 1 from the front gives
+# $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So $\partial\hat I/\partial R_k=T_k$: every change behind is weighted by
+# the transmittance in front.
 #
-# **Line 3. One opacity.** $\alpha_k$ is not in $T_k$ (only the ones in front are), and not in $R_{k+1}$ (only the ones
-# behind are). So $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. In words: more opacity shows more
-# of the own colour and less of what is behind.
+# **Line 3. One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
+# depend on it either, only on the opacities behind. So
+# $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour of
+# Gaussian $k$ and removes colour behind it.
 #
-# **Line 4. Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and nothing as background: $Z_k$ and $Q_k$.
+# **Line 4. Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and 0 as background. They
+# give $Z_k$ and $Q_k$.
 #
 # **Line 5. Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
 #
-# Nothing is divided by $1-\alpha_k$, and so $\alpha_k=1$ is no special case:
+# There is no division by $1-\alpha_k$, so $\alpha_k=1$ is not a special case:
 #
 # $$
 # \begin{aligned}
@@ -223,10 +228,12 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Line 6. From $\alpha$ to the footprint.** Where the clamp holds, all that follows is 0. Else $\alpha=o\,e^{-q/2}$:
-# $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
+# **Line 6. From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
+# $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and
+# $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
 #
-# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$, $\mathrm d d_y=-\mathrm dv$:
+# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
+# $\mathrm d d_y=-\mathrm dv$:
 #
 # $$
 # \begin{aligned}
@@ -237,7 +244,8 @@ plt.show()
 # $$
 #
 # **Line 8. Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
-# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$; $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
+# $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
+# $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
 # $$
 # g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .
@@ -308,7 +316,8 @@ for settings in (PAPER, EXACT):
 
 # %% [markdown]
 # The released program adds a small number to $\det^2$ in this last step, so that its $g_a,g_b,g_c$ are multiplied by
-# $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces it under the name `conic_epsilon`; here with a number large enough to show.
+# $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces this under the name `conic_epsilon`. The next cell uses a
+# number that is large enough to be visible.
 
 # %%
 exact, damped = (kernel_reverse(scene, PAPER, g_I, g_D, g_O, conic_epsilon=number) for number in (0.0, 1e4))
@@ -318,8 +327,8 @@ np.testing.assert_allclose(damped["covariance2d"], exact["covariance2d"] * det**
 # %% [markdown]
 # ## The gradient check
 #
-# The difference is taken only between ends that make the same decisions (order, contributors, clamp). `composite_blocks` is the fast
-# path that training uses: it walks front to back and computes the same.
+# A difference is taken only between two ends with the same discrete decisions (order, contributors, clamp).
+# `composite_blocks` is the fast path that training uses. It runs front to back and computes the same gradients.
 
 # %%
 with one_thread():
@@ -333,8 +342,9 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# One pixel, three Gaussians with $\alpha=0.3,\ 1,\ 0.5$ front to back. Which of the three opacities and colours have a gradient? Much code
-# recovers $T_k$ in the reverse pass by dividing the final $T_n$ by $1-\alpha$. What would it find here?
+# At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back. Which of the three opacities and
+# colours have a gradient? Many programs recover $T_k$ in the reverse pass by dividing the final $T_n$ by $1-\alpha$.
+# What would such a program compute here?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The first two have gradients, the opaque one included (less opacity would show the third). The third has none. Division

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 9. The mask-propagating Laplacian pyramid (component L)
 #
-# Fine detail is compared in the bands of a pyramid. The difficulty is the instrument: a filter that reads one pixel of it has
-# read a wrong value. Component L counts a band value only if **no excluded pixel has any weight in it**.
+# Fine detail is compared in the bands of a pyramid. The difficulty is the instrument: a filter that reads one of its
+# pixels gives a wrong value. Component L counts a band value only if **no excluded pixel has any weight in it**.
 #
-# Equation {eq}`eq-5` of {doc}`/specification/05_laplacian`.
+# The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -31,8 +31,8 @@ rng = np.random.default_rng(9)
 # %% [markdown]
 # ## Down and up
 #
-# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The border is reflected
-# without repeating the edge sample:
+# Down-sampling $\mathsf D$ filters rows and columns with $b=\tfrac1{16}(1,4,6,4,1)$ and keeps the even samples. The
+# border is reflected without repeating the edge sample:
 #
 # $$
 # (\mathsf D G)[y,x] = \sum_{r=-2}^{2}\sum_{s=-2}^{2} b_r b_s\; G\bigl[\mathrm{refl}(2y+r,H),\ \mathrm{refl}(2x+s,W)\bigr],
@@ -49,7 +49,8 @@ rng = np.random.default_rng(9)
 # \end{aligned}
 # $$
 #
-# Both are linear and act on each axis alone. So each is a small matrix per axis; we write the matrices down from the text.
+# Both are linear and act on each axis separately, so each is a small matrix per axis. The next cell writes these
+# matrices down from the text.
 
 # %% tags=["transcription"]
 b = np.array([1, 4, 6, 4, 1]) / 16
@@ -116,7 +117,8 @@ for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
         np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
 
 # %% [markdown]
-# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with `half_pixel`.
+# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with
+# `half_pixel`.
 
 # %%
 ramp = np.broadcast_to(np.arange(96.0), (1, 96, 96)).copy()
@@ -128,8 +130,9 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # %% [markdown]
 # ## Which values are valid
 #
-# A boolean support is sent through the same operations. A coarse sample is supported if all of its $5\times5$ are; a band value
-# is valid if its own fine sample is, and every coarse sample that $\mathsf U$ reads there:
+# A boolean support passes through the same operations. A coarse sample is supported if all of its $5\times5$ inputs are
+# supported. A band value is valid if its own fine sample is supported, and so is every coarse sample that $\mathsf U$
+# reads there:
 #
 # $$
 # \begin{aligned}
@@ -140,7 +143,8 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 #
 # ## The loss
 #
-# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$ the number of valid values:
+# With $G_0=\hat I$, $G_j=\mathsf D G_{j-1}$, $P_j=G_{j-1}-\mathsf U G_j$, the same for the observed image, and $n_j$
+# the number of valid values:
 #
 # $$
 # \begin{aligned}
@@ -192,7 +196,7 @@ for rule in ("co_sited", "half_pixel"):
     np.testing.assert_allclose(loss, loss_text(rendered, observed, V, rule), rtol=1e-12)
 
 # %% [markdown]
-# **Nothing under the instrument is read.** Put NaN there, in the render and in the observation:
+# **No value under the instrument is read.** The next cell puts NaN there, in the render and in the observed frame:
 
 # %%
 masks = support_masks(mask)
@@ -203,11 +207,11 @@ assert loss_spoiled == loss
 assert np.array_equal(laplacian_loss_reverse(1.0, saved_spoiled), laplacian_loss_reverse(1.0, saved))
 
 # %% [markdown]
-# ## A picture: valid masks per level, and what masking first would do
+# ## Figure: valid masks per level, and the effect of masking first
 #
-# Above: what counts at each level (grey: tissue whose value is not used, because its footprint touches the instrument). Below:
-# the bands of the observed image if it is multiplied by the mask first and then filtered. The edge of the instrument is the
-# brightest "detail" of the picture; a render would be asked to reproduce it.
+# Above: the valid values of each level (grey: tissue whose value is not used, because its support touches the
+# instrument). Below: the bands of the observed image if it is first multiplied by the mask and then filtered. The edge
+# of the instrument is then the strongest detail of the image, and the loss would make the render reproduce it.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(13, 5.4), layout="constrained")
@@ -232,9 +236,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# $|\cdot|$ gives the sign $\sigma_j$, divided by the count; three levels and three channels give the 9. The rest is linear, and the reverse of
-# a linear map is its transpose. Each $G_j$ is used twice: as the fine image of band $j+1$, and expanded in band $j$ (with a minus). And it
-# was the source of $G_{j+1}$:
+# The derivative of $|\cdot|$ is the sign $\sigma_j$, divided by the count; three levels and three channels give the
+# factor 9. The rest is linear, and the reverse of a linear map is its transpose. Each $G_j$ is used in three places: as
+# the fine image of band $j+1$, expanded in band $j$ (with a minus sign), and as the source of $G_{j+1}$:
 #
 # $$
 # \begin{aligned}
@@ -285,8 +289,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# One single pixel in the middle of a large image is excluded. How many values of each band does it cost (`co_sited`)? Does it matter
-# whether the pixel has even or odd coordinates?
+# One single pixel in the middle of a large image is excluded. How many values of each band become invalid (`co_sited`)?
+# Does the number depend on whether the coordinates of the pixel are even or odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned round: an even pixel is read by more

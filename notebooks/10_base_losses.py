@@ -13,16 +13,20 @@
 # %% [markdown]
 # # 10. The base losses: L1, SSIM, depth and smoothness
 #
-# Four terms hold the base model: colour by pixel, colour by structure, depth by its prior, and smoothness where nothing
-# is known. All but the last never read what lies under the instrument.
+# The base model has four loss terms: the colour of each pixel, the structure of the colours, the depth against the
+# prior depth, and smoothness where nothing is observed. All except the last read no value under the instrument.
 #
-# Equations {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of
-# {doc}`/specification/b08_depth` and {eq}`eq-b9` of {doc}`/specification/b09_smoothness`.
+# The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
+# {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
+# {doc}`/specification/b09_smoothness`.
+# The optional exposure of a frame, {eq}`eq-b13` of {doc}`/specification/b13_exposure`, acts on the render before the
+# losses do.
 
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.equations.exposure import exposure_forward, exposure_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
@@ -48,8 +52,8 @@ H, W = M.shape
 #
 # ## Masked SSIM
 #
-# Both images are 0 where the mask is False. $k$ is a Gaussian window of 11×11 with standard deviation 1.5, sum 1; $*$ is
-# convolution with zeros outside the image.
+# Both images are 0 where the mask is False. $k$ is a Gaussian window of 11×11 with standard deviation 1.5 and sum 1.
+# $*$ is convolution with zeros outside the image.
 #
 # $$
 # \begin{aligned}
@@ -61,8 +65,8 @@ H, W = M.shape
 # \end{aligned}
 # $$
 #
-# The code computes the same quantity from the difference $e=x-y$ and the sum $f=x+y$. It needs no covariance, is exactly 1
-# for equal images, and keeps all digits of $1-s$:
+# The code computes the same quantity from the difference $e=x-y$ and the sum $f=x+y$. This form needs no covariance, is
+# exactly 1 for equal images, and keeps all digits of $1-s$:
 #
 # $$
 # \begin{aligned}
@@ -124,7 +128,8 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 # %% [markdown]
 # ## Normalised depth
 #
-# Depth and prior are divided by their own largest value, over the whole image: an unknown scale of the prior does not matter.
+# Rendered depth and prior depth are each divided by their own largest value over the whole image, so the scale of the
+# prior has no effect.
 #
 # $$
 # m=\max_{p}\hat D_p,\qquad m_D=\max_{p}D_p,\qquad
@@ -133,8 +138,8 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 #
 # ## Smoothness
 #
-# $\mathcal Q$ keeps depth smooth on tissue away from depth edges $E$; the two total variations keep depth and colour flat under the
-# instrument, where nothing is observed.
+# $\mathcal Q$ keeps the depth smooth on tissue, away from depth edges $E$. The two total variations keep depth and
+# colour flat under the instrument, where nothing is observed.
 #
 # $$
 # \begin{aligned}
@@ -181,10 +186,10 @@ L_smooth, saved_smooth = smoothness_forward(step, I_hat, M, E, 30.0)
 np.testing.assert_allclose(L_smooth, smoothness_text(step, I_hat, M, E, 30.0), rtol=1e-12)
 
 # %% [markdown]
-# ## A picture: why there is an SSIM beside the L1
+# ## Figure: why SSIM is used beside L1
 #
-# Three renders with **equal** masked L1. A person prefers the first by far. L1 cannot tell; SSIM can. (Maps of $1-s$, mean over
-# channels.)
+# The three renders have **equal** masked L1, but the first looks much better. L1 does not distinguish them; SSIM does.
+# (The maps show $1-s$, averaged over channels.)
 
 # %% tags=["hide-input"]
 from scipy.ndimage import gaussian_filter
@@ -212,15 +217,15 @@ plt.show()
 # %% [markdown]
 # ## The reverse passes
 #
-# **L1**: the derivative of $|\cdot|$ is the sign; $\operatorname{sign}(0)=0$.
+# **L1.** The derivative of $|\cdot|$ is the sign, with $\operatorname{sign}(0)=0$.
 #
 # $$
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
 # $$
 #
 # **SSIM.** $s$ depends on $x$ through three windowed images, $k*x$, $k*x^2$ and $k*(xy)$; call the derivatives by them
-# $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric, so the reverse of $k*$ is $k*$
-# itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
+# $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric, so the reverse
+# of $k*$ is $k*$ itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
 #
 # $$
 # \begin{aligned}
@@ -230,13 +235,13 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Depth.** The maximum is part of the formula: all pixels together decide how the largest one is pulled.
+# **Depth.** The maximum is part of the formula, so the gradient at the largest pixel contains a sum over all pixels.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
 # $$
 #
-# **Smoothness.** Each pixel meets its up to four neighbours.
+# **Smoothness.** Each pixel has at most four neighbours.
 #
 # $$
 # \begin{aligned}
@@ -303,11 +308,33 @@ for found, text in zip(smoothness_reverse(0.5, saved_smooth), smoothness_reverse
     np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-18)
 
 # %% [markdown]
+# ## The exposure of a frame
+#
+# $$
+# \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
+# $$
+#
+# The colour of every pixel of a channel goes through the same two numbers. So their gradients are sums over the pixels, and that
+# of $\gamma_c$ has the factor $e^{\gamma_c}$ of the exponential.
+
+# %%
+gamma, b = rng.normal(0, 0.3, 3), rng.normal(0, 0.1, 3)
+exposed, saved_exposure = exposure_forward(I_hat, gamma, b)
+g_I = rng.normal(size=I_hat.shape)
+found = exposure_reverse(g_I, saved_exposure)
+for c in range(3):
+    gain = np.exp(gamma[c])
+    np.testing.assert_allclose(exposed[c], gain * I_hat[c] + b[c], rtol=1e-14)
+    np.testing.assert_allclose(found.colour[c], gain * g_I[c], rtol=1e-14)
+    np.testing.assert_allclose(found.log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11)
+    np.testing.assert_allclose(found.bias[c], g_I[c].sum(), rtol=1e-11)
+
+# %% [markdown]
 # ## The gradient check
 
 # %%
 with one_thread():
-    names = ("masked_l1", "masked_ssim", "normalised_depth", "smoothness")
+    names = ("masked_l1", "masked_ssim", "normalised_depth", "smoothness", "exposure")
     reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in names]
 print(table(reports))
 assert all(report.passed for report in reports)
@@ -315,8 +342,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The depth loss does not change when the rendered depth is multiplied by a constant. What does that say about the gradient,
-# $\sum_p g_{\hat D_p}\hat D_p$? Check it; then say which term of the gradient makes it true.
+# The depth loss does not change when the rendered depth is multiplied by a constant. What follows for the sum
+# $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum makes it so: without it every pixel

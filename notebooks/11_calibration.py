@@ -11,12 +11,13 @@
 # ---
 
 # %% [markdown]
-# # 11. How strong should the detail loss be? The calibration
+# # 11. Calibration of the Laplacian weight
 #
-# A weight that is right for one sequence is wrong for the next. The paper therefore sets $\lambda_{\mathrm{lap}}$ by its force: at
-# full weight, the detail loss pushes each rendered image with a fixed fraction $r$ of the force of the photometric loss.
+# The best weight of the Laplacian loss depends on the sequence. The paper therefore derives $\lambda_{\mathrm{lap}}$
+# from gradients: at full weight and in the median over the views, the gradient of the Laplacian loss by the rendered
+# image has a fixed ratio $r$ to the gradient of the photometric loss.
 #
-# Equation {eq}`eq-7` of {doc}`/specification/07_calibration`.
+# The equation is {eq}`eq-7` of {doc}`/specification/07_calibration`.
 
 # %%
 import matplotlib.pyplot as plt
@@ -37,8 +38,9 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # %% [markdown]
 # ## The equation
 #
-# The views are spread over the training frames: positions $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered
-# by the base model. Here a blurred frame stands in for the base render: that is what a base render looks like.
+# The views are spread over the training frames: positions
+# $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered by the base model. Here a
+# blurred frame replaces the base render, because base renders look like blurred frames.
 #
 # $$
 # \begin{aligned}
@@ -48,7 +50,8 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # \end{aligned}
 # $$
 #
-# $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$; $\mathcal L_{\mathrm{lap}}$ has weight 1.
+# $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$.
+# $\mathcal L_{\mathrm{lap}}$ has weight 1.
 
 
 # %% tags=["transcription"]
@@ -89,7 +92,7 @@ np.testing.assert_allclose(calibration.lambda_lap, lambda_text(views, r), rtol=1
 np.testing.assert_allclose(calibrate(sizes[:15], r).lambda_lap, lambda_text(views[:15], r), rtol=1e-13)
 
 # %% [markdown]
-# After calibration the detail loss has the force it was promised, in the median view:
+# After calibration the Laplacian loss has the required gradient in the median view:
 
 # %%
 force = [calibration.lambda_lap * lap / rgb for _, rgb, lap in sizes]
@@ -97,11 +100,12 @@ np.testing.assert_allclose(np.median(force), r, rtol=1e-13)
 np.testing.assert_allclose(calibrate(sizes, 2 * r).lambda_lap, 2 * calibration.lambda_lap, rtol=1e-14)
 
 # %% [markdown]
-# ## A picture: two forces on the same image
+# ## Figure: two gradients of the same image
 #
-# Left and middle: where the two losses pull (size of the gradient). The pull of L1 is the same everywhere and changes only its
-# sign; SSIM adds strength, and varies. The Laplacian pulls in fine grain, and not at all beside the instrument, where
-# no band value is valid. (Its scale is a quarter of the other one, as its force is.) Right: what $\lambda_{\mathrm{lap}}$ becomes for other weights $w$ of SSIM. The published 0.83 belongs to a small $w$.
+# Left and middle: the absolute gradients of the two losses. The gradient of L1 has the same size everywhere and changes
+# only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Beside the
+# instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.) Right:
+# $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. The published 0.83 corresponds to a small $w$.
 
 # %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])
@@ -119,7 +123,7 @@ rgb, lap = views[8]
 top = np.quantile(np.abs(rgb), 0.99)
 for panel, values, title in (
     (axes[1], rgb, "$|g|$ photometric"),
-    (axes[2], calibration.lambda_lap * lap / r, "$|g|/r$ detail, calibrated"),
+    (axes[2], calibration.lambda_lap * lap / r, "$|g|/r$ Laplacian, calibrated"),
 ):
     panel.imshow(np.abs(values).mean(axis=0), cmap="magma", vmin=0, vmax=top)
     panel.set_title(title)
@@ -136,8 +140,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: $\lambda_{\mathrm{lap}}$ is a constant of training. What the calibration measures **are** reverse passes, those of
-# {doc}`09_laplacian_pyramid` and {doc}`10_base_losses`, so these must be right:
+# There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is a constant of training. The calibration itself measures
+# reverse passes, those of {doc}`09_laplacian_pyramid` and {doc}`10_base_losses`. The next cell checks them:
 
 # %%
 with one_thread():
@@ -149,8 +153,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## When it cannot work
 #
-# A view with $g_{\mathrm{rgb}}=0$ or a value that is not finite is dropped and named. If no view is left, or the median is 0, there is an
-# error with the table of all views, never an infinite weight.
+# A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and named. If no view is left, or if
+# the median is 0, an error with the table of all views is raised. The weight is never infinite.
 
 # %%
 assert calibrate([*sizes, ("perfect", 0.0, 0.0), ("broken", np.nan, 1.0)], r).lambda_lap == calibration.lambda_lap
@@ -165,8 +169,8 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 # %% [markdown]
 # ## Exercise
 #
-# Make every error of the render half as large. Does the calibrated weight change, for $w=0$? Think of what the gradient of a mean of
-# absolute values depends on.
+# Make every error of the render half as large. Does the calibrated weight change for $w=0$? Consider what the gradient
+# of a mean of absolute values depends on.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Not at all. The gradient of a mean of absolute values depends on how many residuals are not zero, not on how large they

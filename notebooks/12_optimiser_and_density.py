@@ -13,17 +13,19 @@
 # %% [markdown]
 # # 12. The optimiser and density control
 #
-# Gradients are turned into steps by Adam, with one rate per kind of parameter. And every hundred iterations the number of
-# Gaussians itself is adapted: more where the picture pulls hard, fewer where they have faded.
+# Adam turns gradients into steps, with one rate per kind of parameter. Every hundred iterations density control adapts
+# the number of Gaussians: it adds Gaussians where the screen gradient is large and removes Gaussians whose opacity is
+# small.
 #
-# Equations {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of {doc}`/specification/b11_density`.
+# The equations are {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of
+# {doc}`/specification/b11_density`.
 
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.config import PAPER, DensityConfig
-from endotsr.fitting.adam import adam_state, adam_step, adam_update
+from endotsr.fitting.adam import adam_state, adam_step, adam_update, regather
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.scene.density_control import DensityStatistics, densify, empty_statistics, gather_statistics
@@ -45,7 +47,7 @@ rng = np.random.default_rng(12)
 # \end{aligned}
 # $$
 #
-# $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
+# The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
 
 # %% tags=["transcription"]
 beta_1, beta_2, epsilon = 0.9, 0.999, 1e-15
@@ -79,8 +81,9 @@ for k in (1, 2, 3):
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
-# **Size does not matter, sign does.** The first step is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 or of $10^{-10}$. With
-# $\epsilon=10^{-15}$ even rounding noise moves a parameter by a full step. That is why every sum in the package has a fixed order.
+# **The first step depends on the sign only.** It is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 as for one of
+# $10^{-10}$. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a full step. Every sum in the package
+# therefore has a fixed order.
 
 # %%
 for size in (1.0, 1e-10):
@@ -91,11 +94,12 @@ for size in (1.0, 1e-10):
 # %% [markdown]
 # ## The rates
 #
-# Position, deformation and residuals decay exponentially to $\varphi=0.01$ of their start; the residuals begin at $K_s$:
+# The rates of position, deformation and residuals decay exponentially to $\varphi=0.01$ of their start. Those of the
+# residuals start at $K_s$:
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
-# \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
+# \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
 # $$
 
 
@@ -121,16 +125,17 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # %% [markdown]
 # ## Density control
 #
-# Where the image pulls a Gaussian hard across the screen, one Gaussian does the work of two. The measure is the mean gradient by its
-# screen centre, in units of normalised device coordinates, over the views in which it is visible:
+# A large gradient by the screen centre of a Gaussian indicates that one Gaussian covers a region that needs two. The
+# statistic is the mean norm of this gradient, in units of normalised device coordinates, over the views in which the
+# Gaussian is visible:
 #
 # $$
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}
 # $$
 #
-# Then, in this order: **prune** below opacity 0.005; **clone** a steep Gaussian whose largest semi-axis is at most $p\,e=0.1$ scene
-# units; **split** a larger one into two children of $1/1.6$ of its size, drawn from it. Children inherit everything; their
-# moments start at 0.
+# The rule has three steps, in this order. **Prune** Gaussians with an opacity below 0.005. **Clone** a candidate whose
+# largest semi-axis is at most $p\,e=0.1$ scene units. **Split** a larger candidate into two children of $1/1.6$ of its
+# size, whose positions are drawn from it. Children inherit all other parameters; their moments start at 0.
 
 
 # %% tags=["transcription"]
@@ -183,8 +188,7 @@ np.testing.assert_allclose(statistics.gradient_sum / np.maximum(statistics.visit
 # %%
 rule = DensityConfig(gradient_threshold=float(np.quantile(steep, 0.6)))
 extent, p = 10.0, rule.dense_fraction
-adam = adam_state(arrays(gaussians))
-after = densify(gaussians, adam, statistics, rule, np.random.default_rng(5), extent)
+after = densify(gaussians, statistics, rule, np.random.default_rng(5), extent)
 alive = 1 / (1 + np.exp(-gaussians.opacity_logit)) >= rule.prune_opacity
 candidate = alive & (steep >= rule.gradient_threshold)
 small = np.exp(gaussians.log_scale).max(axis=0) <= p * extent
@@ -192,6 +196,12 @@ to_clone, to_split = np.flatnonzero(candidate & small), np.flatnonzero(candidate
 assert (after.pruned, after.cloned, after.split) == (np.sum(~alive), len(to_clone), len(to_split))
 assert min(after.pruned, after.cloned, after.split) > 0, "the example shows all three"
 survivors = np.flatnonzero(alive & ~np.isin(np.arange(N), to_split))
+adam = adam_state(arrays(gaussians))
+adam.first["position"] += np.arange(1.0, N + 1)
+regather(adam, arrays(gaussians), after.plan.source, after.plan.survivors)  # moments follow; fresh ones start at 0
+np.testing.assert_array_equal(
+    adam.first["position"][0], [*(survivors + 1.0), *np.zeros(len(to_clone) + 2 * len(to_split))]
+)
 np.testing.assert_array_equal(after.gaussians.position[:, : len(survivors)], gaussians.position[:, survivors])
 np.testing.assert_array_equal(
     after.gaussians.position[:, len(survivors) :][:, : len(to_clone)], gaussians.position[:, to_clone]
@@ -208,7 +218,7 @@ for column, parent in enumerate(to_split):
         np.testing.assert_allclose(after.gaussians.log_scale[:, at], log_scale, rtol=1e-12)
 
 # %% [markdown]
-# ## A picture: rates over a run, and one act of density control
+# ## Figure: rates over a run, and one step of density control
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1])
@@ -250,9 +260,9 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are by-products of compositing, before the
-# projection adds its share: they say how hard the image pulls, whatever the parameters do with it. So the pair to check is
-# that of {doc}`08_compositing`, block `mean2d`.
+# Adam and density control are not differentiated; they **use** reverse passes. $g_u,g_v$ are results of the reverse
+# pass of compositing, before that of the projection. The pair to check is therefore that of {doc}`08_compositing`,
+# block `mean2d`.
 
 # %%
 with one_thread():
@@ -263,8 +273,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and goes on. How large is the first update of a child born at
-# $k=600$, in units of $\eta$? And when the count is very large?
+# A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and continues. How large is the first update
+# of a child added at $k=600$, in units of $\eta$? How large is it when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and the corrections no longer make up for it.

@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 13. The simulated scene, and where the Gaussians start
 #
-# No real sequence tells its true motion, its true depth behind the instrument or its true light. The simulator does: a sheet of tissue
-# given by a formula, under an endoscope, with each effect on a switch. It also shows how the first Gaussians are made.
+# For a real sequence the true motion, the true depth behind the instrument and the true light are unknown. The
+# simulator provides them: it renders a sheet of tissue given by a formula, under an endoscope, and each effect has a
+# switch. This notebook also shows how the first Gaussians are made.
 #
-# Equation {eq}`eq-b12` of {doc}`/specification/b12_initialisation`.
+# The equation is {eq}`eq-b12` of {doc}`/specification/b12_initialisation`.
 
 # %%
 import os
@@ -40,9 +41,9 @@ camera = sequence.cameras[0]
 # ## The sheet
 #
 # A material point has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
-# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane waves and, for each motion $k$, a time
-# course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction $\mathbf v_k$. Which point a pixel shows is found by Newton's method,
-# to $10^{-10}$ mm.
+# $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane
+# waves and, for each motion $k$, a time course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction
+# $\mathbf v_k$. Which point a pixel shows is found by Newton's method, to $10^{-10}$ mm.
 
 
 # %% tags=["transcription"]
@@ -75,7 +76,8 @@ for index in (0, 5, 11):
 # %% [markdown]
 # ## Each effect is a switch
 #
-# With all effects off, all frames are equal. With one on, the difference between two frames is that effect and nothing else.
+# With all effects off, all frames are equal. With one effect on, the difference between two frames is that effect
+# alone.
 
 # %% tags=["hide-input"]
 tiny = SimulatorSettings(width=64, height=51, frames=8)
@@ -101,10 +103,10 @@ for panel, effect in zip(axes.flat, EFFECTS):
 plt.show()
 
 # %% [markdown]
-# ## A picture: frames, true depth, true motion
+# ## Figure: frames, true depth, true motion
 #
-# The flow is what optical flow methods look for; here it is known, behind the instrument too. The lower right panel follows
-# single points over the clip: breathing moves all of them, the beat and the pull only some.
+# Optical flow methods estimate the flow; here it is known, also behind the instrument. The lower right panel follows
+# single points over the clip. Breathing moves all of them; the beat and the pull move only some.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 4, figsize=(14, 5.6), layout="constrained")
@@ -146,7 +148,8 @@ plt.show()
 # $$
 #
 # with the colour of the pixel, $h_0=(rgb-\tfrac12)/Y_{00}$, opacity 0.1, no rotation, and three equal log-scales
-# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest other points.
+# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest
+# other points.
 
 
 # %% tags=["transcription"]
@@ -193,8 +196,8 @@ assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
 # %% [markdown]
 # ## The reverse pass
 #
-# Nothing here is differentiated. What makes the start a good one is that lifting and projecting obey the same rule of pixel
-# centres; the pair that depends on it is the projection.
+# Initialisation is not differentiated. The initial points are accurate because back-projection and projection use the
+# same rule for pixel centres. The pair that depends on this rule is the projection.
 
 # %%
 with one_thread():
@@ -205,7 +208,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# Held-out frames contribute nothing to the start. How would you find out whether that is true of a program you cannot read?
+# Held-out frames contribute nothing to the initial Gaussians. How would you test whether that is true of a program
+# whose source you cannot read?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Change the held-out frames to anything, and see whether one bit of the result moves.

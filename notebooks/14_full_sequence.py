@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 14. From one frame to a full sequence
 #
-# All stages are in place. We fit one frame, then a whole clip; look at frames that the training has never seen; and take the
-# components of the paper out one by one.
+# The previous notebooks explain all stages. This notebook fits one frame and then a whole clip, evaluates frames that
+# were not used in training, and removes the components of the paper one by one.
 #
-# Equation {eq}`eq-6` of {doc}`/specification/06_objective`; {eq}`eq-m1` and {eq}`eq-m2` of {doc}`/specification/metrics`.
+# The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
+# {doc}`/specification/metrics`.
 
 # %%
 import base64
@@ -35,7 +36,8 @@ from endotsr.config import DEMO, with_iterations
 from endotsr.evaluation.baselines import BASELINES
 from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
 from endotsr.fitting.model import render_at
-from endotsr.fitting.trainer import new_training, training_step, workshop
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
@@ -63,17 +65,18 @@ print(f"{sequence.count} frames of {sequence.width}x{sequence.height}; held out:
 # \end{aligned}
 # $$
 #
-# The terms are those of {doc}`10_base_losses`, {doc}`09_laplacian_pyramid` and {doc}`04_motion_and_prior`. The detail weight rises
-# from iteration $a$ to $b$:
+# The terms are those of {doc}`10_base_losses`, {doc}`09_laplacian_pyramid` and {doc}`04_motion_and_prior`. The
+# Laplacian weight is a ramp from iteration $a$ to $b$:
 #
 # $$
 # \lambda_{\mathrm{lap}}(i) = \lambda_{\mathrm{lap}}\,\min\!\left(1,\max\!\left(0,\frac{i-a}{b-a}\right)\right).
 # $$
 #
-# The rest of the iteration is bookkeeping: draw a view, render, reverse, one Adam step ({doc}`12_optimiser_and_density`).
+# The other steps of an iteration are: draw a view, render, reverse, one Adam step ({doc}`12_optimiser_and_density`).
+# {doc}`/one_iteration` describes them all.
 #
-# The transcription takes the terms that an iteration reports and forms the sum by the text. It is compared with **every**
-# iteration of the run below.
+# The transcription takes the terms that an iteration reports and forms the sum of the text. It is compared with
+# **every** iteration of the run below.
 
 
 # %% tags=["transcription"]
@@ -123,7 +126,7 @@ def score(state, shop, frames, **components):
 # %% [markdown]
 # ## One frame
 #
-# The first training frame alone. Nothing moves, so everything that moves is off.
+# This run uses the first training frame alone. Nothing moves, so every component of motion is off.
 
 # %%
 first = int(sequence.train_index[0])
@@ -138,7 +141,7 @@ others = sequence.train_index[len(sequence.train_index) // 2 :]
 print(
     f"the fitted frame: {score(one_state, one_shop, [first]):.1f} dB; later frames: {score(one_state, one_shop, others):.1f} dB"
 )
-assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, "it knows one moment only"
+assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, "it was fitted to one time only"
 
 # %% [markdown]
 # ## The full sequence
@@ -147,8 +150,8 @@ assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) 
 state, shop, log = train(sequence, config)
 for entry in log:
     np.testing.assert_allclose(entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12)
-born = config.training.residual_activation
-assert "matern_penalty" not in log[born - 1] and log[born]["matern_penalty"] == 0.0, (
+activation = config.training.residual_activation
+assert "matern_penalty" not in log[activation - 1] and log[activation]["matern_penalty"] == 0.0, (
     "the residuals start at zero, one iteration after K_s"
 )
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
@@ -167,7 +170,7 @@ for name, label in (
     there = [e for e in log if name in e]
     values = np.array([1 - e[name] if name == "ssim" else e[name] for e in there])
     axes[0].semilogy([e["iteration"] for e in there][4:-4], np.maximum(smooth(values), 1e-9)[4:-4], label=label)
-for milestone, label in ((config.loss.laplacian_from, "detail begins"), (born, "A and S are born")):
+for milestone, label in ((config.loss.laplacian_from, "Laplacian loss begins"), (activation, "A and S activated")):
     axes[0].axvline(milestone, color="0.7", lw=1)
     axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
@@ -186,7 +189,8 @@ plt.show()
 # %% [markdown]
 # ## Held-out frames: the numbers
 #
-# $\hat x,x$ are render and truth with excluded pixels 0, $n$ counts tissue pixels, $s$ is the map of {eq}`eq-b7`.
+# $\hat x,x$ are render and truth with excluded pixels set to 0. $n$ is the number of tissue pixels, and $s$ is the map
+# of {eq}`eq-b7`.
 #
 # $$
 # \begin{aligned}
@@ -237,9 +241,10 @@ for k in sequence.test_index:
 # %% [markdown]
 # ## Held-out frames: the pictures
 #
-# Frames that took part in nothing: not in the losses, not in the initial points, not in the statistics of the atoms. Below:
-# truth, render, error over tissue, and what each residual does to the picture. S adds little here: its rate is a tenth of that of
-# the deformation, and a short run gives it few steps.
+# Held-out frames are used in no part of training: not in the losses, not for the initial points, not in the statistics
+# of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each residual on the
+# image. The effect of S is small here, because its rate is a tenth of that of the deformation and a short run has few
+# steps.
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -272,8 +277,8 @@ for row, k in zip(axes, shown):
 plt.show()
 
 # %% [markdown]
-# And moving, from the first to the last frame and half-way between any two: observed frames on the left, the render on the
-# right, with a red bar while the moment is that of a held-out frame.
+# The animation runs from the first to the last frame and includes the times half-way between frames. Observed frames
+# are on the left and the render is on the right. A red bar marks the times of held-out frames.
 
 # %% tags=["hide-input"]
 times = np.arange(2 * sequence.count - 1) / (2 * sequence.count)
@@ -296,9 +301,9 @@ SimpleNamespace(
 # %% [markdown]
 # ## Ablation
 #
-# Each component out, everything else equal: the same seed, the same schedule. Beside them the answers that need no model. Be
-# honest with small differences: one seed of a short run says little. On a slow clip the blend of two neighbouring frames is
-# hard to beat; a reconstruction also gives depth, and any other moment and view.
+# Each component is removed in turn, with the same seed and the same schedule. The table also lists the baselines, which
+# need no model. Small differences are not significant: they come from one seed of a short run. On a slow clip the blend
+# of two neighbouring frames is a strong baseline. A reconstruction also gives depth, and any other time and view.
 
 # %% tags=["hide-input"]
 variants = {
@@ -330,16 +335,46 @@ axis.set(title="held-out PSNR over tissue", xlabel="dB", xlim=(min(scores.values
 plt.show()
 
 # %% [markdown]
+# ## From Python, in ten lines
+#
+# The stages above are the inside. From the outside, `import endotsr` is enough: the same training with a callback, a picture at
+# a time between two frames, the metrics of the held-out frames, and a run folder that the command line reads as well.
+
+# %%
+import tempfile
+
+import endotsr
+
+clip = endotsr.load_sequence("simulated", simulator={"width": 48, "height": 38, "frames": 16})
+losses = []
+run = endotsr.train(
+    clip,
+    preset="demo",
+    iterations=60,
+    initialisation={"first_frame_points": 900, "other_frame_points": 225},
+    on_iteration=lambda entry: losses.append(entry["loss"]),
+)
+view = run.render(time=0.37)
+metrics = run.evaluate()
+print(run, f"{metrics['held_out']['mean']['psnr_tissue']:.2f} dB on held-out tissue")
+assert view.colour.shape == (3, 38, 48) and view.depth.shape == view.opacity.shape == (38, 48)
+assert len(losses) == 60 and np.mean(losses[-10:]) < 0.7 * np.mean(losses[:10])
+with tempfile.TemporaryDirectory() as folder:
+    opened = endotsr.open_run(run.save(f"{folder}/run"))
+np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
+
+# %% [markdown]
 # ## The reverse pass
 #
-# The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. From there it runs
-# through compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection {eq}`eq-b3`, covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals
-# {eq}`eq-2` and {eq}`eq-3`, in that order: each stage of these notebooks, backwards. $\mathcal L_{\mathrm{msp}}$ adds to $g_C$ directly.
+# The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. It
+# continues through the reverse passes of compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection {eq}`eq-b3`,
+# covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and {eq}`eq-3`, in that order. The
+# gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
 #
 # ## The gradient check
 #
-# The whole chain as one function: ten groups of raw parameters in, one number out. One block per group here;
-# `endotsr gradcheck` probes the same pair in finer blocks.
+# The whole chain is checked as one function of ten groups of raw parameters with one number as its value. Here each
+# group is one block; `endotsr gradcheck` probes the same pair in finer blocks.
 
 # %%
 pair = all_pairs()["objective"]
@@ -359,8 +394,8 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# Take component A out of the **trained** model (`render_at(..., appearance=False)`), and compare with the model that was trained
-# without A. Which is better on the training frames? Why does an ablation need a training of its own?
+# Remove component A from the **trained** model (`render_at(..., appearance=False)`), and compare with the model that
+# was trained without A. Which is better on the training frames? Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The one trained without A: its other parameters have learned to do without (wrongly, by moving things). The difference

@@ -13,11 +13,13 @@
 # %% [markdown]
 # # 15. Hard cases
 #
-# Correct on random input is not correct. Each section below is an input that a plausible program gets wrong, named after the
-# mistake, with what must come out. It ends with the question that matters most: could our gradient check have failed?
-# The full list, with a bound and a test for each, and the naive formulas executed in both precisions: {doc}`/hard_cases`.
+# A program that is correct on random input can still be wrong. Each section below has an input that breaks plausible
+# programs, is named after the mistake, and states the required result. The last section asks whether the gradient check
+# can fail. {doc}`/hard_cases` has the full list with a bound and a test for each case, and the naive formulas evaluated
+# in both precisions.
 #
-# Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears once more, because its **form** is what saves the first case.
+# Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears again, because its **form** is what makes the
+# first case accurate.
 
 # %%
 import matplotlib.pyplot as plt
@@ -70,9 +72,9 @@ small = Camera(np.eye(3), np.zeros(3), 20.0, 20.0, 8.0, 6.0, 16, 12)
 # %% [markdown]
 # ## The needle: digits lost in the inverse matrix
 #
-# Seen at an angle, a needle 1000 pixels long has $a\approx b\approx c\approx5\cdot10^5$. The textbook writes
-# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$: a difference of numbers near $10^{12}$, divided by $3\cdot10^5$, that should give 1. The specification writes a sum of
-# squares:
+# Seen at an angle, a needle of 1000 pixels has $a\approx b\approx c\approx5\cdot10^5$. The textbook form is
+# $q=(c\,d_x^2-2b\,d_xd_y+a\,d_y^2)/\det$: a difference of numbers near $10^{12}$, divided by $3\cdot10^5$, that should
+# give 1. The specification writes a sum of squares:
 #
 # $$
 # \begin{aligned}
@@ -121,10 +123,10 @@ assert np.abs(lost / truth - 1).max() > 0.01
 np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)  # the same formula, while digits last
 
 # %% [markdown]
-# ## Equal depths: an order that depends on chance
+# ## Equal depths: an undefined order
 #
-# Stereo depth is often a whole number, so ties are common. Equal $z$ keep the order of their index. Distinct $z$: the order of the
-# input does not matter, bit by bit.
+# Stereo depth is often a whole number, so equal depths are common. Gaussians with equal $z$ keep the order of their
+# index. With distinct $z$, the image is bitwise independent of the order of the input.
 
 # %%
 tie = made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
@@ -136,8 +138,8 @@ shuffled = Scene(*(part[..., shuffle].copy() for part in many[:5]))
 assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].colour)
 
 # %% [markdown]
-# **Crossing depths.** Two Gaussians pass each other in depth: the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$, and no derivative sees it.
-# That is why the checker refuses differences across a change of order.
+# **Crossing depths.** When two Gaussians cross in depth, the image jumps by $\alpha_1\alpha_2(rgb_1-rgb_2)$. The
+# derivative does not contain this jump. The checker therefore refuses differences across a change of order.
 
 
 # %%
@@ -153,7 +155,8 @@ np.testing.assert_allclose(jump, alpha**2 * np.array([1.0, 0.0, -1.0]), atol=1e-
 # %% [markdown]
 # ## Behind the camera, on the near plane, at the camera
 #
-# No contribution, gradients exactly 0, and the image bitwise that of the scene without them. Not "very small": exactly.
+# Such Gaussians do not contribute. Their gradients are exactly 0, not merely small, and the image is bitwise that of
+# the scene without them.
 
 # %%
 plain = made([[0.1], [0.0], [2.0]])
@@ -167,9 +170,9 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
     )
 
 # %% [markdown]
-# ## Nothing at all
+# ## Empty input
 #
-# No Gaussians, or an image of one pixel: the background, and no gradient to anything.
+# Without Gaussians the image is the background, and there is no gradient. An image of one pixel is valid.
 
 # %%
 nothing = made(np.zeros((3, 0)))
@@ -180,8 +183,8 @@ assert render_reverse(out.colour, out.depth, None, saved).position.shape == (3, 
 # %% [markdown]
 # ## Two thousand faint sheets
 #
-# Equal sheets of opacity $\alpha$ in colour $c$: the image must be $c\,(1-E)$ with $E=(1-\alpha)^n$. The opacity image is the **sum** of
-# weights: formed as $1-T_n$ it would be 0 in float32 for one sheet of $\alpha=10^{-8}$.
+# For equal sheets of opacity $\alpha$ and colour $c$, the image must be $c\,(1-E)$ with $E=(1-\alpha)^n$. The opacity
+# image is the **sum** of the weights. In float32, $1-T_n$ would be 0 for one sheet of $\alpha=10^{-8}$.
 
 # %%
 n, faint = 2000, 1e-3
@@ -197,8 +200,8 @@ assert render(one_sheet, small)[0].opacity[6, 8] > 0.99e-8
 # %% [markdown]
 # ## NaN under the instrument, and an empty level
 #
-# What lies under the mask is selected away, never multiplied: $0\cdot\mathrm{NaN}$ is NaN. And a mask so full that a level of the
-# pyramid has no valid value gives that level loss 0, not a mean of nothing.
+# Values under the mask are removed by selection, never by multiplication, because $0\cdot\mathrm{NaN}$ is NaN. If the
+# mask leaves a level of the pyramid without a valid value, that level has loss 0, not the mean of an empty set.
 
 # %%
 image, observed = rng.uniform(size=(3, 40, 48)), rng.uniform(size=(3, 40, 48))
@@ -239,7 +242,8 @@ assert np.isfinite(loss) and np.isfinite(laplacian_loss_reverse(1.0, saved)).all
 # %% [markdown]
 # ## The same scene in metres, millimetres, micrometres
 #
-# A number with a unit hidden in the code (a fixed near plane, an epsilon added to $z$) shows when the unit changes.
+# A constant with a hidden unit in the code (a fixed near plane, an epsilon added to $z$) becomes visible when the unit
+# changes.
 
 # %%
 reference = render(many, small, PAPER)[0]
@@ -250,7 +254,7 @@ for factor in (1e-3, 1e3):
     np.testing.assert_allclose(again.depth, reference.depth * factor, rtol=1e-9, atol=1e-9 * factor)
 
 # %% [markdown]
-# ## A picture of three of them
+# ## Figure: three of these cases
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.7), layout="constrained")
@@ -287,8 +291,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
-# We hand the checker a right reverse pass, and then four wrong ones: a flipped sign, one part in a thousand too much, a zero
-# gradient, one Gaussian forgotten. It must refuse all four, and say where.
+# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by one
+# part in a thousand, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
 
 # %%
 pair = all_pairs()["matern_penalty"]
@@ -320,7 +324,7 @@ with one_thread():
         assert report.passed == (name == "right")
 
 # %% [markdown]
-# And the whole render, in float64 against differences and in float32 against float64:
+# The next cell checks the whole render, in float64 against differences and in float32 against float64:
 
 # %%
 with one_thread():
@@ -333,8 +337,8 @@ assert report.passed and precision.passed
 # %% [markdown]
 # ## Exercise
 #
-# A quaternion of exactly 0 is not a rotation. The deformation model can reach it, because it adds to the raw quaternion. What
-# should the image be, and the gradient? And why is "add a small epsilon to the norm" a worse answer?
+# A quaternion of exactly 0 is not a rotation. The deformation model can produce it, because it adds to the raw
+# quaternion. What should the image be, and what the gradient? Why is it worse to add a small epsilon to the norm?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The identity rotation and no gradient: a defined result. With an epsilon the "rotation" matrix shrinks to something that is

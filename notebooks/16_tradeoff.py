@@ -13,10 +13,11 @@
 # %% [markdown]
 # # 16. Accuracy against time
 #
-# A Gaussian never ends, and light behind an opaque stack never quite dies out. A renderer that wants to be fast cuts both off. This
-# notebook measures what that costs and what it gains, on a scene small enough to render exactly.
+# A Gaussian has unbounded support, and the transmittance behind an opaque stack never reaches 0. A fast renderer
+# truncates both. This notebook measures the error and the gain in time, on a scene small enough to render exactly.
 #
-# Equation {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/accuracy_against_time` shows the same for every dial.
+# The equation is {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/tradeoff` shows the same
+# measurement for every setting.
 
 # %%
 import os
@@ -48,7 +49,7 @@ study = StudyScene(
 reference = frame(prepare(study, reference_setting(study)))[0]
 
 # %% [markdown]
-# ## What is cut off
+# ## What is truncated
 #
 # The blend of a pixel, front to back:
 #
@@ -61,8 +62,9 @@ reference = frame(prepare(study, reference_setting(study)))[0]
 # \end{aligned}
 # $$
 #
-# Exactly, every Gaussian contributes. A renderer skips $\alpha_k<\alpha_{\mathrm{cut}}$, and ends the pixel before $T_{k+1}$ falls
-# below $T_{\mathrm{stop}}$. Here both are written out, with a count of the pairs whose $\alpha$ had to be known: the **visits**.
+# By definition every Gaussian contributes. A renderer skips $\alpha_k<\alpha_{\mathrm{cut}}$, and ends the pixel before
+# $T_{k+1}$ falls below $T_{\mathrm{stop}}$. The next cell writes out both, and counts the pairs of pixel and Gaussian
+# whose $\alpha$ is evaluated: the **visits**.
 
 # %%
 scene, _ = scene_at(gaussians, study.spectral, model, time)
@@ -109,12 +111,13 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 # %% [markdown]
 # ## How large the error can be, and how the work grows
 #
-# At a pixel, what is skipped are many Gaussians, each with $\alpha<\alpha_{\mathrm{cut}}$. In front of an opaque scene only a few of them
-# lie on the rim of their ellipse at one pixel, so the sum stays within a few times $\alpha_{\mathrm{cut}}$: five, on a surface. Where hundreds
-# of faint Gaussians overlap it is more.
+# At a pixel many Gaussians are skipped, each with $\alpha<\alpha_{\mathrm{cut}}$. On an opaque surface only a few of
+# them are close to the border of their ellipse at one pixel. The error then stays within a few times
+# $\alpha_{\mathrm{cut}}$; on a surface the factor is five. Where hundreds of faint Gaussians overlap, it is larger.
 #
-# $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels: the visits
-# grow with the **logarithm** of the accuracy. A thousand times the accuracy costs the same number of visits again and again.
+# $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
+# $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow with the **logarithm** of the
+# accuracy. Each factor of a thousand in accuracy adds the same number of visits.
 
 # %%
 cutoffs = 10.0 ** -np.arange(2, 11)
@@ -141,10 +144,11 @@ axes[1].set(xlabel="cutoff", ylabel="visits", title="The work follows its logari
 plt.show()
 
 # %% [markdown]
-# ## Which settings are worth having
+# ## The front of settings
 #
-# Cutoff, stop and precision together. A setting is **dominated** if another costs no more and errs no more, and is not its equal. What
-# nothing dominates is the front: whoever knows a budget finds the setting there.
+# Cutoff, stop and precision vary together. A setting is **dominated** if another setting takes no more time, has no
+# larger error, and is not equal to it in both. The settings that are not dominated form the front. The best setting for
+# a given budget is on the front.
 
 # %%
 sweep = {
@@ -177,7 +181,8 @@ plt.show()
 # %% [markdown]
 # ## Exercise
 #
-# You know the visits at the cutoffs $10^{-3}$ and $10^{-5}$. How many do you expect at $10^{-7}$, and why is the answer a little too large?
+# The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you expect at $10^{-7}$, and why is this
+# estimate slightly too large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The visits are a straight line in ln(1 / cutoff): as many more as between the first two. It is a little too large because an ellipse

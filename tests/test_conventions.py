@@ -62,7 +62,7 @@ def test_every_forward_has_a_reverse_directly_below_it(file, name):
 def test_every_forward_is_named_by_a_pair(file, name):
     dotted = f"{module_name(file)}.{name}"
     functions = {pair.function for pair in all_pairs().values()}
-    assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register a Pair that names it"
+    assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register a stage that names it"
 
 
 def test_every_pair_names_a_function_of_the_package():

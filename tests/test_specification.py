@@ -14,7 +14,7 @@ SPECIFICATION = ROOT / "docs" / "specification"
 PACKAGE = ROOT / "reference" / "endotsr"
 
 PAPER_LABELS = ["1", "1b", *"234567"]
-BASE_LABELS = [f"B{k}" for k in range(1, 13)]
+BASE_LABELS = [f"B{k}" for k in range(1, 14)]
 METRIC_LABELS = ["M1", "M2", "M3"]
 LABELS = [*PAPER_LABELS, *BASE_LABELS, *METRIC_LABELS]
 

@@ -1,6 +1,6 @@
 """The map of the book: for each equation its functions, reverse pass, gradient check, golden cases and notebooks.
 
-Everything is read from the pair registry, `golden/cases` and the notebooks. Only what no pair can say is written here:
+Everything is read from the registry of stages, `golden/cases` and the notebooks. Only what no stage can say is here:
 the functions of equations without a derivative, why they have none, and which tests check them instead.
 """
 
@@ -20,7 +20,7 @@ PARTS = {"b5b": "b5", "b5c": "b5"}
 
 
 class Undifferentiated(NamedTuple):
-    """An equation without a pair."""
+    """An equation without a reverse pass."""
 
     functions: tuple[str, ...]
     reason: str  # why there is no reverse pass

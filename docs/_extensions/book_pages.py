@@ -84,7 +84,7 @@ def equation_page() -> str:
         "# Map of the equations",
         "",
         "Where each equation is computed, differentiated, checked, pinned by stored numbers, and explained. The table",
-        "is made from the registry of pairs, the golden cases and the notebooks; the number of cases is in brackets.",
+        "is made from the registry of stages, the golden cases and the notebooks; the number of cases is in brackets.",
         "",
         "| Equation | Function | Reverse | Check | Golden cases | Notebook |",
         "|---|---|---|---|---|---|",

@@ -12,7 +12,8 @@ import json
 import sys
 from pathlib import Path
 
-from endotsr.cli.evaluate import PUBLISHED
+from endotsr.evaluation.run import PUBLISHED
+from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 
 FOLDER = Path(__file__).parent
@@ -46,11 +47,15 @@ def rows(records: dict[str, dict]) -> list[tuple[str, dict]]:
 
 def table(records: dict[str, dict]) -> str:
     """Held-out means as Markdown, and one line on each run."""
-    lines = ["| Held-out frames | " + " | ".join(c[1] for c in COLUMNS) + " |", "|---" * (len(COLUMNS) + 1) + "|"]
-    for label, values in rows(records):
-        cells = [f.format(values[key]) if values.get(key) is not None else "-" for key, _, f in COLUMNS]
-        lines.append(f"| {label} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n\n" + "\n".join(about(name, r) for name, r in records.items())
+    cells = [
+        [label, *(f.format(values[key]) if values.get(key) is not None else "-" for key, _, f in COLUMNS)]
+        for label, values in rows(records)
+    ]
+    return (
+        markdown(["Held-out frames", *(c[1] for c in COLUMNS)], cells)
+        + "\n\n"
+        + "\n".join(about(name, r) for name, r in records.items())
+    )
 
 
 def about(name: str, metrics: dict) -> str:

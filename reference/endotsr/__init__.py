@@ -1,11 +1,76 @@
 """endotsr: the reference implementation of Endo-TSR on the CPU.
 
-Data walks through the package in the order of the paper. `equations` holds the paper, one equation a
-module; `splatting` the rasteriser; `losses` the base losses; `scene` what is fitted; `fitting` the
-training; `sequences` and `simulator` what is read; `evaluation` what is measured. Every forward pass
-`<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
+Ten lines of Python load a sequence, train on it and render: see `endotsr.api`. The names in `__all__` are stable.
+Importing this package imports nothing heavy; a name is imported when it is first used.
 
-Importing this package imports nothing heavy; import the room you need.
+The rooms of the package follow the order of the paper:
+
+    equations              the paper, one equation a module
+    splatting, losses      the rasteriser and the base losses
+    scene, fitting         the Gaussians, and their training
+    sequences, simulator   input: folders, or simulated sequences with known truth
+    evaluation             metrics and baselines
+
+Every forward pass `<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
 """
 
+TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part of this one
+if TYPE_CHECKING:
+    from typing import Any
+
+    from endotsr.api import LoadedSequence, Run, StopTraining, load_sequence, make_config, open_run, train
+    from endotsr.config import Config
+    from endotsr.errors import CalibrationError, InputError
+    from endotsr.sequences.sequence import Sequence
+    from endotsr.splatting.camera import Camera
+    from endotsr.splatting.render import RenderOut
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "CalibrationError",
+    "Camera",
+    "Config",
+    "InputError",
+    "LoadedSequence",
+    "RenderOut",
+    "Run",
+    "Sequence",
+    "StopTraining",
+    "__version__",
+    "load_sequence",
+    "make_config",
+    "open_run",
+    "train",
+]
+
+_MODULES = {
+    "CalibrationError": "endotsr.errors",
+    "Camera": "endotsr.splatting.camera",
+    "Config": "endotsr.config",
+    "InputError": "endotsr.errors",
+    "LoadedSequence": "endotsr.api",
+    "RenderOut": "endotsr.splatting.render",
+    "Run": "endotsr.api",
+    "Sequence": "endotsr.sequences.sequence",
+    "StopTraining": "endotsr.api",
+    "load_sequence": "endotsr.api",
+    "make_config": "endotsr.api",
+    "open_run": "endotsr.api",
+    "train": "endotsr.api",
+}
+
+
+def __getattr__(name: str) -> "Any":
+    """A public name, imported at its first use."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_MODULES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

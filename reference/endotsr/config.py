@@ -8,14 +8,14 @@ import math
 import re
 import tomllib
 from pathlib import Path
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import msgspec
 
 from endotsr.errors import InputError
 
-Section = TypeVar("Section", bound=msgspec.Struct)
+SectionType = TypeVar("SectionType", bound=msgspec.Struct)
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
@@ -23,11 +23,11 @@ Count = Annotated[int, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
 
 
-class _Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Common strictness of all sections."""
+class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A section of settings: frozen, fields by name only, unknown keys refused. The simulator's sections are too."""
 
 
-class SequenceConfig(_Section, frozen=True, kw_only=True):
+class SequenceConfig(Section, frozen=True, kw_only=True):
     """What is read from an EndoNeRF folder."""
 
     masks: Literal["masks", "gt_masks"] = "masks"
@@ -35,7 +35,7 @@ class SequenceConfig(_Section, frozen=True, kw_only=True):
     excluded_value: Literal["white", "black"] = "white"
     """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
     allow_tissue_fraction: bool = False
-    """accept a tissue share below 5 % or of exactly 100 %, and masks that the pictures or the other masks contradict"""
+    """accept a tissue fraction below 5 % or of exactly 100 %, and masks that the pictures or other masks contradict"""
     frames: str = ""
     """frame range start:stop[:step] in Python slice notation; empty = all"""
     scale: Positive = 1.0
@@ -48,7 +48,7 @@ class SequenceConfig(_Section, frozen=True, kw_only=True):
     """per-frame clip of the non-zero depth prior, percent"""
 
 
-class ModelConfig(_Section, frozen=True, kw_only=True):
+class ModelConfig(Section, frozen=True, kw_only=True):
     """What the model is made of. A component that is off allocates nothing and runs nothing."""
 
     appearance: bool = True
@@ -59,6 +59,8 @@ class ModelConfig(_Section, frozen=True, kw_only=True):
     """component L: mask-propagating Laplacian detail loss, eq. (5)"""
     deformation: bool = True
     """flexible deformation model; off = a rigid scene"""
+    exposure: bool = False
+    """gain and bias of each colour channel for every training frame, eq. (B13)"""
     basis: Literal["quartic", "gaussian"] = "quartic"
     """FDM time basis: `quartic` is what the released code computes"""
     bases: PositiveCount = 17
@@ -79,7 +81,7 @@ class ModelConfig(_Section, frozen=True, kw_only=True):
     """l of the Matern-5/2 prior, normalised time"""
 
 
-class RasterConfig(_Section, frozen=True, kw_only=True):
+class RasterConfig(Section, frozen=True, kw_only=True):
     """The rasteriser preset used in training and rendering."""
 
     preset: Literal["paper", "legacy", "exact"] = "paper"
@@ -94,7 +96,7 @@ class RasterConfig(_Section, frozen=True, kw_only=True):
     """clamp of alpha; 1 = none"""
 
 
-class LossConfig(_Section, frozen=True, kw_only=True):
+class LossConfig(Section, frozen=True, kw_only=True):
     """Weights of the objective, eq. (6), and of the calibration, eq. (7)."""
 
     ssim_weight: Fraction = 0.1
@@ -123,7 +125,7 @@ class LossConfig(_Section, frozen=True, kw_only=True):
     """training views used by the calibration"""
 
 
-class OptimiserConfig(_Section, frozen=True, kw_only=True):
+class OptimiserConfig(Section, frozen=True, kw_only=True):
     """Adam and its learning rates. Decaying rates fall exponentially to `final_factor` of their start."""
 
     position: NonNegative = 1.6e-3
@@ -142,6 +144,8 @@ class OptimiserConfig(_Section, frozen=True, kw_only=True):
     """log-scale"""
     rotation: NonNegative = 0.001
     """quaternion"""
+    exposure: NonNegative = 1e-3
+    """log gain and bias of the exposures, decaying"""
     spectral_motion_factor: NonNegative = 0.1
     """translation residual C, times `deformation`, decaying"""
     appearance_factor: NonNegative = 31.25 / 16.0
@@ -160,7 +164,7 @@ class OptimiserConfig(_Section, frozen=True, kw_only=True):
     """skip the Adam step on densify iterations, as the released code does"""
 
 
-class DensityConfig(_Section, frozen=True, kw_only=True):
+class DensityConfig(Section, frozen=True, kw_only=True):
     """Clone, split and prune."""
 
     start: Count = 500
@@ -181,7 +185,7 @@ class DensityConfig(_Section, frozen=True, kw_only=True):
     """no clone or split beyond this count"""
 
 
-class InitialisationConfig(_Section, frozen=True, kw_only=True):
+class InitialisationConfig(Section, frozen=True, kw_only=True):
     """Back-projected training pixels."""
 
     first_frame_points: PositiveCount = 35_000
@@ -192,7 +196,7 @@ class InitialisationConfig(_Section, frozen=True, kw_only=True):
     """a pixel of another frame counts as moved when its depth differs by more, scene units"""
 
 
-class TrainingConfig(_Section, frozen=True, kw_only=True):
+class TrainingConfig(Section, frozen=True, kw_only=True):
     """Length, seed and bookkeeping of a run."""
 
     iterations: PositiveCount = 6000
@@ -204,7 +208,7 @@ class TrainingConfig(_Section, frozen=True, kw_only=True):
     time_jitter: NonNegative = 0.0
     """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
     bridge_fraction: Fraction = 0.0
-    """share of iterations at a time between two training frames, compared with either by its nearness in time"""
+    """fraction of iterations at a time between two training frames, compared with either by its nearness in time"""
     seed: Count = 0
     """seed of every random draw"""
     threads: Count = 0
@@ -215,7 +219,7 @@ class TrainingConfig(_Section, frozen=True, kw_only=True):
     """iterations between checkpoints"""
 
 
-class Config(_Section, frozen=True, kw_only=True):
+class Config(Section, frozen=True, kw_only=True):
     """All settings of a run."""
 
     preset: Literal["paper", "sharp", "demo"] = "paper"
@@ -247,7 +251,7 @@ MILESTONES = {
 
 
 def with_iterations(config: Config, iterations: int) -> Config:
-    """The same schedule stretched to `iterations`: every milestone of `MILESTONES` keeps its share of the run."""
+    """The same schedule stretched to `iterations`: every milestone of `MILESTONES` keeps its fraction of the run."""
     ratio = iterations / config.training.iterations
     changed = {}
     for section, names in MILESTONES.items():
@@ -281,7 +285,7 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
     return config
 
 
-def checked(data: dict[str, Any], kind: type[Section], where: str, prefix: str = "") -> Section:
+def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
     """A section from plain data, types and ranges checked. Raises InputError naming the key and what is allowed."""
     _refuse_non_finite(data, where, prefix)
     try:
@@ -350,7 +354,7 @@ def allowed_values(kind: Any) -> str:
     if origin is Literal:
         return ", ".join(map(str, arguments))
     if origin in (Union, UnionType):
-        return " or ".join(map(allowed_values, arguments))
+        return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
     if origin is tuple:
         return f"{len(arguments)} values, each {allowed_values(arguments[0])}"
     if origin is Annotated:
@@ -359,7 +363,7 @@ def allowed_values(kind: Any) -> str:
         return f"{allowed_values(arguments[0])} {words}"
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         return "a section of settings"
-    return {bool: "true, false", int: "an integer", float: "a number", str: "text"}[kind]
+    return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
 
 
 def _refuse_contradictions(config: Config, where: str) -> None:

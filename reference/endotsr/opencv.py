@@ -1,9 +1,9 @@
-"""The one importer of OpenCV: picture files, Canny edges, DIS optical flow and area resizing.
+"""The only module that imports OpenCV: picture files, Canny edges, DIS optical flow and area resizing.
 
-In and out are NumPy arrays in this project's conventions (RGB order, planar flow); OpenCV's own conventions (BGR,
-interleaved flow, one-dimensional arrays that differ between versions 4 and 5) end here. `cv2` is imported on
-first use, so that commands which read no picture start without it. Nothing that a golden vector records may depend on
-this module except the Canny edges, which take part in the smoothness loss as given data.
+Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
+(BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this module. `cv2` is
+imported on first use, so that commands which read no picture start without it. No golden vector may depend on this
+module, except through the Canny edges, which are an input of the smoothness loss.
 """
 
 import struct
@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-
-Array = NDArray[Any]
+from endotsr.kernels.arrays import Array
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
@@ -31,7 +30,7 @@ def _cv2() -> Any:
 
 
 def check_png_bytes(data: bytes, name: object) -> None:
-    """Refuse PNG bytes that a decoder might repair in silence: walks the chunks up to IEND and checks every CRC.
+    """Refuse PNG bytes that a decoder might silently repair: check the CRC of every chunk up to IEND.
 
     Raises InputError naming `name` if the signature, a chunk length, a checksum or the end chunk is wrong.
     """
@@ -79,8 +78,8 @@ def read_png(path: Path) -> Array:
 
     returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored; transparency is dropped
 
-    Raises:  InputError naming the file if it is missing, not a PNG, truncated or damaged. OpenCV decodes a cut file
-             into a half-grey picture without complaint, so the chunk structure is checked first.
+    Raises:  InputError naming the file if it is missing, not a PNG, truncated or damaged. OpenCV decodes a
+             truncated file into a half-grey picture without an error, so the chunk structure is checked first.
     """
     try:
         data = Path(path).read_bytes()
@@ -109,10 +108,10 @@ def write_png(path: Path, pixels: Array) -> None:
 
 
 def canny_edges(depth: Array) -> NDArray[np.bool_]:
-    """Edges of a rendered depth image, for the smoothness loss (equation B9). A constant: no gradient passes.
+    """Edges of a rendered depth image, for the smoothness loss (B9). They are constants: no gradient passes.
 
-    depth    (H, W) scene units; cut to 8 bits by saturation to [0, 255] and truncation (a depth of 300 is 255 and does
-             not wrap to 44); not-a-number counts as 0
+    depth    (H, W) scene units; converted to 8 bits by saturation to [0, 255] and truncation (a depth of 300 is 255 and
+             does not wrap to 44); not-a-number counts as 0
     returns  (H, W) bool, True on an edge; Sobel 3x3, |gx| + |gy|, thresholds 20 and 200
     """
     eight_bit = np.clip(np.nan_to_num(depth, nan=0.0, posinf=255.0, neginf=0.0), 0.0, 255.0).astype(np.uint8)

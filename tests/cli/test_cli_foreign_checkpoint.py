@@ -85,16 +85,16 @@ def test_the_checkpoint_of_another_run_is_refused(run, tmp_path, capsys):
 
 
 def test_a_checkpoint_from_before_the_residuals_is_of_the_run(run, tmp_path, monkeypatch):
-    from endotsr.fitting import trainer
+    from endotsr.fitting import state as training_state
 
     early = tmp_path / "early"
-    save = trainer.save_state
+    save = training_state.save_state
 
     def stop(path, state, config):
         save(path, state, config)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(trainer, "save_state", stop)
+    monkeypatch.setattr(training_state, "save_state", stop)
     assert main(train_words(early, "--no-evaluate")) == 130
     monkeypatch.undo()
     forget_settings(early / "checkpoint.npz")

@@ -124,7 +124,7 @@ def test_unusable_setting_is_one_line(words, named, tmp_path, capsys):
         (["--excluded-value", "black"], "--excluded-value: no such option; did you mean --sequence.excluded-value?"),
         (["--resum"], "--resum: no such option; did you mean --resume?"),
         (["--frobnicate"], "--frobnicate: no such option; `endotsr train --help` lists the options"),
-        (["again"], "'again': one word too many; `endotsr train --help` lists the options"),
+        (["again"], "'again': unexpected argument; `endotsr train --help` lists the options"),
     ],
 )
 def test_a_mistyped_option_is_named_with_the_one_that_was_meant(words, said, tmp_path, capsys):

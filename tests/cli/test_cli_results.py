@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from tiny import SEQUENCE, SETTINGS, assert_refused
 
-from endotsr.cli.evaluate import held_out_table
+from endotsr.bench.clock import REST, STAGES
 from endotsr.cli.main import main
-from endotsr.cli.parts.pictures import depth_bytes, depth_step
 from endotsr.kernels.threads import use_threads
 from endotsr.opencv import read_png
+from endotsr.report.pictures import depth_bytes, depth_step
+from endotsr.report.run_text import held_out_table
 from endotsr.runs.files import os_error_line, write_json
 
 
@@ -191,12 +192,12 @@ def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_r
 
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
     from endotsr.errors import CalibrationError
-    from endotsr.fitting import trainer
+    from endotsr.fitting import objective
 
     def no_answer(*_):
         raise CalibrationError("calibration: none of the 2 views is valid\nview a\nview b")
 
-    monkeypatch.setattr(trainer, "calibrate_on", no_answer)
+    monkeypatch.setattr(objective, "calibrate_on", no_answer)
     assert main(["calibrate", str(finished_run)]) == 2
     said = capsys.readouterr()
     assert said.err == "endotsr: error: calibration: none of the 2 views is valid\n"
@@ -209,7 +210,7 @@ def test_bench_times_every_stage(tmp_path, capsys):
     assert main(["bench", "iteration", *sizes, "--json", str(file)]) == 0
     said = capsys.readouterr().out
     result = json.loads(file.read_text())
-    assert {"scene", "render", "losses", "render reverse", "scene reverse", "optimiser"} <= set(result["stages"])
+    assert set(result["stages"]) == {*STAGES, REST}
     slowest = max(stage["median_ms"] for stage in result["stages"].values())
     assert 0 < slowest and result["iteration"]["quartiles_ms"][1] > 0  # times themselves are not for a test
     assert all(name in said for name in result["stages"]) and "peak memory" in said

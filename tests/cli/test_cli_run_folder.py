@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from tiny import assert_refused
 
+from endotsr.cli.main import main
 from endotsr.config import PAPER
 from endotsr.errors import InputError
+from endotsr.runs import files, machine
 from endotsr.runs import folder as runs
+from endotsr.runs.log import RunLog
 from endotsr.runs.sources import remembered_cameras, sequence_record
 from endotsr.simulator.settings import CameraMotion, SimulatorSettings
 from endotsr.simulator.simulate import simulate
@@ -64,20 +67,20 @@ def test_open_refuses_what_is_not_a_run(tmp_path):
 
 def test_replacing_a_file_keeps_the_old_one_on_failure(tmp_path):
     file = tmp_path / "metrics.json"
-    runs.write_json(file, {"psnr": 1.0})
+    files.write_json(file, {"psnr": 1.0})
 
     def broken(temporary):
         temporary.write_text("{")
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.raises(OSError):
-        runs.replace_file(file, broken)
+        files.replace_file(file, broken)
     assert json.loads(file.read_text()) == {"psnr": 1.0}
     assert list(tmp_path.iterdir()) == [file]
 
 
 def test_json_has_no_nan(tmp_path):
-    runs.write_json(tmp_path / "a.json", {"a": float("nan"), "b": [np.float32(np.inf), np.arange(2)], "c": tmp_path})
+    files.write_json(tmp_path / "a.json", {"a": float("nan"), "b": [np.float32(np.inf), np.arange(2)], "c": tmp_path})
     assert json.loads((tmp_path / "a.json").read_text()) == {"a": None, "b": [None, [0, 1]], "c": str(tmp_path)}
 
 
@@ -90,7 +93,7 @@ def log_of(path, iterations, tail=b""):
 def test_resumed_log_is_cut_at_the_checkpoint(tail, tmp_path):
     path = tmp_path / "log.jsonl"
     log_of(path, range(1, 6), tail)
-    log = runs.RunLog(path, 3)
+    log = RunLog(path, 3)
     assert log.seconds == 1.5
     log.append({"iteration": 4, "loss": float("nan")})
     log.close()
@@ -100,7 +103,7 @@ def test_resumed_log_is_cut_at_the_checkpoint(tail, tmp_path):
 
 def test_log_keeps_whole_lines_when_the_disk_is_full(tmp_path):
     path = tmp_path / "log.jsonl"
-    log = runs.RunLog(path, 0)
+    log = RunLog(path, 0)
     log.append({"iteration": 1})
     whole = path.read_bytes()
 
@@ -142,9 +145,9 @@ def test_leftovers_of_a_killed_process_are_removed(tmp_path):
 
 
 def test_machine_and_versions_say_something():
-    assert runs.machine()["cores"] >= 1 and runs.machine()["processor"]
-    assert {"endotsr", "python", "numpy", "numba"} <= set(runs.versions())
-    peak = runs.peak_memory_bytes()
+    assert machine.machine()["cores"] >= 1 and machine.machine()["processor"]
+    assert {"endotsr", "python", "numpy", "numba"} <= set(machine.versions())
+    peak = machine.peak_memory_bytes()
     assert peak is None or peak > 10_000_000
 
 
@@ -184,11 +187,29 @@ def test_sequence_json_without_its_keys_is_one_line(key, finished_run, tmp_path,
         assert_refused(capsys, ["evaluate", str(run)], f"{run / 'sequence.json'}: {key} is missing")
 
 
+def test_a_sequence_json_with_the_near_plane_of_earlier_versions_is_read(finished_run, tmp_path):
+    record = json.loads((finished_run / "sequence.json").read_text())
+    assert "near" not in record
+    run = damaged_copy(finished_run, tmp_path / "run", "sequence.json", json.dumps(record | {"near": 0.2}))
+    assert main(["render", str(run), "--out", str(tmp_path / "pictures")]) == 0
+
+
+def test_a_random_state_of_another_generator_is_one_line(finished_run, tmp_path, capsys):
+    run = damaged_copy(finished_run, tmp_path / "run", "run.json", (finished_run / "run.json").read_text())
+    with np.load(run / "checkpoint.npz") as file:
+        entries = {key: file[key] for key in file.files}
+    header = json.loads(entries["header"].tobytes())
+    header["rng_state"] = {"bit_generator": "MT19937"}
+    entries["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(run / "checkpoint.npz", **entries)
+    assert_refused(capsys, ["train", "--out", str(run), "--resume"], f"{run / 'checkpoint.npz'}: rng_state: ")
+
+
 @pytest.mark.parametrize("moving", [False, True])
 def test_cameras_are_remembered_to_the_last_bit(moving, tmp_path):
     settings = SimulatorSettings(width=32, height=24, frames=9, camera_motion=CameraMotion(on=moving))
     sequence = simulate(settings).sequence
-    runs.write_json(tmp_path / "sequence.json", sequence_record(sequence))
+    files.write_json(tmp_path / "sequence.json", sequence_record(sequence))
     record = json.loads((tmp_path / "sequence.json").read_text())
     cameras = remembered_cameras(record)
     assert len(cameras) == 9 and len(record["cameras"]) == (9 if moving else 1)

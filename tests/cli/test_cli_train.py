@@ -16,9 +16,11 @@ import pytest
 from tiny import assert_refused, assert_same_run, log_without_seconds, run_line, start, train_words
 
 from endotsr.cli.main import main
-from endotsr.cli.parts import progress, stopping
+from endotsr.cli.parts import progress
 from endotsr.config import load_config
+from endotsr.fitting import state as training_state
 from endotsr.fitting import trainer
+from endotsr.runs import stopping
 from endotsr.runs.folder import RunFolder
 
 LAST = 30
@@ -216,14 +218,14 @@ def test_results_of_an_unfinished_run_say_so_and_show_its_checkpoint_alone(tmp_p
 
 
 def test_a_signal_while_the_checkpoint_is_written_leaves_the_one_before(tmp_path, capsys, monkeypatch):
-    out, save = tmp_path / "run", trainer.save_state
+    out, save = tmp_path / "run", training_state.save_state
 
     def slow(path, state, *rest):
         if state.iteration == 9:
             signal.raise_signal(signal.SIGTERM)
         save(path, state, *rest)
 
-    monkeypatch.setattr(trainer, "save_state", slow)
+    monkeypatch.setattr(training_state, "save_state", slow)
     signal_at(9, monkeypatch, lambda: None)
     code, said = run_line(capsys, *train_only(out))
     assert code == 130 and "the checkpoint of iteration 7 is kept" in said.strip().splitlines()[-1]
@@ -285,7 +287,7 @@ def test_an_error_without_a_signal_is_a_failure(tmp_path, monkeypatch):
 def test_full_disk_keeps_the_last_checkpoint_or_leaves_nothing(checkpoint, finished_run, tmp_path, capsys, monkeypatch):
     out = tmp_path / "run"
     calls = []
-    save = trainer.save_state
+    save = training_state.save_state
 
     def full(path, *rest):
         calls.append(path)
@@ -293,7 +295,7 @@ def test_full_disk_keeps_the_last_checkpoint_or_leaves_nothing(checkpoint, finis
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
         save(path, *rest)
 
-    monkeypatch.setattr(trainer, "save_state", full)
+    monkeypatch.setattr(training_state, "save_state", full)
     code, said = run_line(capsys, *train_only(out))
     monkeypatch.undo()
     last = said.strip().splitlines()[-1]
@@ -367,7 +369,7 @@ def test_resume_may_repeat_the_command_line(finished_run, tmp_path):
 def test_resume_compares_only_what_was_asked_for(tmp_path, capsys):
     out = tmp_path / "run"
     file = tmp_path / "mine.toml"
-    file.write_text("[model]\nbeta = 0.4\n[loss]\ndetail_from = 600\n")
+    file.write_text("[model]\nbeta = 0.4\n[loss]\nlaplacian_from = 600\n")
     words = ["--scale", "0.75", "--initialisation.motion-threshold", "30", "--iterations", "6"]
     assert main(train_only(out, "--config", str(file), *words)) == 0
     kept = (out / "config.toml").read_bytes()
@@ -399,13 +401,13 @@ def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypat
     assert main(train_only(tmp_path / "a", *words)) == 0
     weight = RunFolder(tmp_path / "a").record()["lambda_lap"]
     assert weight > 0
-    save = trainer.save_state
+    save = training_state.save_state
 
     def stop(path, state, config):
         save(path, state, config)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(trainer, "save_state", stop)
+    monkeypatch.setattr(training_state, "save_state", stop)
     assert main(train_only(tmp_path / "b", *words)) == 130
     monkeypatch.undo()
     monkeypatch.setattr(trainer, "calibrated_weight", None)  # a second calibration would be an error

@@ -1,6 +1,7 @@
-"""The extensions of the book are importable, as Sphinx has them."""
+"""The extensions of the book, as Sphinx has them, and the makers of its pages are importable."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "_extensions"))
+DOCS = Path(__file__).parents[2] / "docs"
+sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS / "pages")]

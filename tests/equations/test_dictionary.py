@@ -17,7 +17,7 @@ from endotsr.equations.dictionary import (
     normalised_atoms,
     report_atoms,
 )
-from endotsr.fitting.trainer import workshop
+from endotsr.fitting.state import workshop
 from endotsr.scene import workload
 from oracle import fourier_oracle
 

@@ -272,9 +272,10 @@ def test_kernels_equal_their_python_bodies(monkeypatch, rule):
 
 
 def test_float32_gradient_is_the_float64_gradient():
-    from endotsr.gradcheck.pairs_equations import PAIRS, observed_image, tissue_mask
+    from endotsr.gradcheck import all_pairs
+    from endotsr.stages.laplacian import observed_image, tissue_mask
 
-    for pair in (p for p in PAIRS if p.equation == "5"):
+    for pair in (p for p in all_pairs().values() if p.equation == "5"):
         rendered = pair.inputs(np.random.default_rng(2))["rendered"].astype(np.float32)
         masks = support_masks(tissue_mask())
         assert min(masks.counts) > 0

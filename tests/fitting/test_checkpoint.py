@@ -10,7 +10,7 @@ import pytest
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
-from endotsr.fitting.adam import adam_state, adam_update
+from endotsr.fitting.adam import adam_state, adam_update, regather
 from endotsr.fitting.checkpoint import load_checkpoint, restore_rng, save_checkpoint
 from endotsr.scene.density_control import densify, empty_statistics, gather_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -37,8 +37,9 @@ def step(gaussians, adam, statistics, rng, iteration):
     gather_statistics(statistics, gradients["position"][:2], np.ones(gaussians.count, bool), 4, 4)
     adam_update(adam, named, gradients, dict.fromkeys(named, 1e-2), 0.9, 0.999, 1e-15)
     if iteration % 3 == 0:
-        result = densify(gaussians, adam, statistics, DensityConfig(gradient_threshold=2.5), rng, 10.0)
-        return result.gaussians, result.adam, result.statistics
+        result = densify(gaussians, statistics, DensityConfig(gradient_threshold=2.5), rng, 10.0)
+        regather(adam, named, result.plan.source, result.plan.survivors)
+        return result.gaussians, adam, result.statistics
     return gaussians, adam, statistics
 
 

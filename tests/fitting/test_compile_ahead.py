@@ -24,7 +24,8 @@ import msgspec
 from endotsr.scene import workload
 from endotsr.bench.case import representative
 from endotsr.config import PAPER
-from endotsr.fitting.trainer import new_training, training_step, workshop
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
 
 small = msgspec.structs.replace(PAPER.initialisation, first_frame_points=500, other_frame_points=50)
 config = msgspec.structs.replace(PAPER, initialisation=small)

@@ -137,4 +137,4 @@ def test_calibration_is_the_ratio_of_the_gradients_at_the_render(frame, rendered
     assert found.lambda_lap == pytest.approx(config.loss.gradient_ratio / ratio, rel=1e-12)
     assert clip.asked == [(4, np.dtype(np.float64)), (9, np.dtype(np.float64))]
     assert "frame 4" in found.table and "frame 9" in found.table
-    assert left_out == [{"appearance": False, "spectral_motion": False}] * 2  # a rule of the base model
+    assert left_out == [{"frames": None, "appearance": False, "spectral_motion": False}] * 2  # a rule of the base model

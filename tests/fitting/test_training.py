@@ -22,25 +22,17 @@ from endotsr.config import (
 from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
-from endotsr.fitting.checkpoint import load_checkpoint
+from endotsr.fitting.checkpoint import check_lengths, load_checkpoint
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
 from endotsr.fitting.schedules import densify_now
-from endotsr.fitting.trainer import (
-    calibrated_weight,
-    new_training,
-    save_state,
-    state_from_checkpoint,
-    train,
-    training_step,
-    workshop,
-)
-from endotsr.scene.density_control import check_lengths
+from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, workshop
+from endotsr.fitting.trainer import calibrated_weight, train, training_step
 from endotsr.scene.gaussians import arrays
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
-BORN, LENGTH = 25, 60
+ACTIVATED, LENGTH = 25, 60
 RESIDUALS = ("appearance_coefficients", "motion_coefficients")
 FDM = ("fdm_weight", "fdm_centre", "fdm_width")
 
@@ -55,7 +47,7 @@ def settings(iterations=LENGTH, optimiser=None, loss=None, training=None, **mode
         initialisation=InitialisationConfig(first_frame_points=250, other_frame_points=60),
         training=TrainingConfig(
             iterations=iterations,
-            residual_activation=BORN,
+            residual_activation=ACTIVATED,
             harmonics_interval=15,
             checkpoint_every=10,
             **(training or {}),
@@ -123,7 +115,7 @@ def test_loss_falls_and_every_part_takes_part(finished):
     assert all(np.isfinite(e["loss"]) for e in log)
     assert ["smoothness" in e for e in log] == [i >= 10 for i in range(1, LENGTH + 1)]
     assert ["laplacian" in e for e in log] == [i > 15 for i in range(1, LENGTH + 1)]
-    assert ["matern_penalty" in e for e in log] == [i > BORN for i in range(1, LENGTH + 1)]
+    assert ["matern_penalty" in e for e in log] == [i > ACTIVATED for i in range(1, LENGTH + 1)]
     counts = [e["gaussians"] for e in log]
     changes = [log[i]["iteration"] for i in range(LENGTH - 1) if counts[i + 1] != counts[i]]
     assert changes and set(changes) <= {20, 30, 40}
@@ -179,16 +171,17 @@ def stepped(state, sequence, config, monkeypatch):
     seen = []
     real = trainer.image_loss
     with monkeypatch.context() as patch:
-        patch.setattr(trainer, "image_loss", lambda rendered, *rest: seen.append(rendered) or real(rendered, *rest))
+        watched = lambda rendered, *rest, **named: seen.append(rendered) or real(rendered, *rest, **named)
+        patch.setattr(trainer, "image_loss", watched)
         state = copy.deepcopy(state)
         entry = training_step(state, workshop(sequence, config))
     return state, entry, seen[0]
 
 
-def test_residuals_are_born_without_changing_the_image(sequence, monkeypatch):
+def test_residuals_are_activated_without_changing_the_image(sequence, monkeypatch):
     """At K_s + 1, with and without A and S: image, loss and the step of every other array are bitwise equal."""
     with_all, without = settings(), settings(appearance=False, spectral_motion=False)
-    state, _ = run(sequence, settings(iterations=BORN))
+    state, _ = run(sequence, settings(iterations=ACTIVATED))
     assert all(getattr(state.gaussians, name) is None for name in RESIDUALS)
     # learning rates look at the length of the run: from here on both take that of the whole
     after, entry, image = stepped(state, sequence, with_all, monkeypatch)
@@ -200,7 +193,7 @@ def test_residuals_are_born_without_changing_the_image(sequence, monkeypatch):
         np.testing.assert_array_equal(array, getattr(after.gaussians, name), err_msg=name)
     assert all(getattr(after.gaussians, name).any() for name in RESIDUALS)  # and they learn at once
     assert all(after.adam.step[name] == 1 for name in RESIDUALS)
-    assert after.adam.step["position"] == BORN + 1
+    assert after.adam.step["position"] == ACTIVATED + 1
 
 
 # --- components that are off ---
@@ -245,7 +238,7 @@ def test_a_component_that_is_off_allocates_and_calls_nothing(component, sequence
     changes, functions, fields = OFF[component]
     for module, name in functions:
         monkeypatch.setattr(module, name, forbidden)
-    state, log = run(sequence, settings(iterations=BORN + 7, **changes))
+    state, log = run(sequence, settings(iterations=ACTIVATED + 7, **changes))
     for name in fields:
         assert getattr(state.gaussians, name) is None
         assert name not in state.adam.first and name not in state.adam.second and name not in state.adam.step
@@ -260,20 +253,20 @@ def test_a_component_that_is_on_is_called(component, sequence, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(module, name, forbidden)
             with pytest.raises(AssertionError, match="is off was called"):
-                run(sequence, settings(iterations=BORN + 7))
+                run(sequence, settings(iterations=ACTIVATED + 7))
 
 
 # --- the automatic detail weight ---
 
 
 def test_automatic_weight_is_deterministic_and_equals_the_same_number_given(sequence, tmp_path, monkeypatch):
-    automatic = settings(iterations=BORN + 15, loss={"lambda_lap": "auto"})
+    automatic = settings(iterations=ACTIVATED + 15, loss={"lambda_lap": "auto"})
     weight = calibrated_weight(sequence, automatic)
     assert weight == calibrated_weight(sequence, automatic) and 0 < weight < 100
     states = []
     state, log = run(sequence, automatic, checkpoints=states)
     assert state.lambda_lap == weight
-    given, given_log = run(sequence, settings(iterations=BORN + 15, loss={"lambda_lap": weight}))
+    given, given_log = run(sequence, settings(iterations=ACTIVATED + 15, loss={"lambda_lap": weight}))
     assert_same(state, given)
     assert log == given_log
     # a resumed run has the weight from its checkpoint and does not calibrate again

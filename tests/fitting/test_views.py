@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from endotsr.config import PAPER
-from endotsr.fitting.trainer import _draw_view
+from endotsr.fitting.sampling import draw_view, next_view
 
 TRAIN = np.array([0, 2, 3, 4, 7])
 
@@ -14,9 +14,11 @@ TRAIN = np.array([0, 2, 3, 4, 7])
 def _draws(count: int, **training):
     config = msgspec.structs.replace(PAPER, training=msgspec.structs.replace(PAPER.training, **training))
     sequence = SimpleNamespace(train_index=TRAIN, times=np.arange(8) / 8, count=8)
-    shop = SimpleNamespace(config=config, sequence=sequence)
-    rng = np.random.default_rng(3)
-    drawn = [_draw_view(rng, shop) for _ in range(count)]  # type: ignore[arg-type]
+    rng, drawn = np.random.default_rng(3), []
+    for _ in range(count):
+        expected = next_view(rng, sequence, config.training)  # type: ignore[arg-type]
+        drawn.append(draw_view(rng, sequence, config.training))  # type: ignore[arg-type]
+        assert drawn[-1] == expected  # and the look ahead has drawn nothing
     return np.array([d[0] for d in drawn]), np.array([d[1] for d in drawn])
 
 

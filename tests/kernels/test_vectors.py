@@ -6,19 +6,9 @@ import pytest
 from numba.core.errors import TypingError
 
 from endotsr.kernels.jit import jit, jit_inline
-from endotsr.kernels.vectors import (
-    GROUP,
-    fold,
-    lanes,
-    local_array,
-    lowest_bit,
-    prefetch,
-    vector,
-    write_group,
-)
+from endotsr.kernels.vectors import fold, lanes, local_array, lowest_bit, prefetch, vector
 
 ROOM = 24
-THREE = 3 * GROUP
 DTYPES = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
@@ -117,27 +107,3 @@ def _numbers_of(bits, out):
 def test_the_lowest_bit_again_and_again_gives_all_of_them(numbers):
     bits, out = np.uint64(sum(1 << k for k in numbers)), np.zeros(64, np.int64)
     assert list(out[: _numbers_of(bits, out)]) == list(out[: jit(_numbers_of)(bits, out)]) == numbers
-
-
-def _sums_of(first, stop, values, out):
-    """Rows of `out`: the number, its square and its cube; group by group."""
-    results = local_array(THREE, values)
-    for start in range(first, stop, GROUP):
-        count = min(GROUP, stop - start)
-        for item in range(count):
-            value = values[start + item]
-            results[item], results[GROUP + item], results[2 * GROUP + item] = value, value**2, value**3
-        write_group(results, start, count, out)
-
-
-@DTYPES
-@pytest.mark.parametrize("first, stop", [(0, 0), (3, 4), (0, GROUP), (5, 5 + 3 * GROUP), (1, 2 * GROUP)])
-def test_the_results_of_groups_come_to_their_columns(first, stop, dtype):
-    values = np.random.default_rng(4).normal(size=4 * GROUP).astype(dtype)
-    wanted = np.full((3, values.size), 7, dtype)
-    for row, power in zip(wanted, (1, 2, 3), strict=True):
-        row[first:stop] = values[first:stop] ** power
-    for function in (_sums_of, jit(_sums_of)):
-        out = np.full((3, values.size), 7, dtype)
-        function(first, stop, values, out)
-        np.testing.assert_allclose(out, wanted, rtol=1e-6)

@@ -7,9 +7,12 @@ from collections.abc import Callable
 
 MODULES = (
     "kernels.exponential",
+    "kernels.gather",
     *(f"equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
-    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation")),
-    *(f"splatting.{name}" for name in ("camera", "covariance", "projection", "projection_kernels", "harmonics")),
+    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure")),
+    *(f"splatting.{name}" for name in ("camera", "camera_model", "covariance", "projection")),
+    *(f"splatting.{name}" for name in ("projection_formulas", "projection_kernels", "harmonics", "harmonics_formulas")),
+    "kernels.sums",
     *(f"splatting.{name}" for name in ("records", "binning", "compositing", "fast.blocks", "fast.tiles", "render")),
     *(f"losses.{name}" for name in ("rows", "masked_l1", "masked_ssim", "depth", "smoothness")),
     "scene.density_control",
@@ -17,7 +20,7 @@ MODULES = (
     "fitting.schedules",
 )
 # functions in which only a named defect is planted
-MORE = ("fitting.trainer.workshop",)
+MORE = ("fitting.state.workshop",)
 
 
 def kernels() -> dict[str, Callable]:

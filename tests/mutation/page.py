@@ -76,7 +76,7 @@ def reverse_part(found: list[Row]) -> list[str]:
     missed = [r for r in changing if "gradcheck" not in r.suites]
     lines = [
         f"Of the mutants that only the reverse pass runs, {len(changing)} change the gradient of some input by more "
-        f"than {CHANGED:g} of its norm; the gradient checks alone notice {len(changing) - len(missed)} of them."
+        f"than {CHANGED:g} of its norm; the gradient checks alone detect {len(changing) - len(missed)} of them."
     ]
     return lines + ["", *(f"- {r.name}" for r in missed)] if missed else lines
 
@@ -92,19 +92,19 @@ def page(result: dict[str, Any]) -> str:
     again = ""
     if later:
         sample = sample.replace("at most", "at first at most")
-        again = f" What survived, and what was not yet among them, was put to the tests of {later[-1]['commit']}"
+        again = f" Survivors and new mutants were tested again with the tests of {later[-1]['commit']}"
         again += f" ({sum(r['seconds'] for r in later) / 60:.0f} minutes more)."
     lines = [
         "# What the tests can tell apart",
         "",
         "Every function of the numerical modules is changed in one place at a time: another operator, a dropped term "
         "or statement, another constant, a shifted index, a flipped comparison, sign or branch, sine for cosine, "
-        "smallest for largest. Each wrong version (mutant) is put to five suites; a suite notices it when one of its "
+        "smallest for largest. Five suites test each wrong version (mutant). A suite detects a mutant when one of its "
         "checks fails, raises or does not end.",
         "",
         "- `gradcheck`: the public checker on the registered pairs. A mutant that only the reverse pass runs is "
-        "judged against the differences of the right forward pass, along every line the checker takes; any other "
-        "along two joint lines, and two lines of every block where the forward pass is quick.",
+        "compared with the differences of the correct forward pass, along every line of the checker. Any other mutant "
+        "is compared along two joint lines, and along two lines of every block where the forward pass is fast.",
         "- `oracle`: tests that compare with an independent formula or library.",
         "- `golden`: the reference against the stored answers of `golden/`, both paths in float64, the definition in "
         "float32.",
@@ -116,9 +116,9 @@ def page(result: dict[str, Any]) -> str:
         f"({machine['cores']} cores). Made by `python tests/mutation/discrimination.py"
         f"{' --sample ' + str(run['sample']) if run['sample'] else ''}"
         f"{' --minutes ' + format(run['minutes'], 'g') if run['minutes'] else ''}`. "
-        f"The kernels run as plain Python here; checks that take longer than {run['slow']:g} s that way are left out "
-        f"({len(result['left_out'])} of {len(result['left_out']) + len(result['checks'])}), so a suite may notice more "
-        f"than is counted.{again}",
+        f"The kernels run as plain Python here. Checks that take longer than {run['slow']:g} s that way are left out "
+        f"({len(result['left_out'])} of {len(result['left_out']) + len(result['checks'])}), so a suite may detect more "
+        f"mutants than are counted.{again}",
         "",
         "## Summary",
         "",
@@ -130,7 +130,7 @@ def page(result: dict[str, Any]) -> str:
         "",
         "## Named defects",
         "",
-        "Mistakes that ports and published codes have made, each planted in the source.",
+        "Each is a mistake that ports or published programs have made, put into the source on purpose.",
         "",
         *defects(result),
         "",
@@ -144,7 +144,7 @@ def page(result: dict[str, Any]) -> str:
         "",
         "## Equivalent mutants",
         "",
-        "These compute the same, or differ in what no result depends on.",
+        "These mutants compute the same results, or differ only in values on which no result depends.",
         "",
     ]
     tested = {r.name for r in found if r.equivalent}

@@ -27,26 +27,27 @@ def _rotation_transposed() -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-D_Z = "inverse_z2 * (fx * (power_x * slope_x * d_j02 - d_j00) + fy * (power_y * slope_y * d_j12 - d_j11))"
-PROJECT, PROJECT_REVERSE = "splatting.projection_kernels._project", "splatting.projection_kernels._project_reverse"
+D_Z = ("inverse_z2 * (through_x + through_y)", "zero")
+CAMERA, CAMERA_REVERSE = "splatting.camera_model.pinhole", "splatting.camera_model.pinhole_reverse"
+SCREEN = "splatting.projection_formulas.screen_covariance"
 COMPOSITE, COMPOSITE_REVERSE = "splatting.compositing._composite", "splatting.compositing._composite_reverse"
 BLOCK_REVERSE = "splatting.fast.blocks._blend_block_reverse"
 
 DEFECTS: tuple[Defect, ...] = (
     Defect(
         "d covariance / d mean frozen",
-        PROJECT_REVERSE,
+        CAMERA_REVERSE,
         (
-            ("-fx * inverse_z2 * d_j02 if free_x else zero", "zero"),
-            ("-fy * inverse_z2 * d_j12 if free_y else zero", "zero"),
-            (D_Z, "zero"),
+            ("-lens.fx * inverse_z2 * d_j02 if free_x else zero", "zero"),
+            ("-lens.fy * inverse_z2 * d_j12 if free_y else zero", "zero"),
+            D_Z,
         ),
     ),
-    Defect("dJ/dz frozen", PROJECT_REVERSE, ((D_Z, "zero"),)),
+    Defect("dJ/dz frozen", CAMERA_REVERSE, (D_Z,)),
     Defect(
         "clamped dJ/dz twice too large",
-        PROJECT_REVERSE,
-        (("power_x = two if free_x else clamp_factor", "power_x = two"),),
+        CAMERA_REVERSE,
+        (("power_x = two if free_x else lens.clamp_factor", "power_x = two"),),
     ),
     Defect(
         "off-diagonal gradient halved",
@@ -66,8 +67,8 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "quaternion gradient without its normalisation",
-        "splatting.covariance._covariance_reverse",
-        tuple((f"(g{k} - along * {k})", f"g{k}") for k in "wxyz"),
+        "splatting.covariance.unit_quaternion_reverse",
+        tuple((f"(d_{k} - along * {k})", f"d_{k}") for k in "wxyz"),
     ),
     Defect(
         "alpha clamp .99 forward, .999 in reverse",
@@ -88,28 +89,26 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "sign of dy in the fast reverse pass", BLOCK_REVERSE, (("se, sy = s * e, s * dy", "se, sy = s * e, -s * dy"),)
     ),
-    Defect("rotation transposed", "splatting.covariance._covariance_forward", _rotation_transposed()),
+    Defect("rotation transposed", "splatting.covariance.rotation_of", _rotation_transposed()),
     Defect(
         "fx and fy exchanged",
-        PROJECT,
+        CAMERA,
         (
             (
-                "mean_x, mean_y = fx * slope_x + cx, fy * slope_y + cy",
-                "mean_x, mean_y = fy * slope_x + cx, fx * slope_y + cy",
+                "u, v = lens.fx * slope_x + lens.cx, lens.fy * slope_y + lens.cy",
+                "u, v = lens.fy * slope_x + lens.cx, lens.fx * slope_y + lens.cy",
             ),
         ),
     ),
     Defect(
         "low-pass dropped",
-        PROJECT,
-        (("a, b, c, spread = low_pass, zero, low_pass, zero", "a, b, c, spread = zero, zero, zero, zero"),),
+        SCREEN,
+        (("a = low_pass + u0 * u0", "a = u0 * u0"), ("c = low_pass + v0 * v0", "c = v0 * v0")),
     ),
-    Defect(
-        "determinant as a c - b b", PROJECT, (("low_pass * low_pass + low_pass * spread + areas", "a * c - b * b"),)
-    ),
+    Defect("determinant as a c - b b", SCREEN, (("low_pass * low_pass + low_pass * spread + areas", "a * c - b * b"),)),
     Defect(
         "atom statistics from all time stamps",
-        "fitting.trainer.workshop",
+        "fitting.state.workshop",
         (("sequence.times[sequence.train_index]", "sequence.times"),),
     ),
     Defect(

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from endotsr.golden.store import golden_folder, read_golden
+from endotsr.golden.judge.store import golden_folder, read_golden
 from endotsr.gradcheck import all_pairs
 from endotsr.kernels.jit import kernel_source_hash
 from mutation.checks import BLOCKS, Check, forward_only, of_case, of_item, of_pair, surveyed

@@ -1,5 +1,9 @@
 """Density control, equation (B11): selection, order of the result, inheritance; hard cases G1-G4."""
 
+import copy
+import inspect
+from typing import NamedTuple
+
 import msgspec
 import numpy as np
 import pytest
@@ -7,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
-from endotsr.fitting.adam import AdamState, adam_state, adam_update
+from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
+from endotsr.fitting.checkpoint import check_lengths
 from endotsr.scene.density_control import (
     DensityStatistics,
     _fainter_than,
     _rotations,
-    check_lengths,
     densify,
     empty_statistics,
     gather_statistics,
@@ -59,8 +63,26 @@ def steep(count, *indices) -> DensityStatistics:
     return statistics
 
 
+class Round(NamedTuple):
+    """Result of a densification and the moments that followed it."""
+
+    gaussians: Gaussians
+    adam: AdamState
+    statistics: DensityStatistics
+    cloned: int
+    split: int
+    pruned: int
+
+
+def densified(gaussians, adam, statistics, config, rng, extent) -> Round:
+    """As a training does it; `adam` is left as it is."""
+    result, moved = densify(gaussians, statistics, config, rng, extent), copy.deepcopy(adam)
+    regather(moved, arrays(gaussians), result.plan.source, result.plan.survivors)
+    return Round(result.gaussians, moved, *result[2:])
+
+
 def run(gaussians, adam, statistics, config=CONFIG, seed=0, extent=EXTENT):
-    result = densify(gaussians, adam, statistics, config, np.random.default_rng(seed), extent)
+    result = densified(gaussians, adam, statistics, config, np.random.default_rng(seed), extent)
     check_lengths(result.gaussians, result.adam)
     assert result.statistics.visits.shape == (result.gaussians.count,)
     assert not result.statistics.visits.any() and not result.statistics.gradient_sum.any()
@@ -219,7 +241,7 @@ def test_hard_G4_lengths_agree_after_many_rounds(rng, dtype):
     generator = np.random.default_rng(3)
     for _ in range(4):
         statistics = steep(gaussians.count, *generator.choice(gaussians.count, 3, replace=False))
-        result = densify(gaussians, adam, statistics, CONFIG, generator, EXTENT)
+        result = densified(gaussians, adam, statistics, CONFIG, generator, EXTENT)
         gaussians, adam = result.gaussians, result.adam
         check_lengths(gaussians, adam)
         assert gaussians.position.dtype == dtype
@@ -271,15 +293,25 @@ def test_zero_quaternion_and_huge_scale_split_finitely(rng):
     assert np.isfinite(result.gaussians.position).all()
 
 
-def test_consumed_moments_give_the_same_result_and_leave_nothing_behind(rng):
-    gaussians, adam = make(rng, 9)
-    statistics = steep(9, 2, 5)
-    kept = densify(gaussians, adam, statistics, CONFIG, np.random.default_rng(5), EXTENT)
-    assert adam.first and adam.second  # not consumed unless asked for
-    names = list(adam.first)
-    consumed = densify(gaussians, adam, statistics, CONFIG, np.random.default_rng(5), EXTENT, consume_moments=True)
-    assert not adam.first and not adam.second
-    assert list(consumed.adam.first) == names
-    for name in names:
-        np.testing.assert_array_equal(consumed.adam.first[name], kept.adam.first[name])
-        np.testing.assert_array_equal(consumed.adam.second[name], kept.adam.second[name])
+def test_the_plan_names_the_source_of_every_column_and_which_are_fresh(scene):
+    gaussians, _, statistics = scene
+    plan = densify(gaussians, statistics, CONFIG, np.random.default_rng(5), EXTENT).plan
+    assert plan.source.tolist() == [0, 1, 2, 5, 1, 3, 3] and plan.survivors == 4
+
+
+def test_density_control_does_not_know_the_optimiser():
+    import endotsr.scene.density_control as module
+
+    assert "endotsr.fitting" not in inspect.getsource(module)
+
+
+def test_moments_of_other_arrays_are_left_alone(scene):
+    """A parameter that is not per Gaussian keeps its moments; so do all step counters."""
+    gaussians, adam, statistics = scene
+    adam.first["exposure_bias"] = adam.second["exposure_bias"] = np.arange(12.0).reshape(3, 4)
+    adam.step["exposure_bias"] = 7
+    other, steps = adam.first["exposure_bias"], dict(adam.step)
+    plan = densify(gaussians, statistics, CONFIG, np.random.default_rng(5), EXTENT).plan
+    regather(adam, arrays(gaussians), plan.source, plan.survivors)
+    assert adam.first["exposure_bias"] is other is adam.second["exposure_bias"] and adam.step == steps
+    assert adam.first["position"].shape == (3, 7)

@@ -35,7 +35,6 @@ def make(count=5, test=(1,), seed=0) -> Sequence:
         times=everything / count,
         cameras=[camera] * count,
         names=[f"{k:03d}" for k in everything],
-        near=0.2,
         unit="mm",
         static_camera=True,
         train_index=np.setdiff1d(everything, test),
@@ -195,7 +194,7 @@ def test_activation_allocates_zeros_for_what_is_on():
 @pytest.mark.data
 def test_pulling_sequence_starts_with_the_published_counts():
     """35 000 + up to 79 from each of the 54 other training frames of 63."""
-    from endotsr.config import SequenceConfig
+    from endotsr.config import RasterConfig, SequenceConfig
     from endotsr.sequences.endonerf import read_endonerf
 
     sequence = read_endonerf(data_folder("endonerf_pulling"), SequenceConfig())
@@ -203,7 +202,7 @@ def test_pulling_sequence_starts_with_the_published_counts():
     assert 35_000 < gaussians.count <= 35_000 + 79 * 54
     assert all(a is None or np.isfinite(a).all() for a in gaussians)
     u, v, z = project(sequence.cameras[0], gaussians.position.astype(np.float64))
-    assert ((0 < u) & (u < sequence.width) & (0 < v) & (v < sequence.height) & (z > sequence.near)).all()
+    assert ((0 < u) & (u < sequence.width) & (0 < v) & (v < sequence.height) & (z > RasterConfig().near)).all()
 
 
 def test_settings_of_the_paper():

@@ -39,10 +39,10 @@ def test_reads_exactly_what_was_written(tmp_path, excluded, mask_folder, white, 
     np.testing.assert_array_equal(sequence.depth, written.depth)
     np.testing.assert_array_equal(sequence.times, np.arange(5) / 5)
     np.testing.assert_array_equal(sequence.test_index, [1])
-    assert sequence.near == 0.2 and sequence.unit == "mm" and sequence.static_camera
+    assert sequence.unit == "mm" and sequence.static_camera
     assert all(camera is sequence.cameras[0] for camera in sequence.cameras)
     assert sequence.cameras[0][2:] == (FOCAL, FOCAL, 16.0, 12.0, 32, 24)
-    assert any(f"{excluded} = excluded" in note and "tissue share" in note for note in sequence.notes)
+    assert any(f"{excluded} = excluded" in note and "tissue fraction" in note for note in sequence.notes)
 
 
 def test_frame_converts_to_the_precision_asked_for(tmp_path):
@@ -291,7 +291,7 @@ DAMAGES = {
     "range text": (lambda f: None, {"frames": "all"}, r"frames 'all': not a range; write start:stop"),
     "range backwards": (lambda f: None, {"frames": "::-1"}, r"frames '::-1': the step must be 1 or more"),
     "no block fits": (lambda f: None, {"split": "blocks"}, r"no held-out block of 8 frames fits into 5 frames"),
-    "scale too small": (lambda f: None, {"scale": 0.5}, r"scale 0.5 makes 16x12 .* under 16"),
+    "scale too small": (lambda f: None, {"scale": 0.5}, r"scale 0.5 makes 16x12 .* at least 16 on each side"),
     "scale above one": (lambda f: None, {"scale": 2.0}, r"scale 2: .*\(0, 1\]"),
 }
 

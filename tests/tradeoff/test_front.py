@@ -71,5 +71,5 @@ def test_committed_measurements(file):
         for point in (by_name[name] for name in dial["points"].values()):
             if dial["name"] == "cutoff" and result["scene"]["name"] == "simulated":
                 assert point["error"]["max"] <= 5 * point["setting"]["raster"]["alpha_cutoff"]
-    page = (RESULTS.parent / "accuracy_against_time.md").read_text(encoding="utf-8")
+    page = (RESULTS.parent / "tradeoff.md").read_text(encoding="utf-8")
     assert all(reason in page for reason in KEPT.values())

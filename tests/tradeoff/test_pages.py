@@ -1,4 +1,4 @@
-"""Pictures whose words can be read, a page that stands alone, and the generated parts of the documentation."""
+"""Pictures whose words can be read, and a page that needs no other file."""
 
 import json
 import re
@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from made_up import moving_scene
 
-from endotsr.bench.page import replaced
-from endotsr.tradeoff.document import fragments
 from endotsr.tradeoff.figures import dials_figure, draw, main_figure
 from endotsr.tradeoff.page import PICTURES, advice, error_over_cutoff, plain, write_page
 from endotsr.tradeoff.settings import CUTOFFS
@@ -82,28 +80,6 @@ def test_three_sentences_with_the_figures_of_the_measurement(result):
     assert len(sentences) == 3 and all(s.endswith(".") for s in sentences)
     paper = next(p for p in result["points"] if p["name"] == "paper")
     assert f"{paper['error']['max'] * 255:.2g}/255 at the worst pixel" in sentences[0]
-
-
-def test_every_mark_of_the_documentation_is_filled(result):
-    page = ROOT / "docs" / "accuracy_against_time.md"
-    text = page.read_text(encoding="utf-8")
-    made = fragments(result, {"other": result}, {})
-    assert set(re.findall(r"<!-- tradeoff:(\w+):start -->", text)) == set(made)
-    filled = replaced(text, made, page, "tradeoff")
-    assert made["advice"] in filled and made["scenes"] in filled
-    assert replaced(filled, made, page, "tradeoff") == filled
-
-
-def test_a_scene_on_which_the_advice_fails_is_named(result):
-    other = json.loads(json.dumps(result))
-    advised = next(p for p in other["points"] if p["name"].startswith("float32, cutoff 1e-4, stop"))
-    for p in other["points"]:
-        if p["name"].startswith("float32") and p["setting"]["raster"]["alpha_cutoff"] >= 1e-4:
-            p["error"]["max"] = 0.5
-    assert advised["error"]["max"] == 0.5
-    made = fragments(result, {"other": other}, {})["scenes"]
-    rows = [line for line in made.splitlines() if line.startswith("| made up")]
-    assert rows[0].endswith("holds |") and "does not hold" in rows[1]
 
 
 def test_the_factor_of_the_cutoff_is_the_largest_of_the_sweep(result):

@@ -10,7 +10,8 @@ from endotsr.cli.parts.options import base_settings, parse
 from endotsr.cli.train import TrainOptions
 from endotsr.config import DEMO, InitialisationConfig, with_iterations
 from endotsr.errors import InputError
-from endotsr.fitting.trainer import new_training, train
+from endotsr.fitting.state import new_training
+from endotsr.fitting.trainer import train
 from endotsr.runs.sources import load_sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.tradeoff import training
@@ -48,7 +49,7 @@ def numbers(result):
 def test_every_question_is_answered(whole):
     result, file = whole
     asked = {c["dial"] for c in result["configurations"]}
-    assert asked == {"base", "residuals", "detail loss", "image scale", "Gaussians", "cutoffs", "precision"}
+    assert asked == {"base", "residuals", "Laplacian loss", "image scale", "Gaussians", "cutoffs", "precision"}
     assert json.loads(file.read_text()) == json.loads(json.dumps(result))
     for c in result["configurations"]:
         iterations = [row["iteration"] for row in c["milestones"]]

@@ -39,9 +39,9 @@ def exact_needle(dtype, rotation, scale):
     "The determinant of a needle",
     naive="`a * c - b * b`",
     bound=40,
-    why="A needle of 3000 px seen at 45° has a ≈ b ≈ c ≈ 4.5 million. Two products near 2e13 are subtracted to "
-    "get 12 million. Where that comes out as zero or less, programs clamp it, and the needle becomes a disc "
-    "or vanishes.",
+    why="A needle of 3000 px seen at 45° has a ≈ b ≈ c ≈ 4.5 million. Two products near 2e13 are subtracted, and "
+    "the result is 12 million. Where the computed difference is zero or less, programs clamp it, and the needle "
+    "becomes a disc or vanishes.",
 )
 def determinant(dtype):
     out, rotation, scale = needle(dtype, 3000)
@@ -56,9 +56,9 @@ def determinant(dtype):
     "Mahalanobis distance at the tip of a needle",
     naive="`(c*dx*dx - 2*b*dx*dy + a*dy*dy) / det`",
     bound=40,
-    why="The same cancellation at every pixel: terms of 2.5e11 leave 1e6, even with the right determinant. "
-    'Released programs have a line "power > 0: skip" for the pixels where the distance comes out negative. As '
-    "a sum of two squares it cannot. (1000 px; the bound grows with the distance from the centre.)",
+    why="The same cancellation occurs at every pixel: terms of 2.5e11 leave 1e6, even with the right determinant. "
+    'Released programs have a line "power > 0: skip" for the pixels where the computed distance is negative. A '
+    "sum of two squares is never negative. (1000 px; the bound grows with the distance from the centre.)",
 )
 def mahalanobis(dtype):
     out, rotation, scale = needle(dtype, 1000)
@@ -78,8 +78,8 @@ def mahalanobis(dtype):
     "A very short quaternion",
     naive="`q / sqrt(w*w + x*x + y*y + z*z)`",
     bound=8,
-    why="The squares underflow long before the numbers do. Deformation adds to the raw quaternion, so short ones "
-    "occur. (Entry R₁₀ for a length of 1e-200 in float64 and 1e-30 in float32.)",
+    why="The squares underflow long before the numbers do. Deformation adds to the raw quaternion, so short "
+    "quaternions occur. (Entry R₁₀ for a length of 1e-200 in float64 and 1e-30 in float32.)",
 )
 def quaternion(dtype):
     q = np.array([0.5, 0.25, -0.75, 0.125]) * (1e-200 if dtype is np.float64 else 1e-30)
@@ -132,9 +132,9 @@ def by_division(alphas, dtype):
     "Reverse pass behind an opaque Gaussian",
     naive="`T = T / (1 - alpha)`, back to front",
     bound=8,
-    why="The transmittance is not stored but divided back out, from 0 once an alpha was 1: 0/0. Clamping alpha at "
-    "0.99 is the usual cure. (Gradient of the red of one pixel by the first of three alphas, 0.3, 1 and 0.5; "
-    "only the first is red.)",
+    why="The transmittance is not stored but recovered by division. Once an alpha is 1, this is 0/0. Many programs "
+    "therefore clamp alpha at 0.99. (Gradient of the red of one pixel by the first of three alphas, 0.3, 1 and "
+    "0.5; only the first is red.)",
 )
 def opaque(dtype):
     return 1.0, by_division([0.3, 1.0, 0.5], dtype), weight_gradient([0.3, 1.0, 0.5], dtype)
@@ -145,9 +145,9 @@ def opaque(dtype):
     "Reverse pass through 8000 faint Gaussians",
     naive="`T = T / (1 - alpha)`, back to front",
     bound=8,
-    why="The product falls to the subnormal numbers and sticks at one of them, because 0.98 times it rounds to itself; "
-    "the divisions blow that up. A stop at T = 1e-4 hides it; without a stop it is the answer. (Alpha 0.02 each; the "
-    "same gradient.)",
+    why="The product falls to the subnormal numbers and stays at one of them, because 0.98 times this number rounds "
+    "to itself. The divisions then amplify it. A stop at T = 1e-4 avoids this; without a stop the wrong value "
+    "is the result. (Alpha 0.02 each; the same gradient.)",
 )
 def faint(dtype):
     alphas = [0.02] * 8000
@@ -159,7 +159,7 @@ def faint(dtype):
     "Opacity of one faint splat",
     naive="`1 - T`",
     bound=8,
-    why="In float32 1 - 1e-8 is 1. The sum of the weights keeps what the product forgets.",
+    why="In float32 1 - 1e-8 is 1. The sum of the weights keeps the digits that the product loses.",
 )
 def opacity(dtype):
     scene = stack([1e-8], dtype)
@@ -174,7 +174,7 @@ def opacity(dtype):
     "Log-opacity of a logit of -800",
     naive="`log(1 / (1 + exp(-x)))`",
     bound=8,
-    why="exp overflows, the sigmoid is 0, its logarithm minus infinity, and 0 · ∞ waits in the gradient.",
+    why="exp overflows, the sigmoid is 0 and its logarithm is minus infinity. The gradient then contains 0 · ∞.",
 )
 def log_sigmoid(dtype):
     x = np.array([-800], dtype)
@@ -186,8 +186,8 @@ def log_sigmoid(dtype):
     "A Gaussian at the camera centre",
     naive="`direction = v / norm(v)`",
     bound=8,
-    why="0/0 in the viewing direction poisons the colour and with it every pixel. It happens: camera at the "
-    "origin, centre initialised at 0. Without a direction only band 0 is left, here 0.7.",
+    why="The viewing direction is 0/0, and the NaN reaches the colour and every pixel. This occurs with a camera at "
+    "the origin and a centre initialised at 0. Without a direction only degree 0 remains, here 0.7.",
 )
 def at_the_camera(dtype):
     h = np.full((4, 3, 1), 0.2 / Y00, dtype)
@@ -203,8 +203,8 @@ def at_the_camera(dtype):
     "How many depths the sort can tell apart",
     naive="NDC depth in float32, planes 0.01 and 100",
     bound=0,
-    why="200 001 depths between 20 and 100 are left with a few thousand values, and the order within each is "
-    "chance. View z keeps them all in either precision.",
+    why="Of 200 001 depths between 20 and 100 only a few thousand distinct values remain, and the order within each "
+    "is arbitrary. View z keeps all of them distinct in either precision.",
 )
 def depth_values(dtype):
     z = np.linspace(20, 100, 200_001).astype(dtype)

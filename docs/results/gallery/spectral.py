@@ -18,7 +18,7 @@ from gallery.registry import case
     "A colour residual of 3e-10",
     naive="`(colour + residual) - colour`",
     bound=8,
-    why="Formed as a difference of two colours near 0.5 a small residual is rounding noise, or nothing.",
+    why="As a difference of two colours near 0.5, a small residual is rounding noise or 0.",
 )
 def residual(dtype):
     x = dtype(1e-9)
@@ -31,8 +31,8 @@ def residual(dtype):
     "Slope of tanh at 20",
     naive="`1 - tanh(x)**2`",
     bound=8,
-    why="tanh is rounded to 1 and the slope to 0: a saturated residual could never come back. As 4e/(1 + e)² with "
-    "e = exp(-2x) the slope keeps its digits.",
+    why="tanh is rounded to 1 and the slope to 0, so a saturated residual could never change again. As 4e/(1 + e)² "
+    "with e = exp(-2x) the slope keeps its digits.",
 )
 def slope(dtype):
     saved = appearance_forward(np.full((3, 1, 1), 20, dtype), np.ones(1, dtype), Y00)[1]
@@ -46,8 +46,8 @@ def slope(dtype):
     "sin(2π · 16 t) at t = 31/32",
     naive="`sin(2 * pi * 16 * t)`",
     bound=0,
-    why="π is rounded before the sine sees it. This atom is 0 on every frame of a 32-frame clip; what the naive "
-    "form leaves is noise, which normalisation by its RMS blows up to size 1.",
+    why="π is rounded before the sine is evaluated. This atom is 0 on every frame of a 32-frame clip. The result of "
+    "the naive form is noise, and normalisation by its RMS amplifies it to size 1.",
 )
 def phase(dtype):
     t = dtype(31 / 32)
@@ -59,8 +59,8 @@ def phase(dtype):
     "Matérn weight for a correlation length of 1e-60",
     naive="`s / mean(s)`, `s = (5/l**2 + w**2)**3`",
     bound=4,
-    why="∞/∞ as soon as the cube overflows: below l = 7e-7 in float32, 1e-51 in float64. The limit is plain: "
-    "white noise, every weight 1.",
+    why="The result is ∞/∞ as soon as the cube overflows: below l = 7e-7 in float32, 1e-51 in float64. The limit is "
+    "white noise, with every weight 1.",
 )
 def matern(dtype):
     omega = frequencies(8, 1, 16, dtype)
@@ -73,8 +73,8 @@ def matern(dtype):
     "Zero border in the pyramid",
     naive="5-tap filter with zeros outside",
     bound=4,
-    why="A constant image has no detail. With zeros outside the image, its corners show half of the brightness as "
-    "detail, at every frame and in every gradient.",
+    why="A constant image has no detail. With zeros outside the image, its corners have bands of half the "
+    "brightness, at every frame and in every gradient.",
 )
 def border(dtype):
     taps = np.array([1, 4, 6, 4, 1], dtype) / dtype(16)
@@ -88,8 +88,8 @@ def border(dtype):
     "A pyramid level without a valid value",
     naive="`mean(abs(difference[valid]))`",
     bound=0,
-    why="Close instruments leave no footprint of 37 pixels without one. The mean of nothing is NaN, and one NaN "
-    "ends a training run. Such a level counts 0.",
+    why="With instruments close together, every support of 37 pixels contains an excluded pixel. The mean of an "
+    "empty set is NaN, and one NaN ends a training run. Such a level has loss 0.",
 )
 def empty_level(dtype):
     a, b = np.zeros((3, 16, 16), dtype), np.ones((3, 16, 16), dtype)
@@ -102,7 +102,7 @@ def empty_level(dtype):
     "NaN under the instrument",
     naive="`sum(mask * abs(I - J)) / sum(mask)`",
     bound=2,
-    why="0 · NaN is NaN. A mask is a selection, not a factor; the same holds for the gradient.",
+    why="0 · NaN is NaN. A mask selects and does not multiply; the same holds for the gradient.",
 )
 def under_the_mask(dtype):
     a, b, mask = np.full((3, 4, 4), 0.75, dtype), np.full((3, 4, 4), 0.5, dtype), np.ones((4, 4), bool)
@@ -115,8 +115,9 @@ def under_the_mask(dtype):
     "1 - SSIM of two bright, even images",
     naive="`mean(x*x) - mean(x)**2`",
     bound=1000,
-    why="In float32 the variance of a wall lit at 0.95 is a difference of numbers near 0.9, with an error as "
-    "large as itself and sometimes below 0. From sum and difference of the images no moments are subtracted.",
+    why="In float32 the variance of a wall lit at 0.95 is a difference of numbers near 0.9. Its error is as large "
+    "as the variance itself, and the result is sometimes negative. The form with sum and difference of the "
+    "images subtracts no moments.",
 )
 def similarity(dtype):
     rng = np.random.default_rng(3)
@@ -147,8 +148,8 @@ def moment_ssim(x, y, dtype):
     "A view without any gradient in the calibration",
     naive="`r / median(g_lap / g_rgb)`",
     bound=8,
-    why="One fully masked frame gives 0/0, and the median of a list with a NaN is NaN: the weight of the detail "
-    "loss is gone. The view is dropped and listed; with none left, the error is named.",
+    why="One fully masked frame gives 0/0. The median of a list with a NaN is NaN, so the Laplacian weight is NaN. "
+    "The view is dropped and listed; if no view remains, an error is raised.",
 )
 def dead_view(dtype):
     rgb, lap = np.array([1.0, 0.0, 1.0, 1.0], dtype), np.array([0.25, 0.0, 0.5, 0.125], dtype)

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from endotsr.bench.clock import SPLAT, StageClock
 from endotsr.bench.timing import spread
 from endotsr.config import PAPER, Config
 from endotsr.scene import workload
@@ -66,24 +67,14 @@ def measure(case: Case) -> dict[str, Any]:
     """
     import numba
 
-    from endotsr.bench.clock import SPLAT, StageClock
-    from endotsr.fitting.trainer import training_step
     from endotsr.runs.machine import peak_memory_bytes
     from endotsr.scene.gaussians import arrays
 
     numba.set_num_threads(min(case.threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     config = case.config()
     state, shop = prepare(case, config)
-    iteration = state.iteration
-    began = time.perf_counter()
-    training_step(state, shop)
-    first, clock = time.perf_counter() - began, StageClock()
-    with clock.watching():
-        for _ in range(WARM_UP + case.repeats):
-            state.iteration = iteration
-            with clock.iteration():
-                training_step(state, shop)
-    times, peak = clock.repeats[WARM_UP:], peak_memory_bytes()
+    first, times = time_iterations(state, shop, case.repeats)
+    peak = peak_memory_bytes()
     numbers = sum(a.size for a in arrays(state.gaussians).values())
     return {
         "case": asdict(case) | {"gaussians": state.gaussians.count, "scene": case.scene and Path(case.scene).stem},
@@ -101,7 +92,7 @@ def measure(case: Case) -> dict[str, Any]:
 def prepare(case: Case, config: Config) -> tuple[Any, Any]:
     """State and workshop of a case, at the iteration that is timed, every target made."""
     from endotsr.bench.trained import trained_gaussians
-    from endotsr.fitting.trainer import bench_state, workshop
+    from endotsr.fitting.state import bench_state, workshop
 
     shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in shop.sequence.train_index:
@@ -113,8 +104,27 @@ def prepare(case: Case, config: Config) -> tuple[Any, Any]:
     return bench_state(scene, config, representative(config)), shop
 
 
+def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
+    """The same iteration of the schedule again and again, after warm-up.
+
+    returns  seconds of the very first iteration (compilation or loading of compiled code included); of each of the
+             `repeats`, seconds by stage, whose sum is the iteration
+    """
+    from endotsr.fitting.trainer import training_step
+
+    iteration, clock = state.iteration, StageClock()
+    began = time.perf_counter()
+    training_step(state, shop)
+    first = time.perf_counter() - began
+    for _ in range(WARM_UP + repeats):
+        state.iteration = iteration
+        with clock.iteration():
+            training_step(state, shop, clock)
+    return first, clock.repeats[WARM_UP:]
+
+
 def representative(config: Config) -> int:
-    """An iteration after which everything runs: residuals, detail loss and statistics, but no densification."""
+    """An iteration after which everything runs: residuals, Laplacian loss and statistics, but no densification."""
     t, loss = config.training, config.loss
     start = max(t.residual_activation + 1, loss.laplacian_full, loss.smoothness_from)
     return start + config.density.interval // 2
@@ -136,17 +146,15 @@ def _view(state: Any, shop: Any) -> dict[str, int]:
 
 def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:
     """What an iteration that densifies spends on it; the scene changes, so there are few repeats."""
-    from endotsr.bench.clock import StageClock
     from endotsr.fitting.trainer import training_step
 
     if repeats == 0:
         return None
     interval, clock = shop.config.density.interval, StageClock()
-    with clock.watching():
-        for _ in range(1 + repeats):  # the first one loads its kernels
-            state.iteration = -(-state.iteration // interval) * interval - 1
-            with clock.iteration():
-                training_step(state, shop)
+    for _ in range(1 + repeats):  # the first one loads its kernels
+        state.iteration = -(-state.iteration // interval) * interval - 1
+        with clock.iteration():
+            training_step(state, shop, clock)
     seconds = [t["density control"] for t in clock.repeats[1:]]
-    share = float(np.median(seconds)) * 1e3 / interval
-    return spread(seconds) | {"per_iteration_ms": share, "gaussians": state.gaussians.count}
+    per_iteration = float(np.median(seconds)) * 1e3 / interval
+    return spread(seconds) | {"per_iteration_ms": per_iteration, "gaussians": state.gaussians.count}

@@ -1,13 +1,16 @@
-"""Pictures of benchmark results, on white, drawn with matplotlib."""
+"""Charts of benchmark results: stacked bars of the stages, and cost against each size.
+
+Comes in: what `bench.stages` and `bench.scaling` return. Goes out: a picture file, png or svg. Colours of stages are
+fixed here, everything else of the style in `endotsr.report.style`.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from endotsr.bench.clock import REST, STAGES
-from endotsr.report.curves import UNSIGNED
+from endotsr.report.style import INK, NORMAL, SMALL, legend, name_axes, new_figure, plain_axes, save
 
-INK, FAINT = "#24303a", "#c9d1d8"
 # Stages of one kind share a hue: time bases blue, splatting orange to red, losses green, optimiser violet.
 COLOURS = {
     "FDM": "#0b6e99",
@@ -28,7 +31,8 @@ assert set(COLOURS) == {*STAGES, REST}
 
 def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
     """One stacked bar a case, the stages in their order, the whole iteration in numbers at its end."""
-    figure, axes = _figure(9.6, 1.7 + 0.42 * len(cases))
+    figure = new_figure(9.6, 1.7 + 0.42 * len(cases))
+    axes = figure.subplots()
     labels = [_label(case["case"]) for case in cases]
     left = [0.0] * len(cases)
     for name, colour in COLOURS.items():
@@ -38,13 +42,13 @@ def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
     longest = max(left, default=0.0)
     for row, (end, case) in enumerate(zip(left, cases)):
         text = f"{case['iteration']['median_ms']:.0f} ms"
-        axes.text(end + 0.012 * longest, row, text, va="center", color=INK, fontsize=9)
+        axes.text(end + 0.012 * longest, row, text, va="center", color=INK, fontsize=NORMAL.text)
     axes.set_xlim(0, 1.1 * longest)
     axes.invert_yaxis()
-    axes.set_xlabel("median time of one training iteration, ms", color=INK, fontsize=9)
-    _finish(axes, "x")
-    figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=9, labelcolor=INK)
-    _save(figure, path)
+    name_axes(axes, "median time of one training iteration, ms")
+    plain_axes(axes, grid="x")
+    legend(figure, loc="outside lower center", ncols=5)
+    save(figure, path)
 
 
 CURVE_COLOURS = {
@@ -62,19 +66,18 @@ def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """A panel for each size: measured times as points, the fitted power of the upper decade as a line."""
     columns = min(3, len(axes))
     rows = -(-len(axes) // columns)
-    figure, panels = _figure(3.9 * columns, 3.5 * rows, columns, rows)
-    panels = list(panels.flat) if hasattr(panels, "flat") else [panels]
+    figure = new_figure(3.9 * columns, 3.5 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, axis in zip(panels, axes.values()):
         for name, times in axis["median_ms"].items():
             _power(panel, axis["size"], times, name, axis["exponent"][name])
         _logarithmic(panel, axis["size"], len(axis["median_ms"]))
-        panel.set_xlabel(axis["unit"], color=INK, fontsize=9)
-        panel.set_ylabel("ms", color=INK, fontsize=9)
-        panel.legend(frameon=False, fontsize=8, labelcolor=INK, loc="upper left")
-        _finish(panel)
+        name_axes(panel, axis["unit"], "ms")
+        plain_axes(panel)
+        legend(panel, sizes=SMALL, loc="upper left")
     for empty in panels[len(axes) :]:
         empty.set_visible(False)
-    _save(figure, path)
+    save(figure, path)
 
 
 def _logarithmic(panel: Any, size: Sequence[float], curves: int) -> None:
@@ -120,25 +123,3 @@ def _power(panel: Any, size: Sequence[float], times: Sequence[float], name: str,
 def _label(case: Mapping[str, Any]) -> str:
     what = case["scene"] or f"{case['gaussians'] / 1000:g}k"
     return f"{what}, {case['precision']}, {case['threads']} thread{'s' if case['threads'] > 1 else ''}"
-
-
-def _figure(width: float, height: float, columns: int = 1, rows: int = 1) -> tuple[Any, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(rows, columns)
-
-
-def _finish(axes: Any, grid: str = "both") -> None:
-    axes.tick_params(which="both", colors=INK, labelsize=9, length=0)
-    axes.grid(True, axis=grid, color=FAINT, linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in axes.spines.values():
-        side.set_visible(False)
-
-
-def _save(figure: Any, path: Path) -> None:
-    metadata = UNSIGNED if path.suffix == ".png" else {"Creator": None, "Date": None}
-    figure.savefig(path, dpi=150, metadata=metadata)

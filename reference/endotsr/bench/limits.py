@@ -2,9 +2,9 @@
 
 For each stage, floating-point operations and bytes. Operations are counted in the forward and reverse formulas (a
 fused multiply-add is two, so is a division); bytes are compulsory traffic: every large array is read once and
-written once, nothing is read twice. The limit is the longer of the two times, so a share of the limit of 100 % cannot
-be passed but by data that stay in a cache between stages. Sorting and bookkeeping have no arithmetic to speak of:
-their limit is traffic alone.
+written once, nothing is read twice. The limit is the longer of the two times, so a stage exceeds 100 % of its limit
+only where data stay in a cache between stages. Sorting and bookkeeping have almost no arithmetic: their limit is
+traffic alone.
 """
 
 from collections.abc import Mapping
@@ -39,15 +39,15 @@ def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
     size = 8 if case["precision"] == "float64" else 4
     fdm = 3 * DEFORMATION_CHANNELS * case["bases"] * n  # numbers of the three arrays
     spectral = 6 * case["frequencies"] * n  # numbers of A, and of C
-    bands = 3 * (config.model.harmonics_degree + 1) ** 2
-    base = 11 + bands  # numbers of a Gaussian beside its time bases and residuals
+    harmonics = 3 * (config.model.harmonics_degree + 1) ** 2  # coefficients
+    base = 11 + harmonics  # numbers of a Gaussian beside its time bases and residuals
     seen, listed, blended = view["visible"], view["listed"], view["blended"]
     digits = -(-8 * size // RADIX_BITS)
     gathered = RECORD * seen * size + GRADIENT * listed * size + 12 * seen * size
     return {
         "FDM": Work((FDM_FORWARD + FDM_REVERSE + 3 * ADAM) * fdm / 3, size * (6 * fdm + 2 * DEFORMATION_CHANNELS * n)),
         "Fourier": Work(FOURIER * spectral, size * 3 * spectral),  # A, C, and C for the penalty
-        "projection": Work((PROJECTION + HARMONIC * bands) * n, size * (3 * base + 30) * n),
+        "projection": Work((PROJECTION + HARMONIC * harmonics) * n, size * (3 * base + 30) * n),
         "binning": Work(0, digits * (2 * size + 8) * seen + 16 * listed + gathered),
         "blend forward": Work(BLEND_FORWARD * blended, size * (RECORD * seen + 6 * pixels)),
         "blend reverse": Work(BLEND_REVERSE * blended, size * (RECORD * seen + GRADIENT * listed + 10 * pixels)),
@@ -60,7 +60,7 @@ def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
 
 
 def limits(result: Mapping[str, Any], peaks: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """For each stage {"limit_ms", "bound": "arithmetic" or "memory", "share": limit / measured median}.
+    """For each stage {"limit_ms", "bound": "arithmetic" or "memory", "fraction": limit / measured median}.
 
     peaks   of `endotsr.bench.peaks.measure_peaks`, with the threads of the case
     """
@@ -73,6 +73,6 @@ def limits(result: Mapping[str, Any], peaks: Mapping[str, Any]) -> dict[str, dic
         found[name] = {
             "limit_ms": limit,
             "bound": "arithmetic" if arithmetic > memory else "memory",
-            "share": limit / median if median > 0 else None,
+            "fraction": limit / median if median > 0 else None,
         }
     return found

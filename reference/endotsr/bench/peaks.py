@@ -15,9 +15,9 @@ from endotsr.kernels.threads import parallel_for
 
 STEPS = 16  # multiply-adds of one chain, each waiting for the one before
 CHAINS = 8  # of one number, independent: enough to hide the latency of an FMA
-BLOCK = 4096  # numbers of one task: they stay in the first-level cache
-TRIAD_BYTES = 96 << 20  # of one array, beyond any cache of the machine
-PIECE = 1 << 16  # numbers in one task of a memory kernel
+FMA_NUMBERS_PER_TASK = 4096  # they stay in the first-level cache
+MEMORY_NUMBERS_PER_TASK = 1 << 16
+ARRAY_BYTES = 96 << 20  # of each array of a memory kernel, beyond any cache of the machine
 
 
 def _multiply_add(first, stop, values, f):
@@ -46,7 +46,7 @@ def _multiply_add(first, stop, values, f):
 
 def _triad(first, stop, out, left, right, factor):
     """out = left + factor right."""
-    begin, end = first * PIECE, min(out.size, stop * PIECE)
+    begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, x, y = out[begin:end], left[begin:end], right[begin:end]
     for i in range(o.size):
         o[i] = x[i] + factor * y[i]
@@ -54,7 +54,7 @@ def _triad(first, stop, out, left, right, factor):
 
 def _update(first, stop, out, left, right, factor):
     """out <- right + factor out, in place: what an optimiser does; `left` is not read."""
-    begin, end = first * PIECE, min(out.size, stop * PIECE)
+    begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, y = out[begin:end], right[begin:end]
     for i in range(o.size):
         o[i] = y[i] + factor * o[i]
@@ -69,19 +69,19 @@ def fma_peak(precision: str, repeats: int = 7) -> float:
     """Floating-point operations per second with the threads in use; a fused multiply-add counts as two."""
     real = np.dtype(precision).type
     tasks = 64 * numba.get_num_threads()
-    values = np.ones((tasks, BLOCK), real)
+    values = np.ones((tasks, FMA_NUMBERS_PER_TASK), real)
     work = lambda: parallel_for(_multiply_add_kernel, tasks, values, real(0.5))
     return 2.0 * STEPS * CHAINS * values.size / min(repeated(work, repeats, warm_up=2))
 
 
-def bandwidths(repeats: int = 7, array_bytes: int = TRIAD_BYTES) -> dict[str, float]:
+def bandwidths(repeats: int = 7, array_bytes: int = ARRAY_BYTES) -> dict[str, float]:
     """Bytes per second with the threads in use: "triad" (two arrays read, one written), "update"
     (one read, one changed).
 
     A line that is only written is read first by most processors; that traffic is not counted, as in STREAM.
     """
     out, left, right = (np.ones(array_bytes // 4, np.float32) for _ in range(3))
-    tasks, factor = -(-out.size // PIECE), np.float32(0.5)
+    tasks, factor = -(-out.size // MEMORY_NUMBERS_PER_TASK), np.float32(0.5)
     seconds = {
         name: min(repeated(lambda k=kernel: parallel_for(k, tasks, out, left, right, factor), repeats))
         for name, kernel in (("triad", _triad_kernel), ("update", _update_kernel))

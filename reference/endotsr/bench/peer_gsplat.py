@@ -14,11 +14,10 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 ALPHA_MAX = 0.999  # a constant inside gsplat's Python reference
 JACOBIAN_CLAMP = 1.3  # likewise; measured from the image border, so it equals ours for a centred principal point only
@@ -58,8 +57,8 @@ def difference_of_rules(scene: Scene, camera: Camera, settings: RasterSettings) 
         (y, camera.fy, camera.cy, camera.height),
     ):
         slope = slope[seen] / z[seen]
-        share = (JACOBIAN_CLAMP - 1) * pixels / 2
-        low, high = -(centre + share) / focal, (pixels - centre + share) / focal
+        margin = (JACOBIAN_CLAMP - 1) * pixels / 2
+        low, high = -(centre + margin) / focal, (pixels - centre + margin) / focal
         ours = settings.jacobian_clamp * pixels / (2 * focal) if settings.jacobian_clamp > 0 else np.inf
         if not np.allclose(np.clip(slope, low, high), np.clip(slope, -ours, ours), rtol=1e-13, atol=0):
             return "a centre lies beyond the limit of the Jacobian clamp, and the limits differ"

@@ -13,14 +13,13 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.bench.case import Case, Precision, apart
 from endotsr.bench.timing import repeated, spread
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.report.tables import plain
 from endotsr.scene import workload
-
-FloatArray = NDArray[np.floating]
 
 Found = tuple[dict[str, FloatArray], list[float]]
 
@@ -147,17 +146,13 @@ def relative_error(found: FloatArray, expected: FloatArray) -> float:
 
 def table(result: dict[str, Any]) -> str:
     """For a person: times, ratio and the largest error beside it."""
-    lines = [
-        f"{'Gaussians':>9}  {'precision':<10}{'endotsr ms':>11}{'gsplat ms':>11}{'ratio':>7}{'lists ms':>10}"
-        "  largest error"
-    ]
+    rows = []
     for case in result["cases"]:
-        times = [case[name]["median_ms"] for name in ("ours", "gsplat", "pair_lists")]
-        lines.append(
-            f"{case['gaussians']:>9}  {case['precision']:<10}{times[0]:>11.1f}{times[1]:>11.0f}{case['ratio']:>7.0f}"
-            f"{times[2]:>10.0f}  {verdict(case)}"
-        )
-    return "\n".join(lines)
+        ours, gsplat, lists = (case[name]["median_ms"] for name in ("ours", "gsplat", "pair_lists"))
+        times = [f"{ours:.1f}", f"{gsplat:.0f}", f"{case['ratio']:.0f}", f"{lists:.0f}"]
+        rows.append([str(case["gaussians"]), case["precision"], *times, verdict(case)])
+    columns = ("Gaussians", "precision", "endotsr ms", "gsplat ms", "ratio", "lists ms", "largest error")
+    return plain(columns, rows, (1, 6))
 
 
 def verdict(case: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from endotsr.bench.case import Case, apart, measure
 from endotsr.bench.clock import REST, SPLAT, STAGES
 from endotsr.bench.stages import Say, line
+from endotsr.report.tables import plain
 
 # Stages that grow together, in the order of the legend.
 CURVES: dict[str, tuple[str, ...]] = {
@@ -143,11 +144,11 @@ def _slope(axis: dict[str, Any] | None) -> float | None:
 
 def table(result: dict[str, Any]) -> str:
     """For a person: exponents of every curve, then memory."""
-    lines = [f"{'along':<16}{'range':>22}  exponents over the upper decade"]
+    rows = []
     for axis in result["axes"].values():
         fits = ", ".join(f"{name} {p:.2f}" for name, p in axis["exponent"].items() if p is not None)
-        ends = f"{min(axis['size']):,.0f} - {max(axis['size']):,.0f}"
-        lines.append(f"{axis['unit']:<16}{ends:>22}  {fits}")
+        rows.append([axis["unit"], f"{min(axis['size']):,.0f} - {max(axis['size']):,.0f}", fits])
+    lines = [plain(("along", "range", "exponents over the upper decade"), rows, (0, 2))]
     for name, slope in result["memory"].items():
         if slope is not None:
             lines.append(f"{name.replace('_', ' ')}: {slope:,.0f}")

@@ -9,6 +9,8 @@ from endotsr.bench.case import Case, Precision, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
 from endotsr.bench.trained import read_arrays
+from endotsr.report.tables import plain
+from endotsr.report.words import memory
 
 Say = Callable[[str], None]
 
@@ -83,30 +85,30 @@ def line(result: dict[str, Any]) -> str:
     )
 
 
-def memory(found: int | None) -> str:
-    """Peak memory in words."""
-    return f"{found / 1e9:.2f} GB" if found else "memory not known"
-
-
 def table(result: dict[str, Any]) -> str:
-    """One case for a person: each stage with its quartiles, share of the iteration, limit and what binds it."""
-    total = result["iteration"]["median_ms"]
-    lines = [f"{'stage':<22}{'median ms':>11}{'quartiles':>19}{'share':>7}{'limit ms':>10}{'of limit':>10}  bound by"]
+    """One case for a person: each stage with its quartiles, fraction of the iteration, limit and what binds it."""
     rows = [*result["stages"].items(), ("splat", result["splat"]), ("iteration", result["iteration"])]
-    for name, spread in rows:
-        low, high = spread["quartiles_ms"]
-        limit = result["limits"].get(name)
-        reached = f"{limit['share']:.0%}" if limit and limit["share"] is not None else "-"
-        bound = f"{limit['limit_ms']:>10.2f}{reached:>10}  {limit['bound']}" if limit else ""
-        share = f"{spread['median_ms'] / total:.0%}"
-        lines.append(f"{name:<22}{spread['median_ms']:>11.2f}{f'{low:.2f} - {high:.2f}':>19}{share:>7}{bound}")
+    cells = [_row(name, spread, result) for name, spread in rows]
+    lines = [plain(("stage", "median ms", "quartiles", "fraction", "limit ms", "of limit", "bound by"), cells, (0, 6))]
     dense = result["densification"]
     if dense:
         per = f"{dense['per_iteration_ms']:.2f} ms an iteration"
-        lines.append(f"{'densification':<22}{dense['median_ms']:>11.2f}  once an interval: {per}")
+        lines.append(f"densification, once an interval: {dense['median_ms']:.2f} ms, or {per}")
     lines.append(f"first iteration, compiled code loaded or made: {result['first_iteration_s']:.1f} s")
     ns = result["ns_per_pair"]
     if ns["splat"] is not None:
         each = ", ".join(f"{name} {value:.2f}" for name, value in ns.items())
         lines.append(f"{result['view']['blended'] / 1e6:.2f} M blended pairs; ns a pair: {each}")
     return "\n".join(lines)
+
+
+def _row(name: str, spread: dict[str, Any], result: dict[str, Any]) -> list[str]:
+    """One line of the table; a stage without a limit has none."""
+    low, high = spread["quartiles_ms"]
+    fraction = spread["median_ms"] / result["iteration"]["median_ms"]
+    cells = [name, f"{spread['median_ms']:.2f}", f"{low:.2f} - {high:.2f}", f"{fraction:.0%}"]
+    limit = result["limits"].get(name)
+    if limit is None:
+        return [*cells, "", "", ""]
+    reached = f"{limit['fraction']:.0%}" if limit["fraction"] is not None else "-"
+    return [*cells, f"{limit['limit_ms']:.2f}", reached, limit["bound"]]

@@ -15,6 +15,7 @@ import time
 from typing import Any
 
 from endotsr.errors import InputError
+from endotsr.report.tables import plain
 
 MOMENTS = ("imported", "sequence made", "initialised", "first iteration", "first iteration with everything")
 
@@ -50,7 +51,8 @@ def _first_iterations() -> None:
     from endotsr.bench.case import representative
     from endotsr.config import PAPER
     from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.trainer import new_training, training_step, workshop
+    from endotsr.fitting.state import new_training, workshop
+    from endotsr.fitting.trainer import training_step
     from endotsr.scene import workload
 
     say = lambda moment: print(json.dumps(moment), flush=True)
@@ -63,16 +65,15 @@ def _first_iterations() -> None:
     training_step(state, shop)
     say(MOMENTS[3])
     for iteration in (PAPER.training.residual_activation, representative(PAPER)):
-        state.iteration = iteration  # the residuals are born at the first of the two
+        state.iteration = iteration  # the residuals are activated at the first of the two
         training_step(state, shop)
     say(MOMENTS[4])
 
 
 def table(result: dict[str, Any]) -> str:
     """For a person."""
-    lines = [f"{'seconds from the call to':<36}{'cold':>8}{'warm':>8}"]
-    lines += [f"{moment:<36}{result['cold'][moment]:>8.2f}{result['warm'][moment]:>8.2f}" for moment in MOMENTS]
-    return "\n".join(lines)
+    rows = [[moment, *(f"{result[kind][moment]:.2f}" for kind in ("cold", "warm"))] for moment in MOMENTS]
+    return plain(("seconds from the call to", "cold", "warm"), rows)
 
 
 if __name__ == "__main__":

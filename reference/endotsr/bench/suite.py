@@ -1,4 +1,4 @@
-"""`endotsr bench all`: every measurement of the performance page in one go, as JSON and pictures in one folder."""
+"""`endotsr bench all`: every measurement in one go, as JSON and pictures in one folder."""
 
 from collections.abc import Callable
 from pathlib import Path

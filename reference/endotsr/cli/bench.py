@@ -7,13 +7,12 @@ from typing import Any
 from endotsr.cli.parts.bench_options import (
     AllOptions,
     IterationOptions,
-    PageOptions,
     PeersOptions,
     ScalingOptions,
     StagesOptions,
     StartOptions,
 )
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
 
@@ -34,6 +33,7 @@ def run(words: list[str]) -> int:
     chosen = parse(options, rest, f"bench {what}")
     _refuse_nothing(what, chosen)
     refuse_unwritable(getattr(chosen, "json", None), getattr(chosen, "plot", None))
+    _refuse_other_pictures(getattr(chosen, "plot", None))
     measure(chosen)
     return 0
 
@@ -49,6 +49,12 @@ def _refuse_nothing(what: str, options: Any) -> None:
         if getattr(options, name, None) == () and not (name == "gaussians" and scenes):
             other = ", or none with --scenes" if name == "gaussians" and what == "stages" else ""
             raise InputError(f"bench: --{name} is empty, which leaves nothing to time; allowed: one or more{other}")
+
+
+def _refuse_other_pictures(plot: Path | None) -> None:
+    """Raises: InputError for a picture of a kind that is not drawn, before the measurement."""
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg"):
+        raise InputError(f"bench: --plot {plot} is not allowed; allowed: a file whose name ends in .png or .svg")
 
 
 def _overview() -> str:
@@ -127,19 +133,9 @@ def _start(options: StartOptions) -> None:
 
 
 def _all(options: AllOptions) -> None:
-    from endotsr.bench import page, suite
+    from endotsr.bench import suite
 
-    if options.page and not options.page.is_file():
-        raise InputError(f"{options.page}: no such page; allowed: a file with marks, as docs/performance.md")
     suite.run_all(options.out, options.scenes, print)
-    if options.page:
-        page.write_page(options.out, options.page)
-
-
-def _page(options: PageOptions) -> None:
-    from endotsr.bench.page import write_page
-
-    write_page(options.results, options.page)
 
 
 MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
@@ -149,5 +145,4 @@ MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
     "peers": (PeersOptions, _peers),
     "start": (StartOptions, _start),
     "all": (AllOptions, _all),
-    "page": (PageOptions, _page),
 }

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import tyro
-
+from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import differences, parse, with_short_names
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
@@ -31,20 +30,20 @@ class CalibrateOptions:
     --loss.gradient-ratio, --loss.calibration-views and the settings of --raster. All others are fixed by the run.
     """
 
-    run: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="RUN")] = None
+    run: Annotated[Path | None, Option("RUN", positional=True)] = None
     """run folder"""
-    sequence: Annotated[str | None, tyro.conf.arg(metavar="SEQUENCE")] = None
+    sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """where the sequence of the run is now (default: where it was)"""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    json: Annotated[Path | None, Option("FILE")] = None
     """also write weight, ratios and table as JSON"""
-    threads: Annotated[int | None, tyro.conf.arg(metavar="INT")] = None
+    threads: int | None = None
     """threads, 0 = all cores"""
-    settings: Annotated[Config, tyro.conf.arg(name="")] = PAPER
+    settings: Annotated[Config, Option(flat=True)] = PAPER
 
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.fitting.trainer import calibrate_on
+    from endotsr.fitting.objective import calibrate_on
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence
@@ -62,7 +61,7 @@ def run(words: list[str]) -> int:
     model = load_model(folder)
     use_threads(config.training.threads)
     sequence = load_run_sequence(folder, options.sequence)
-    found = calibrate_on(model.gaussians, model.spectral, sequence, config)
+    found = calibrate_on(model.gaussians, model.spectral, sequence, config, model.frames)
     for line in replaced:
         print(f"setting replaced: {line}")
     print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")

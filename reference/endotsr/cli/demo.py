@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.sources import SIMULATED
 
@@ -18,9 +17,9 @@ class DemoOptions:
     The same as `endotsr train simulated --preset demo`; every option of `endotsr train` is understood.
     """
 
-    out: Annotated[Path, tyro.conf.arg(metavar="RUN")]
+    out: Annotated[Path, Option("RUN")]
     """run folder to create"""
-    iterations: Annotated[int, tyro.conf.arg(metavar="N")] = 600
+    iterations: Annotated[int, Option("N")] = 600
     """length of the run; stretches the schedule"""
     scale: float = 1.0
     """size of the simulated pictures; 1 = 160x128"""

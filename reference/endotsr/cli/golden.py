@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 
-Outdir = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUTDIR")]
+Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
 
 
@@ -22,11 +21,11 @@ class _Reported:
     """precision that the port claims"""
     level: Level = 5
     """highest level that is asked for; exit code 0 if it is complete"""
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    json: Annotated[Path | None, Option("FILE")] = None
     """also write the report as JSON"""
-    html: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    html: Annotated[Path | None, Option("FILE")] = None
     """also write the report as one HTML page with difference images"""
 
 
@@ -35,7 +34,7 @@ class JudgeOptions(_Reported):
     """Judge a folder of outputs OUTDIR/<family>/<case>/<name>.npy; exit code 1 if the level is not complete."""
 
     outdir: Outdir = Path()
-    again: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    again: Annotated[Path | None, Option("DIR")] = None
     """outputs of a second run: level 5 asks for the same bits"""
 
 
@@ -47,7 +46,7 @@ class RunOptions(_Reported):
     """the command, with {requests} and {outputs} where the folders go; called without a shell"""
     timeout: float = 600.0
     """seconds allowed for one call"""
-    keep: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    keep: Annotated[Path | None, Option("DIR")] = None
     """keep requests and outputs in this folder, in place of those of an earlier run"""
 
 
@@ -55,7 +54,7 @@ class RunOptions(_Reported):
 class GenerateOptions:
     """Compute all cases anew and compare with the folder; exit code 1 if anything differs."""
 
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
     within_tolerance: bool = False
     """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
@@ -70,19 +69,19 @@ class ReferenceOptions:
     outdir: Outdir
     precision: Literal["float32", "float64"] = "float32"
     """precision of the arithmetic; with --requests, what the requests say"""
-    requests: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    requests: Annotated[Path | None, Option("DIR")] = None
     """answer this folder of requests"""
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
 
 
 @dataclass
-class NegativeOptions:
+class WrongPortOptions:
     """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
 
-    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[FLAG]")] = ""
+    name: Annotated[str, Option("[FLAG]", positional=True)] = ""
     outdir: Outdir = Path()
-    golden: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
 
 
@@ -108,8 +107,8 @@ def run(words: list[str]) -> int:
 
 
 def _judge(words: list[str]) -> int:
-    from endotsr.golden.judge import judge
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.judge.verdict import judge
 
     options = parse(JudgeOptions, words, "golden judge")
     if options.outdir == Path():
@@ -124,9 +123,9 @@ def _judge(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    from endotsr.golden.judge import judge, without_claim
-    from endotsr.golden.port import KEPT, clear_kept, refuse_command, run_port, write_requests
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.judge.verdict import judge, without_claim
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
@@ -147,7 +146,7 @@ def _run(words: list[str]) -> int:
 
 
 def _tell(report, golden, outdir: Path, options: _Reported) -> int:
-    from endotsr.golden.report import as_html, as_json, as_table
+    from endotsr.golden.judge.report import as_html, as_json, as_table
 
     print(as_table(report))
     if options.json:
@@ -158,8 +157,8 @@ def _tell(report, golden, outdir: Path, options: _Reported) -> int:
 
 
 def _generate(words: list[str]) -> int:
-    from endotsr.golden.generate import check, write
-    from endotsr.golden.store import golden_folder
+    from endotsr.golden.judge.store import golden_folder
+    from endotsr.golden.vectors.generate import check, write
 
     options = parse(GenerateOptions, words, "golden generate")
     folder = golden_folder(options.golden)
@@ -174,8 +173,8 @@ def _generate(words: list[str]) -> int:
 
 
 def _reference(words: list[str]) -> int:
-    from endotsr.golden.port import answer_all, answer_requests
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.vectors.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
     if options.requests is not None:
@@ -187,14 +186,14 @@ def _reference(words: list[str]) -> int:
 
 
 def _negative(words: list[str]) -> int:
-    from endotsr.golden.negative import all_negatives
-    from endotsr.golden.port import answer_wrongly
-    from endotsr.golden.store import golden_folder, read_golden
+    from endotsr.golden.judge.store import golden_folder, read_golden
+    from endotsr.golden.vectors.reference import answer_wrongly
+    from endotsr.golden.vectors.registry import all_wrong_ports
 
-    options = parse(NegativeOptions, words, "golden negative")
-    known = all_negatives()
+    options = parse(WrongPortOptions, words, "golden negative")
+    known = all_wrong_ports()
     if not options.name:
-        print("\n".join(f"{n.name}: {n.title} ({n.wrong})" for n in known.values()))
+        print("\n".join(f"{w.flag}: {w.title} ({w.wrong})" for w in known.values()))
         return 0
     if options.name not in known or options.outdir == Path():
         raise InputError("golden negative: give the FLAG of a mistake (without arguments: a list) and OUTDIR")

@@ -4,20 +4,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 
 
 @dataclass
 class GradcheckOptions:
     """Check reverse passes in float64 against finite differences; exit code 1 if one does not pass."""
 
-    names: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="[NAME ...]")] = ()
+    names: Annotated[tuple[str, ...], Option("[NAME ...]", positional=True)] = ()
     """stages to check (default: all)"""
     seed: int = 0
     """seed of inputs and directions"""
-    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    json: Annotated[Path | None, Option("FILE")] = None
     """also write the table as JSON"""
 
 

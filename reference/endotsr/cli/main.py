@@ -11,8 +11,8 @@ import os
 import sys
 
 from endotsr import __version__
-from endotsr.cli.parts.stopping import signals_stop
 from endotsr.errors import CalibrationError, InputError
+from endotsr.runs.stopping import signals_stop
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
@@ -60,7 +60,7 @@ def main(argv: list[str] | None = None) -> int:
 
         return _fail(os_error_line(error))
     except FloatingPointError as error:
-        _fail(f"the training left the numbers: {error}; a smaller learning rate may help")
+        _fail(f"training diverged: non-finite values: {error}; a smaller learning rate may help")
         return 1
     except MemoryError:
         return _fail("not enough memory; a smaller --scale or fewer --frames needs less")

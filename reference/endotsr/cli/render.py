@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import replacing_folder, write_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -20,17 +19,17 @@ class RenderOptions:
     holds colour/, depth/, opacity/ and render.json (time, camera frame and file of every picture, depth scale).
     """
 
-    run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RUN")]
+    run: Annotated[Path, Option("RUN", positional=True)]
     """run folder"""
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
+    out: Annotated[Path, Option("DIR")]
     """folder to create"""
-    times: Annotated[tuple[float, ...], tyro.conf.arg(metavar="T [T ...]")] = ()
+    times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
-    frames: Annotated[Literal["test", "train", "all"] | None, tyro.conf.arg(metavar="{test,train,all}")] = None
+    frames: Literal["test", "train", "all"] | None = None
     """the frames of the sequence instead of --times (default: test)"""
-    count: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    count: Annotated[int | None, Option("N")] = None
     """N times evenly spaced over [0, 1], instead of --times: a film with in-between times"""
-    camera: Annotated[int | None, tyro.conf.arg(metavar="FRAME")] = None
+    camera: Annotated[int | None, Option("FRAME")] = None
     """always look from the camera of this frame"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
@@ -68,6 +67,8 @@ def run(words: list[str]) -> int:
 
 def wanted_views(record: dict[str, Any], options: RenderOptions) -> list[View]:
     """The pictures that the options ask for. Raises InputError for a time or frame that does not exist."""
+    from endotsr.runs.sources import nearest_frame
+
     given = [bool(options.times), options.frames is not None, options.count is not None]
     if sum(given) > 1:
         raise InputError("render: give one of --times, --frames and --count")
@@ -79,7 +80,7 @@ def wanted_views(record: dict[str, Any], options: RenderOptions) -> list[View]:
         for time in times:
             if not 0.0 <= time <= 1.0:
                 raise InputError(f"render: --times {time:g} is not allowed; allowed: times in [0, 1]")
-        views = [View(t, _nearest(record["times"], t), f"{i:05d}") for i, t in enumerate(times)]
+        views = [View(t, nearest_frame(record["times"], t), f"{i:05d}") for i, t in enumerate(times)]
     else:
         index = {"test": record["test_index"], "train": record["train_index"], "all": range(count)}
         views = [View(record["times"][i], i, record["names"][i]) for i in index[options.frames or "test"]]
@@ -92,10 +93,6 @@ def _even(count: int) -> list[float]:
     return [i / max(count - 1, 1) for i in range(count)]
 
 
-def _nearest(times: list[float], time: float) -> int:
-    return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
-
-
 def renderer(folder: RunFolder, without: tuple[str, ...] = ()):
     """(time, camera) -> RenderOut of the run's latest checkpoint."""
     from endotsr.fitting.model import render_at
@@ -106,7 +103,14 @@ def renderer(folder: RunFolder, without: tuple[str, ...] = ()):
 
     def render(time: float, camera):
         return render_at(
-            model.gaussians, model.spectral, model.config, camera, time, appearance=appearance, spectral_motion=motion
+            model.gaussians,
+            model.spectral,
+            model.config,
+            camera,
+            time,
+            frames=model.frames,
+            appearance=appearance,
+            spectral_motion=motion,
         )
 
     return render
@@ -116,8 +120,8 @@ def write_views(target: Path, folder: RunFolder, views: list[View], render, npy:
     """Render and write every view below `target`, then render.json."""
     import numpy as np
 
-    from endotsr.cli.parts.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
     from endotsr.opencv import write_png
+    from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
     from endotsr.runs.sources import remembered_cameras
 
     record = folder.sequence_record("names", "cameras", "static_camera", "unit")

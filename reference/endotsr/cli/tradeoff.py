@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import tyro
-
-from endotsr.cli.parts.options import parse
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.tradeoff_train import TRAINING
+from endotsr.cli.tradeoff_train import run as run_training
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder, write_json
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from endotsr.tradeoff.budget import Budget
     from endotsr.tradeoff.scenes import StudyScene
 
-RESULT, TRAINING = "tradeoff.json", "training.json"
+RESULT = "tradeoff.json"  # in the folder of the measurement
 LEAST_REPEATS = 7
 
 
@@ -26,15 +28,15 @@ class TradeoffOptions:
     training; see its --help. With --budget, the answer comes from the measurement in --out, which is made if missing.
     """
 
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("tradeoff")
+    out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
-    run: Annotated[Path | None, tyro.conf.arg(metavar="RUN")] = None
+    run: Annotated[Path | None, Option("RUN")] = None
     """run folder to take the scene from"""
-    splats: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    splats: Annotated[Path | None, Option("FILE")] = None
     """file of trained Gaussians: .ply, or .npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
     scale: float = 1.0
     """size of the picture, relative to that of the scene"""
-    budget: Annotated[str | None, tyro.conf.arg(metavar="TEXT")] = None
+    budget: str | None = None
     """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
     ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
     images: bool = False
@@ -48,8 +50,6 @@ class TradeoffOptions:
 def run(words: list[str]) -> int:
     """The command."""
     if words[:1] == ["train"]:
-        from endotsr.cli.tradeoff_train import run as run_training
-
         return run_training(words[1:])
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
@@ -136,35 +136,3 @@ def _say_training(out: Path, budget: "Budget") -> int:
         raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
     print("\n".join(training_advice(read_result(file, Trainings), budget).lines))
     return 0
-
-
-class StepBar:
-    """A progress bar on a terminal; one line at the beginning elsewhere."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._bar: Any = None
-
-    def __enter__(self) -> "StepBar":
-        return self
-
-    def begin(self, steps: int) -> None:
-        """The number of steps is known."""
-        from tqdm import tqdm
-
-        self._bar = tqdm(total=steps, desc=self._name, disable=None, dynamic_ncols=True)
-        if self._bar.disable:
-            print(f"{self._name}: {steps} steps", flush=True)
-
-    def step(self, count: int = 1) -> None:
-        """So many more are done."""
-        self._bar.update(count)
-
-    def say(self, message: str) -> None:
-        """A line that does not disturb the bar."""
-        self._bar.clear()
-        print(message, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()

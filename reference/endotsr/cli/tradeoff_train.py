@@ -5,13 +5,15 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
-import tyro
 
-from endotsr.cli.parts.options import parse
-from endotsr.cli.tradeoff import TRAINING, StepBar
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.progress import StepBar
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder
 from endotsr.runs.sources import SIMULATED
+
+TRAINING = "training.json"  # in the folder of the measurement
 
 
 @dataclass
@@ -21,19 +23,19 @@ class TradeoffTrainOptions:
     DIR/training.json is written after every training; the same command goes on where an interrupted one stopped.
     """
 
-    sequence: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[SEQUENCE]")] = SIMULATED
+    sequence: Annotated[str, Option("[SEQUENCE]", positional=True)] = SIMULATED
     """EndoNeRF folder, or `simulated`"""
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("tradeoff")
+    out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
     minutes: float = 8.0
     """length of the whole study: it sets the iterations of each training, and none begins that would exceed it"""
-    iterations: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    iterations: Annotated[int | None, Option("N")] = None
     """iterations of each training instead"""
-    preset: Annotated[Literal["paper", "sharp", "demo"] | None, tyro.conf.arg(metavar="{paper,sharp,demo}")] = None
+    preset: Literal["paper", "sharp", "demo"] | None = None
     """settings of the base training (default: demo for `simulated`, paper for a folder)"""
     scale: float = 1.0
     """image scale of the base training"""
-    lpips: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights"""
     threads: int = 2
     """threads, 0 = all cores"""

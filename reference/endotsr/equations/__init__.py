@@ -1,5 +1,5 @@
-"""The paper, one equation a module, in its order. Knows nothing of scenes, files or the trainer.
+"""The equations of the paper, one a module. The room does not depend on scenes, files or the trainer.
 
-Comes in: NumPy arrays, Gaussian index last, time normalised to [0, 1]. Goes out: values and saved tuples
-for the reverse pass directly below each forward pass.
+Input: NumPy arrays, Gaussian index last; time normalised to [0, 1]. Output: values, and saved tuples for the reverse
+pass, which stands directly below each forward pass.
 """

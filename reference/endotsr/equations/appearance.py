@@ -9,16 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import combine, spread
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
-
 
 LN2_HIGH = 355.0 / 512.0  # ln 2 in nine bits: k * LN2_HIGH is exact for every exponent k of either precision
 LN2_LOW = -2.1219444005469058e-4  # ln 2 - LN2_HIGH
@@ -37,11 +34,11 @@ class AppearanceGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     appearance_coefficients: FloatArray  # (3, 2F, N)
-    phi_bar: FloatArray | None  # (2F,), None when not asked for
+    phi_bar: FloatArray | None  # (2F,), None unless requested
 
 
 def _exp_nonpositive(z):
-    """exp(-z) for z >= 0 by straight-line arithmetic, to a few ulp also where z is large.
+    """exp(-z) for z >= 0 by straight-line arithmetic, accurate to a few ulp, also for large z.
 
     z = k ln 2 + r: the product k * LN2_HIGH is exact, so r keeps all its digits (2^(-z log2 e) would lose
     as many as z has).
@@ -132,5 +129,5 @@ def appearance_reverse(
 
 
 def argument_gradient(d_residual: FloatArray, saved: AppearanceSaved) -> FloatArray:
-    """The first half of the reverse pass: derivative (3, N) by A phi_bar, what tanh is taken of."""
+    """First half of the reverse pass: derivative (3, N) by A phi_bar, the argument of tanh."""
     return np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)

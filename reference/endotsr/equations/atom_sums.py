@@ -6,12 +6,10 @@ float64, block by block.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 GAUSSIANS_PER_TASK = 1024  # Gaussians a task; a few rows of a block stay in the first-level cache
 LANES = 64  # partial sums side by side: enough to fill the vector units
@@ -95,7 +93,7 @@ def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
 def spread(
     d_out: FloatArray, coefficients: FloatArray, atoms: FloatArray, *, atom_gradient: bool = True
 ) -> tuple[FloatArray, FloatArray | None]:
-    """Reverse of `combine`: derivative by the coefficients (3, 2F, N) and by the atoms (2F,), None unless asked for."""
+    """Reverse of `combine`: derivative by the coefficients (3, 2F, N) and, if requested, by the atoms (2F,)."""
     dtype = coefficients.dtype
     if d_out.shape != (coefficients.shape[0], coefficients.shape[2]):
         raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")

@@ -1,11 +1,11 @@
-"""Equation (7): the weight of the Laplacian loss, calibrated so that its gradient has a set share of the photometric.
+"""Equation (7): the weight of the Laplacian loss that makes its gradient a given fraction of the photometric one.
 
 In: for every calibration view the RMS, over all pixels and channels, of the gradient of the whole photometric term
-and of L_lap by the unclamped render. Out: lambda_lap = r / median over the views of (g_lap / g_rgb). Knows nothing of
-the trainer, which renders the views.
+and of L_lap by the unclamped render. Out: lambda_lap = r / median over the views of (g_lap / g_rgb). The trainer
+renders the views; this module does not depend on it.
 
-For a mean-L1 loss these RMS values depend on how many residuals are nonzero, not on their size: the ratio says how
-concentrated the two gradients are.
+For a mean-L1 loss these RMS values depend on how many residuals are nonzero, not on their size: the ratio
+measures how concentrated the two gradients are.
 """
 
 import math
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from endotsr.errors import CalibrationError
 
 
-class ViewGradients(NamedTuple):
+class ViewRms(NamedTuple):
     """Gradient sizes of one calibration view."""
 
     name: str  # frame name, for the table
@@ -27,7 +27,7 @@ class ViewGradients(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """The calibrated weight and where it comes from."""
+    """The calibrated weight and the ratios that it is computed from."""
 
     lambda_lap: float
     ratios: NDArray[np.float64]  # (valid views,)  g_lap / g_rgb, in the order of the views
@@ -51,8 +51,8 @@ def calibration_views(n_train: int, count: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(np.int64))
 
 
-def _verdict(view: ViewGradients) -> str:
-    """Why a view cannot be used; empty when it can."""
+def _verdict(view: ViewRms) -> str:
+    """The reason why a view cannot be used, or an empty string."""
     if not (math.isfinite(view.photometric) and math.isfinite(view.laplacian)):
         return "gradient not finite"
     if view.photometric <= 0:
@@ -64,11 +64,11 @@ def _verdict(view: ViewGradients) -> str:
     return ""
 
 
-def calibrate(views: Iterable[ViewGradients | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
+def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_ratio: float) -> Calibration:
     """Equation (7): lambda_lap = r / median_v(g_lap,v / g_rgb,v).
 
     views           per view its name, g_rgb and g_lap (loss per display unit)
-    gradient_ratio  r > 0, the share the detail gradient shall have of the photometric one
+    gradient_ratio  r > 0, the wanted ratio of the Laplacian gradient to the photometric one
     returns         lambda_lap (linear in r), the ratios of the valid views, a printable table
     Edges:          a view with g_rgb = 0 or a gradient that is not finite is dropped; an even number of views
                     takes the mean of the middle two.
@@ -79,7 +79,7 @@ def calibrate(views: Iterable[ViewGradients | tuple[str, float, float]], gradien
         raise ValueError(f"gradient ratio {gradient_ratio}; allowed: finite, > 0")
     ratios = []
     lines = [f"{'view':<24} {'g_rgb':>12} {'g_lap':>12}  g_lap/g_rgb"]
-    for view in (ViewGradients(*v) for v in views):
+    for view in (ViewRms(*v) for v in views):
         dropped = _verdict(view)
         ratio = "" if dropped else f"{view.laplacian / view.photometric:.6g}"
         lines.append(f"{view.name:<24} {view.photometric:>12.5g} {view.laplacian:>12.5g}  {ratio or dropped}")

@@ -5,8 +5,8 @@
     gaussian:  basis = exp(-u),    u = (t - centre)^2 / (2 S)     (the textbook form)
 
 Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before
-activation. In: three arrays (10, B, N) and one time; out: ten offsets a Gaussian. This module knows nothing
-of what the offsets are used for.
+activation. In: three arrays (10, B, N) and one time. Out: ten offsets a Gaussian. The use of the offsets is no
+concern of this module.
 
 The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,
 basis) row is streamed once, in pieces that stay in the second-level cache.
@@ -15,13 +15,12 @@ basis) row is streamed once, in pieces that stay in the second-level cache.
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Basis = Literal["quartic", "gaussian"]
 BASES: tuple[Basis, ...] = ("quartic", "gaussian")
 
@@ -64,7 +63,7 @@ def deformation_forward(
 
     Reverse: `deformation_reverse`.
     Edges:   all weights 0 -> offsets exactly 0; B = 0 -> 0; N = 0 -> empty; width 0 is finite. A basis of initial
-             width 0.01 reaches 0.014 in time: frames between two of 17 centres are hardly moved at first.
+             width 0.01 reaches 0.014 in time: at first it hardly moves the frames between two of 17 centres.
     Raises:  ValueError if shapes or dtypes disagree or the basis is not known.
     Oracle:  tests/oracle/deformation.py.
     """
@@ -108,7 +107,7 @@ def _check(weight: FloatArray, centre: FloatArray, width: FloatArray, basis: str
 
 
 def _basis_constants(real, quartic):
-    """What tells the bases apart: 2^(scale u v), v = u slope + constant; u is cut at `far`; factor of d/d centre."""
+    """Constants of a basis: 2^(scale u v), v = u slope + constant; the bound `far` of u; the factor of d/d centre."""
     if quartic:
         return real(-LOG2_E), real(1), real(0), real(LARGEST_U), real(4)
     return real(-0.5 * LOG2_E), real(0), real(1), real(2 * LARGEST_U), real(1)

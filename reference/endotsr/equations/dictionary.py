@@ -5,7 +5,7 @@ cycles per unit of normalised time. Out: 2F atoms, all sines first, then all cos
 translation residual, the centred and RMS-normalised atoms phi_bar the colour residual.
 
 A dictionary has 2F of about 16 numbers, so everything here is plain NumPy, evaluated in float64 and rounded once
-to the dtype of the frequencies. Knows nothing of Gaussians or frames.
+to the dtype of the frequencies. This module does not depend on Gaussians or frames.
 """
 
 import math
@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 DEAD_RMS = 1e-6  # below it an atom is rounding noise over the stamps; dividing by it would amplify that noise
-WEAK_RMS = 0.05  # below it an atom is amplified more than twentyfold: worth a warning
+WEAK_RMS = 0.05  # below it an atom is amplified more than twentyfold; `report_atoms` lists it
 
 
 class DictionarySaved(NamedTuple):
@@ -46,7 +46,7 @@ class AtomStatistics(NamedTuple):
 
     @property
     def weak(self) -> NDArray[np.bool_]:
-        """(2F,) atoms that live but are amplified more than 1 / WEAK_RMS."""
+        """(2F,) atoms that are not dead but are amplified by more than 1 / WEAK_RMS."""
         return ~self.dead & (self.rms < WEAK_RMS)
 
 
@@ -58,7 +58,7 @@ class NormaliseSaved(NamedTuple):
 
 
 class AtomReport(NamedTuple):
-    """How well the training stamps tell the atoms apart."""
+    """How well the training stamps distinguish the atoms."""
 
     rank: int  # of the normalised dictionary over the stamps
     condition: float  # largest / smallest singular value inside the rank; 0 when the rank is 0
@@ -194,7 +194,7 @@ def normalised_atoms(t: float, omega: FloatArray, statistics: AtomStatistics) ->
 def report_atoms(times: FloatArray, omega: FloatArray) -> AtomReport:
     """Rank and condition of the normalised dictionary over the training stamps, and its dead and weak atoms.
 
-    A rank below 2F says that the stamps cannot tell all coefficients apart (few frames, or frames on a grid
+    A rank below 2F means that the stamps do not determine all coefficients (few frames, or frames on a grid
     that aliases the highest frequency).
     """
     statistics = atom_statistics(times, omega)

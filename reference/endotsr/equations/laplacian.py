@@ -1,4 +1,4 @@
-"""Equation (5): the mask-propagating Laplacian detail loss of component L.
+"""Equation (5): the mask-propagating Laplacian loss of component L.
 
 In: the rendered and the observed image, planar (3, H, W), display units [0, 1], and the tissue mask (H, W), True =
 tissue. Out: a scalar in display units, and its derivative by the rendered image.
@@ -7,8 +7,8 @@ tissue. Out: a scalar in display units, and its derivative by the rendered image
     L_lap = (1/3) sum_j mean over the valid band pixels and the channels of |P_j(rendered) - P_j(observed)|
 
 A band pixel is valid when every input pixel of its footprint is tissue. The pyramid is linear, so one pyramid of the
-difference image, with 0 selected where there is no tissue, gives all valid band pixels exactly: what stands
-under the instrument (NaN included) reaches none of them, and equal images have loss and gradient exactly 0.
+difference image, with 0 selected where there is no tissue, gives all valid band pixels exactly: values under
+the instrument (NaN included) reach none of them, and equal images have loss and gradient exactly 0.
 """
 
 from typing import NamedTuple
@@ -32,11 +32,9 @@ from endotsr.equations.pyramid import (
     reduce_row_adjoint,
     reflect_indices,
 )
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
-MaskArray = NDArray[np.bool_]
 
 LEVELS = 3
 
@@ -51,8 +49,8 @@ class LaplacianLevels(NamedTuple):
 class SupportMasks(NamedTuple):
     """Which band pixels are valid; depends on the frame only, so it is computed once and cached."""
 
-    image: MaskArray  # (H, W)  the tissue mask
-    bands: tuple[MaskArray, ...]  # valid pixels of P_1 ... P_levels
+    image: BoolArray  # (H, W)  the tissue mask
+    bands: tuple[BoolArray, ...]  # valid pixels of P_1 ... P_levels
     upsampling: Upsampling
 
     @property
@@ -62,11 +60,11 @@ class SupportMasks(NamedTuple):
 
 
 class LaplacianSaved(NamedTuple):
-    """Signs of the valid band differences and what they are weighed with."""
+    """Signs of the valid band differences, and their weights."""
 
     signs: tuple[NDArray[np.int8], ...]  # (3, h, w) a level: -1, 0, 1; 0 where not valid
     weights: tuple[float, ...]  # 1 / (levels * channels * valid pixels), 0 for an empty level
-    mask: MaskArray  # (H, W)
+    mask: BoolArray  # (H, W)
     upsampling: Upsampling
     dtype: np.dtype
 
@@ -89,7 +87,7 @@ def laplacian_levels(image: FloatArray, levels: int = LEVELS, upsampling: Upsamp
     return LaplacianLevels(tuple(bands), image)
 
 
-def _reduce_support(valid: MaskArray) -> MaskArray:
+def _reduce_support(valid: BoolArray) -> BoolArray:
     """A coarse sample is valid when its 5x5 fine samples are: erosion, then the even samples."""
     for axis in (0, 1):
         taps = reflect_indices(valid.shape[axis])
@@ -97,7 +95,7 @@ def _reduce_support(valid: MaskArray) -> MaskArray:
     return valid
 
 
-def _expand_support(valid: MaskArray, shape: tuple[int, ...], upsampling: Upsampling) -> MaskArray:
+def _expand_support(valid: BoolArray, shape: tuple[int, ...], upsampling: Upsampling) -> BoolArray:
     """A fine sample is valid when all coarse samples it is interpolated from are."""
     for axis in (0, 1):
         parents = [[p for p, _ in expand_parents(i, shape[axis], upsampling)] for i in range(shape[axis])]
@@ -106,13 +104,13 @@ def _expand_support(valid: MaskArray, shape: tuple[int, ...], upsampling: Upsamp
     return valid
 
 
-def support_masks(mask: MaskArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
-    """Valid pixels of every band: the mask sent through the operations of the pyramid as a boolean.
+def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
+    """Valid pixels of every band: the mask passed through the operations of the pyramid as a boolean.
 
     mask     (H, W)  True = tissue
     returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
              tissue: 5-7, 13-17, 29-37 pixels an axis for `co_sited`, 7, 17, 37 for `half_pixel`
-    Edges:   a level may come out empty; it then adds 0 to the loss.
+    Edges:   a level may be empty; it then adds 0 to the loss.
     Oracle:  the impulse response of the pyramid, tests/oracle/laplacian_oracle.py.
     """
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
@@ -220,7 +218,7 @@ def laplacian_loss_forward(
     Edges:      an empty level adds 0 and the factor 1/levels stays; pixels outside the mask may hold anything;
                 equal images have loss 0 and gradient exactly 0 (subgradient of |.| at 0 is 0).
     Raises:     ValueError if the shapes do not fit or the masks were made for another rule.
-    Oracle:     tests/oracle/laplacian_oracle.py, the two pyramids taken apart.
+    Oracle:     tests/oracle/laplacian_oracle.py, the difference of two separate pyramids.
     """
     if rendered.shape != observed.shape or rendered.shape[1:] != masks.image.shape:
         raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} do not fit")
@@ -248,7 +246,7 @@ def laplacian_loss_forward(
 
 
 def laplacian_loss_reverse(d_loss: float, saved: LaplacianSaved) -> FloatArray:
-    """Reverse of equation (5): the adjoint of the pyramid applied to the weighed signs.
+    """Reverse of equation (5): the adjoint of the pyramid applied to the weighted signs.
 
     d_loss   ()         derivative of the objective by the loss
     returns  (3, H, W)  derivative by the rendered image, dtype of the render; exactly 0 outside the mask
@@ -258,7 +256,7 @@ def laplacian_loss_reverse(d_loss: float, saved: LaplacianSaved) -> FloatArray:
 
 
 def pull_back(
-    fields: tuple[NDArray, ...], scales: tuple[float, ...], mask: MaskArray, upsampling: Upsampling, dtype: np.dtype
+    fields: tuple[NDArray, ...], scales: tuple[float, ...], mask: BoolArray, upsampling: Upsampling, dtype: np.dtype
 ) -> FloatArray:
     """Adjoint of masked image -> bands: sum_j scales[j] (d P_j / d image)^T fields[j], 0 outside the mask.
 

@@ -1,4 +1,4 @@
-"""Equation (4): Matern-5/2 weights over the frequencies and the motion penalty they weigh.
+"""Equation (4): Matern-5/2 weights of the frequencies, and the penalty on motion that they weight.
 
 In: frequencies (F,) in cycles per unit of normalised time, the correlation length l, the motion coefficients
 C (3, 2F, N) in scene units. Out: weights rho (F,), dimensionless with mean 1; the penalty, a scalar in squared
@@ -9,13 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.atom_sums import LANES
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 
 class MaternSaved(NamedTuple):
@@ -32,7 +30,7 @@ def matern_weights(omega: FloatArray, length: float) -> FloatArray:
     it is finite for every l >= 0: the formula as printed overflows below l = 1e-51 (7e-7 in float32).
 
     omega    (F,)  cycles per unit of normalised time, finite, > 0
-    length   ()    l, normalised time, >= 0; 0 weighs all frequencies alike, inf gives omega^6
+    length   ()    l, normalised time, >= 0; 0 weights all frequencies equally, inf gives omega^6
     returns  (F,)  rho, dimensionless, mean 1, increasing with omega; dtype of omega
     Reverse: none (constant in training).
     Raises:  ValueError for a negative or NaN length, or a frequency that is not finite and positive.

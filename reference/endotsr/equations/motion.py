@@ -7,12 +7,8 @@ phase of a sine/cosine pair, and centring or scaling the two atoms of a pair dif
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.equations.atom_sums import combine, spread
-
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 
 class MotionSaved(NamedTuple):
@@ -26,7 +22,7 @@ class MotionGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
     motion_coefficients: FloatArray  # (3, 2F, N)
-    phi: FloatArray | None  # (2F,), None when not asked for
+    phi: FloatArray | None  # (2F,), None unless requested
 
 
 def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[FloatArray, MotionSaved]:

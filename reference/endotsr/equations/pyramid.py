@@ -7,10 +7,10 @@ Expand, with coarse length m and fine length n = 2m or 2m - 1, edge samples repe
     fine[2k]     = even coarse[k] + (1 - even) coarse[k - 1]
     fine[2k + 1] = odd coarse[k] + (1 - odd) coarse[k + 1]
 `co_sited`: even = 1, odd = 1/2 (coarse k sits on fine 2k). `half_pixel`: even = odd = 3/4 (pixel edges coincide).
-All weights are dyadic, so a mask sent through the same arithmetic stays exact.
+All weights are dyadic, so a mask passed through the same arithmetic stays exact.
 
-Fine rows are worked on as pairs (m, 2) of an even and an odd sample, which keeps the inner loops free of strides.
-Out of these row helpers `laplacian` builds its kernels; this module knows nothing of losses.
+Fine rows are processed as pairs (m, 2) of an even and an odd sample, so that the inner loops have no strides.
+`laplacian` builds its kernels from these row helpers; this module does not depend on losses.
 """
 
 from functools import lru_cache
@@ -19,10 +19,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Upsampling = Literal["co_sited", "half_pixel"]
 
 # (even, odd): the weight of coarse sample k at fine samples 2k and 2k + 1
@@ -30,7 +30,7 @@ EXPAND_WEIGHTS: dict[str, tuple[float, float]] = {"co_sited": (1.0, 0.5), "half_
 
 BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
 MARGIN = 2  # taps of the binomial filter to either side
-ROWS = 16  # rows whose magnitudes are added up together
+ROWS = 16  # rows in one partial sum of magnitudes
 
 
 def expand_weights(upsampling: Upsampling) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""Metrics, LPIPS, image-space baselines, protocols and reports."""
+"""Metrics, LPIPS, image-space baselines, and the evaluation protocol."""

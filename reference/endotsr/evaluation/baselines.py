@@ -1,17 +1,17 @@
-"""Image-space baselines: what a held-out frame looks like without any model.
+"""Image-space baselines: predictions of a held-out frame without a model.
 
-Four answers, each made from training frames only and printed beside the model in every evaluation:
+Four predictions, each made from training frames only and reported beside the model in every evaluation:
 
 temporal_mean      per-pixel mean over the training frames in which that pixel is tissue (0 where it never is)
 nearest_frame      copy of the training frame nearest in time (a tie goes to the earlier one)
 two_neighbours     the training frames before and after, blended linearly in time; on the 7:1 split this is their
                    plain mean, inside a held-out block it is the blend of the two border frames
 flow_interpolation dense optical flow (DIS, medium) in both directions between the same two frames, each warped to
-                   the wanted moment and blended with the same weights
+                   the wanted time and blended with the same weights
 
-Excluded pixels. Only the temporal mean looks at the masks of the training frames: an instrument that passes through
-would otherwise be smeared over the tissue. The other three use the training pixels as they are, instrument included,
-and leave it to the metric to zero what is excluded in the *test* frame. On EndoNeRF `pulling` these choices give
+Excluded pixels. Only the temporal mean uses the masks of the training frames: a passing instrument would otherwise be
+smeared over the tissue. The other three use the training pixels as they are, instrument included; the metric sets the
+pixels that are excluded in the *test* frame to zero. On EndoNeRF `pulling` these choices give
 27.17, 37.71, 40.51 and 41.61 dB (full image, 7:1 split); zeroing the neighbours by their own masks first would
 cost 10 dB, a temporal mean that ignores the masks 1.2 dB.
 """
@@ -20,21 +20,20 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
-FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
 
 
 class Neighbours(NamedTuple):
-    """Training frames around a moment. A frame before the first or after the last has one neighbour, named twice."""
+    """Training frames around a time. A frame before the first or after the last has one neighbour, named twice."""
 
     before: int  # frame index
     after: int  # frame index
-    fraction: float  # where the moment lies between them, 0 = before, 1 = after
+    fraction: float  # position of the time between them, 0 = before, 1 = after
 
 
 def neighbours(sequence: Sequence, index: int) -> Neighbours:
@@ -64,7 +63,7 @@ def unit_image(sequence: Sequence, index: int) -> FloatArray:
 def temporal_mean(sequence: Sequence, index: int) -> FloatArray:
     """Mean of the training frames, each pixel over the frames in which it is tissue; 0 where it never is.
 
-    index     ignored, the answer is one image for all frames (the frame itself is not excluded)
+    index     ignored: the prediction is one image for all frames (the frame itself is not excluded)
     returns   (3, H, W) float32, display units [0, 1]
     """
     del index
@@ -72,7 +71,7 @@ def temporal_mean(sequence: Sequence, index: int) -> FloatArray:
 
 
 def temporal_mean_image(sequence: Sequence) -> FloatArray:
-    """The single image behind `temporal_mean`. Sums are exact integers, so the order of the frames cannot matter."""
+    """The single image of `temporal_mean`. Sums are exact integers, so the order of the frames has no effect."""
     total = np.zeros(sequence.images.shape[1:], np.int64)
     seen = np.zeros(sequence.images.shape[2:], np.int64)
     for i in sequence.train_index:
@@ -95,13 +94,13 @@ def two_neighbours(sequence: Sequence, index: int) -> FloatArray:
 
 
 def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
-    """Both neighbours moved along the optical flow to the wanted moment, then blended as in `two_neighbours`.
+    """Both neighbours warped along the optical flow to the wanted time, then blended as in `two_neighbours`.
 
-    With flows f (before -> after) and g (after -> before) and time fraction s, the pixel p of the answer is
+    With flows f (before -> after) and g (after -> before) and time fraction s, the pixel p of the prediction is
     (1 - s) before(p - s f(p)) + s after(p - (1 - s) g(p)), bilinear, border pixels repeated.
 
     returns   (3, H, W) float32, display units [0, 1]
-    Edges     one neighbour only: its copy; an image side below 16 px allows no flow: the plain blend
+    Edges     one neighbour only: its copy; an image side below 16 px: the plain blend, without flow
     """
     from endotsr.opencv import dis_flow, warp_bilinear
 
@@ -131,4 +130,4 @@ BASELINES: dict[str, tuple[str, Callable[[Sequence], RenderFrame]]] = {
     "two_neighbours": ("Blend of the two neighbouring training frames", lambda s: lambda i: two_neighbours(s, i)),
     "flow_interpolation": ("Optical-flow interpolation (DIS)", lambda s: lambda i: flow_interpolation(s, i)),
 }
-"""Key in metrics.json -> (name for a person, maker of the function frame index -> image)."""
+"""Key in metrics.json -> (label, maker of the function frame index -> image)."""

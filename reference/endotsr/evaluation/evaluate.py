@@ -1,11 +1,11 @@
 """Metrics of renders against frames, the baseline rows beside them, and the dictionary that becomes metrics.json.
 
-Nothing here knows what made a render: a function from frame number to picture is all it takes, so the model, a
-baseline and the pictures of another program are measured by the same lines.
+The source of a render is irrelevant here: the input is a function from frame number to picture, so the model, a
+baseline and the pictures of another program are measured by the same code.
 
 A metric without a value (LPIPS without weights, infinite PSNR of two equal pictures, tissue PSNR of an empty mask, a
-render that is not finite) is None, never NaN, so that the result is valid JSON. Means leave such values out, and
-how many were left out is counted.
+render that is not finite) is None, never NaN, so that the result is valid JSON. Means leave such values out and
+count them.
 """
 
 import math
@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from endotsr.evaluation.baselines import BASELINES, unit_image
 from endotsr.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
 from endotsr.evaluation.metrics import image_metrics, mean_metrics
+from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
-FloatArray = NDArray[np.floating]
 RenderFrame = Callable[[int], FloatArray]
 Metrics = dict[str, float | None]
 
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
-EVERY_TRAINING_FRAME = 6  # of the training frames that stand beside the held-out ones
+EVERY_TRAINING_FRAME = 6  # of the training frames reported beside the held-out ones
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def evaluate_frames(
 
 
 def left_out(evaluation: dict[str, Any]) -> list[str]:
-    """Names of the held-out frames whose tissue PSNR is no number, so that no mean holds it: frames without tissue."""
+    """Names of the held-out frames without a tissue PSNR, which the means leave out: frames without tissue."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
@@ -84,7 +84,7 @@ def left_out(evaluation: dict[str, Any]) -> list[str]:
 def baseline_table(
     sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
 ) -> dict[str, dict[str, Any]]:
-    """The four answers that need no model, measured like a model.
+    """The four predictions without a model, measured like a model.
 
     indices   frames to predict; default: all held-out frames
     returns   baseline key -> {"label", "mean", "per_frame", "excluded", "not_finite"}, in the order of BASELINES
@@ -107,9 +107,9 @@ def evaluate_model(
     lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
 ) -> dict[str, Any]:
-    """Everything that metrics.json says about renders of a sequence.
+    """The content of metrics.json on the renders of a sequence.
 
-    training   frames whose PSNR stands beside the held-out one; default `training_sample`. LPIPS is not computed
+    training   frames whose PSNR is reported beside the held-out one; default `training_sample`. LPIPS is not computed
                on them.
     returns    {"format", "frames", "held_out", "training", "temporal_gap", "baselines", "lpips_reason",
                "not_finite"}; `temporal_gap` is training minus held-out mean, metric by metric;

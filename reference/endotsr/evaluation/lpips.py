@@ -2,7 +2,7 @@
 
 Five feature maps of each image are divided by their norm over channels, subtracted, squared, weighted by a learned
 non-negative vector, summed over channels and averaged over pixels; the distance is the sum over the five.
-The weights are not part of the package. Without them the value is None, with a reason, and never a made-up number.
+The weights are not part of the package. Without them the value is None, with a reason.
 
 Weights file: an .npz with `conv1..5_weight` (out, in, k, k), `conv1..5_bias` (out,), `lin1..5_weight` (out,),
 `shift` (3,) and `scale` (3,), which normalise RGB in [-1, 1].
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 
-Floats = NDArray[np.floating]
 InputRange = Literal["zero_one", "minus_one_one"]
 
 ENVIRONMENT = "ENDOTSR_LPIPS"
@@ -37,15 +37,15 @@ SMALLEST_SIDE = 31  # pixels of an image side that leave one feature in the fift
 class LpipsWeights(NamedTuple):
     """AlexNet's five convolutions and the five heads, float32."""
 
-    kernels: tuple[Floats, ...]  # five of (out, in, k, k)
-    biases: tuple[Floats, ...]  # five of (out,)
-    heads: tuple[Floats, ...]  # five of (out,), >= 0
-    shift: Floats  # (3,)
-    scale: Floats  # (3,)
+    kernels: tuple[FloatArray, ...]  # five of (out, in, k, k)
+    biases: tuple[FloatArray, ...]  # five of (out,)
+    heads: tuple[FloatArray, ...]  # five of (out,), >= 0
+    shift: FloatArray  # (3,)
+    scale: FloatArray  # (3,)
 
 
 def default_weights_path() -> Path:
-    """Where weights are looked for when neither an argument nor the environment names a file."""
+    """The weights file that is used when neither an argument nor the environment names one."""
     from platformdirs import user_data_dir
 
     return Path(user_data_dir("endotsr", appauthor=False)) / FILE_NAME
@@ -55,7 +55,7 @@ def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | 
     """Weights from `path`, else from the file in ENDOTSR_LPIPS, else from `default_weights_path()`, else None.
 
     Raises InputError naming file and key if a file that was named is missing, or any found file cannot be used.
-    `lpips_obstacle(None, ...)` says in words that there are none.
+    `lpips_obstacle(None, ...)` describes the places that were searched.
     """
     named = path if path is not None else os.environ.get(ENVIRONMENT) or None
     if named is None:
@@ -65,7 +65,7 @@ def load_lpips_weights(path: str | os.PathLike | None = None) -> LpipsWeights | 
 
 
 def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str | None:
-    """Why LPIPS of height x width images is not computed; None = it can be."""
+    """The reason why LPIPS of height x width images cannot be computed; None = it can."""
     if weights is None:
         return f"no LPIPS weights: no file was given, {ENVIRONMENT} is not set, {default_weights_path()} does not exist"
     if min(height, width) < SMALLEST_SIDE:
@@ -75,14 +75,16 @@ def lpips_obstacle(weights: LpipsWeights | None, height: int, width: int) -> str
     return None
 
 
-def lpips(a: Floats, b: Floats, weights: LpipsWeights | None, input_range: InputRange = "zero_one") -> float | None:
+def lpips(
+    a: FloatArray, b: FloatArray, weights: LpipsWeights | None, input_range: InputRange = "zero_one"
+) -> float | None:
     """LPIPS (M3) of two images; symmetric, 0 for equal images.
 
     a, b         (3, H, W)  RGB in [0, 1]; NaN gives NaN
-    input_range  "zero_one": fed as they are (the protocol value); "minus_one_one": scaled to [-1, 1] first,
-                 which is what the network was made for. The two are not comparable.
-    returns      the distance, or None where `lpips_obstacle` names a reason
-    Raises:      ValueError for shapes or an input_range that cannot be.
+    input_range  "zero_one": used as they are (the protocol value); "minus_one_one": scaled to [-1, 1] first,
+                 the range that the weights are made for. The two are not comparable.
+    returns      the distance, or None if `lpips_obstacle` gives a reason
+    Raises:      ValueError for shapes that do not fit or an unknown input_range.
     Oracle:      published pair of example images, 0.722 and 0.138 ("minus_one_one").
     Source:      Zhang et al. 2018, the `lpips` package, version 0.1, AlexNet.
     """
@@ -95,7 +97,7 @@ def lpips(a: Floats, b: Floats, weights: LpipsWeights | None, input_range: Input
     return math.fsum(layer_distances(a, b, weights, input_range))
 
 
-def layer_distances(a: Floats, b: Floats, weights: LpipsWeights, input_range: InputRange) -> list[float]:
+def layer_distances(a: FloatArray, b: FloatArray, weights: LpipsWeights, input_range: InputRange) -> list[float]:
     """The five terms of the sum, first layer first."""
     features = [_features(_normalised(image, weights, input_range), weights) for image in (a, b)]
     distances = []
@@ -105,14 +107,14 @@ def layer_distances(a: Floats, b: Floats, weights: LpipsWeights, input_range: In
     return distances
 
 
-def _normalised(image: Floats, weights: LpipsWeights, input_range: InputRange) -> Floats:
+def _normalised(image: FloatArray, weights: LpipsWeights, input_range: InputRange) -> FloatArray:
     image = np.asarray(image, np.float32)
     if input_range == "minus_one_one":
         image = 2 * image - 1
     return (image - weights.shift[:, None, None]) / weights.scale[:, None, None]
 
 
-def _features(image: Floats, weights: LpipsWeights) -> list[Floats]:
+def _features(image: FloatArray, weights: LpipsWeights) -> list[FloatArray]:
     """The five rectified feature maps (out, H_l, W_l)."""
     found = []
     for layer in range(5):
@@ -124,7 +126,7 @@ def _features(image: Floats, weights: LpipsWeights) -> list[Floats]:
     return found
 
 
-def _convolve(image: Floats, kernel: Floats, stride: int, padding: int) -> Floats:
+def _convolve(image: FloatArray, kernel: FloatArray, stride: int, padding: int) -> FloatArray:
     """Correlation with zero padding, as one matrix product."""
     padded = np.pad(image, ((0, 0), (padding, padding), (padding, padding)))
     size = kernel.shape[-1]
@@ -134,7 +136,7 @@ def _convolve(image: Floats, kernel: Floats, stride: int, padding: int) -> Float
     return (kernel.reshape(len(kernel), -1) @ matrix).reshape(len(kernel), rows, columns)
 
 
-def _pool(image: Floats) -> Floats:
+def _pool(image: FloatArray) -> FloatArray:
     """The largest of 3 x 3 neighbours at every second pixel, as nine shifted views."""
     rows, columns = ((size - POOL) // POOL_STRIDE + 1 for size in image.shape[1:])
     views = [
@@ -145,7 +147,7 @@ def _pool(image: Floats) -> Floats:
     return np.maximum.reduce(views)
 
 
-def _unit_length(features: Floats) -> Floats:
+def _unit_length(features: FloatArray) -> FloatArray:
     return features / (np.sqrt((features**2).sum(axis=0)) + np.float32(TINY))
 
 
@@ -167,7 +169,7 @@ def _read_weights(path: Path) -> LpipsWeights:
     return LpipsWeights(tuple(kernels), tuple(biases), tuple(heads), shift, scale)
 
 
-def _entry(path: Path, arrays: dict[str, NDArray], key: str, shape: tuple[int, ...]) -> Floats:
+def _entry(path: Path, arrays: dict[str, NDArray], key: str, shape: tuple[int, ...]) -> FloatArray:
     if key not in arrays:
         raise InputError(
             f"{path}: LPIPS weights: key {key} is missing; it has {', '.join(sorted(arrays)) or 'no keys'}"

@@ -1,8 +1,8 @@
 """PSNR (M1) and SSIM (M2) of a render against a frame, over the full image and over tissue.
 
 In: planar images (3, H, W) in display units and the tissue mask. Out: plain floats. "Full" sets excluded pixels to 0 in
-both images and counts them, as published tables do; "tissue" counts tissue pixels only and is the honest, lower
-number. Everything is computed in float64. What stands under the mask, NaN included, does not matter.
+both images and counts them, as published tables do; "tissue" counts tissue pixels only and is the stricter,
+lower number. All arithmetic is float64. Values at excluded pixels, NaN included, have no effect.
 """
 
 import math
@@ -11,8 +11,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.losses.masked_ssim import masked_ssim_forward, ssim_target
-from endotsr.losses.rows import BoolArray, FloatArray, check_image
+from endotsr.losses.rows import check_image
 
 LEVELS = 255  # of an 8-bit image
 
@@ -31,7 +32,7 @@ def psnr(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
 
 
 def psnr_tissue(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
-    """PSNR (M1) in dB with the mean over tissue pixels only: `psnr` + 10 log10(tissue share). Edges as `psnr`."""
+    """PSNR (M1) in dB with the mean over tissue pixels only: `psnr` + 10 log10(tissue fraction). Edges as `psnr`."""
     squared, count = _squared_error(render, truth, mask)
     return _decibel(squared / count) if count else math.nan
 
@@ -64,10 +65,10 @@ def round_8bit(image: FloatArray) -> NDArray[np.float64]:
 def image_metrics(render: FloatArray, truth: FloatArray, mask: BoolArray) -> dict[str, float]:
     """All metrics of one image.
 
-    render  (3, H, W)  display units; clipped to [0, 1], which is what a screen shows
+    render  (3, H, W)  display units; clipped to [0, 1], as a display does
     truth   (3, H, W)  display units [0, 1]
     returns `psnr_full`, `psnr_tissue`, `ssim_full`, `ssim_tissue` on floats, and the same four with the ending `_8bit`
-            on images rounded to 8 bit (the only difference between the two), inf and nan as in the single functions
+            on images rounded to 8 bit (the only difference between the two), inf and nan as in each function
     """
     pictures = {"": (np.clip(render, 0.0, 1.0), truth), "_8bit": (round_8bit(render), round_8bit(truth))}
     functions = {"psnr_full": psnr, "psnr_tissue": psnr_tissue, "ssim_full": ssim_full, "ssim_tissue": ssim_tissue}

@@ -11,16 +11,17 @@ Consequences to know: a zero gradient still moves a parameter by its momentum; w
 that is pure rounding noise moves a parameter by up to a full rate, which is why gradients are summed in fixed order.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.gather import gather_columns
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 Rate = float | tuple[tuple[slice, float], ...]
 """One learning rate, or one per part of the leading axis: ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))."""
 
@@ -50,6 +51,19 @@ def adam_state(parameters: Mapping[str, FloatArray]) -> AdamState:
 def add_array(state: AdamState, name: str, array: FloatArray) -> None:
     """Fresh moments and step 0 for one more array; what is there under this name is replaced."""
     state.first[name], state.second[name], state.step[name] = np.zeros_like(array), np.zeros_like(array), 0
+
+
+def regather(state: AdamState, names: Iterable[str], source: NDArray[np.intp], kept: int) -> None:
+    """Moments of arrays whose columns were gathered: new column i is old column source[i], or zero from `kept` on.
+
+    names    the arrays that were gathered; the moments of the others, and all step counters, stay as they are
+    source   (M,) and `kept`: see `gather_columns`
+
+    In place, one array after another: old and new moments never stand in memory together.
+    """
+    for group in (state.first, state.second):
+        for name in names:
+            group[name] = gather_columns(group[name], source, kept)
 
 
 def adam_update(

@@ -1,9 +1,10 @@
 """Checkpoints: the whole state of a training in one file, so that a resumed run equals an uninterrupted one bit by bit.
 
 The file is an uncompressed npz without pickle: a JSON header (as bytes) and one entry per array,
-`gaussians.<field>`, `first.<field>`, `second.<field>`, `statistics.<field>`. The header lists dtype and shape of
-every array, so that a missing, foreign or damaged entry is found by name. The file is written beside the old one
-and put in its place by one rename: whatever happens, one whole checkpoint remains.
+`gaussians.<field>`, `first.<field>`, `second.<field>`, `statistics.<field>`, and `frames.<field>` if the model has
+parameters of frames. The header lists dtype and shape of every array, so that a missing, foreign or damaged entry is
+found by name. The file is written beside the old one and put in its place by one rename: whatever happens, one whole
+checkpoint remains.
 """
 
 import json
@@ -18,13 +19,15 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState
-from endotsr.scene.density_control import DensityStatistics, check_lengths
+from endotsr.scene.density_control import DensityStatistics
 from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.parameters import FrameParameters, trained
 
 FORMAT = "endotsr checkpoint"
 VERSION = 1
 HEADER = "header"
-REQUIRED = tuple(name for name in Gaussians._fields if name not in Gaussians._field_defaults)
+GROUPS = {"gaussians": Gaussians, "statistics": DensityStatistics, "frames": FrameParameters}
+TRAINED = {*Gaussians._fields, *FrameParameters._fields} - {"times"}
 
 
 class Checkpoint(NamedTuple):
@@ -36,6 +39,7 @@ class Checkpoint(NamedTuple):
     rng_state: dict[str, Any]  # of the bit generator, see `restore_rng`
     statistics: DensityStatistics
     header: dict[str, Any]  # what the caller stored: configuration, history
+    frames: FrameParameters | None = None  # None if the model has no parameters of frames
 
 
 def save_checkpoint(
@@ -46,13 +50,14 @@ def save_checkpoint(
     rng_state: dict[str, Any],
     statistics: DensityStatistics,
     header: dict[str, Any],
+    frames: FrameParameters | None = None,
 ) -> None:
     """Write atomically; `rng_state` is `rng.bit_generator.state`, `header` any JSON-able dictionary.
 
     Raises: OSError if it cannot be written (a full disk); the previous file is then intact and nothing else is left.
     """
     path = Path(path)
-    entries = _entries(gaussians, adam, statistics)
+    entries = _entries(gaussians, adam, statistics, frames)
     description = {
         "format": FORMAT,
         "version": VERSION,
@@ -75,12 +80,15 @@ def save_checkpoint(
         raise
 
 
-def _entries(gaussians: Gaussians, adam: AdamState, statistics: DensityStatistics) -> dict[str, NDArray]:
+def _entries(
+    gaussians: Gaussians, adam: AdamState, statistics: DensityStatistics, frames: FrameParameters | None
+) -> dict[str, NDArray]:
     groups = {
         "gaussians": arrays(gaussians),
         "first": adam.first,
         "second": adam.second,
         "statistics": statistics._asdict(),
+        "frames": {} if frames is None else {"times": frames.times} | trained(frames),
     }
     return {f"{group}.{name}": array for group, named in groups.items() for name, array in named.items()}
 
@@ -148,30 +156,52 @@ def _read_entries(path: Path, file: Any, listed: dict[str, Any]) -> dict[str, ND
 
 
 def _assemble(path: Path, description: dict[str, Any], entries: dict[str, NDArray]) -> Checkpoint:
-    groups: dict[str, dict[str, NDArray]] = {"gaussians": {}, "first": {}, "second": {}, "statistics": {}}
-    for key, array in entries.items():
-        group, _, name = key.partition(".")
-        if group not in groups or (group != "statistics" and name not in Gaussians._fields):
-            raise InputError(f"{path}: {key}: not known")
-        groups[group][name] = array
-    for group, names in (("gaussians", REQUIRED), ("statistics", DensityStatistics._fields)):
-        for name in names:
-            if name not in groups[group]:
-                raise InputError(f"{path}: {group}.{name}: missing")
+    groups = _grouped(path, entries)
     first, second, steps = groups["first"], groups["second"], description["steps"]
     if not first.keys() == second.keys() == steps.keys():
         raise InputError(f"{path}: steps, first, second: they name different arrays")
     gaussians, adam = Gaussians(**groups["gaussians"]), AdamState(first, second, dict(steps))
+    frames = FrameParameters(**groups["frames"]) if groups["frames"] else None
     statistics = DensityStatistics(**groups["statistics"])
     try:
-        check_lengths(gaussians, adam)
+        check_lengths(gaussians, adam, frames)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
     if statistics.visits.shape != (gaussians.count,) or statistics.gradient_sum.shape != (gaussians.count,):
         raise InputError(f"{path}: statistics: not one entry for each of {gaussians.count} Gaussians")
     return Checkpoint(
-        gaussians, adam, description["iteration"], description["rng_state"], statistics, description["header"]
+        gaussians, adam, description["iteration"], description["rng_state"], statistics, description["header"], frames
     )
+
+
+def _grouped(path: Path, entries: dict[str, NDArray]) -> dict[str, dict[str, NDArray]]:
+    """Arrays by group and field; every name is known and every required one is there."""
+    known = {name: set(kind._fields) for name, kind in GROUPS.items()} | {"first": TRAINED, "second": TRAINED}
+    groups: dict[str, dict[str, NDArray]] = {name: {} for name in known}
+    for key, array in entries.items():
+        group, _, name = key.partition(".")
+        if name not in known.get(group, ()):
+            raise InputError(f"{path}: {key}: not known")
+        groups[group][name] = array
+    for group, kind in GROUPS.items():
+        required = [name for name in kind._fields if name not in kind._field_defaults]
+        for name in required if group != "frames" or groups["frames"] else ():
+            if name not in groups[group]:
+                raise InputError(f"{path}: {group}.{name}: missing")
+    return groups
+
+
+def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
+    """Raise ValueError if an array or a moment has not one column for each Gaussian, or for each training frame."""
+    for what, named, count in (
+        ("Gaussians", arrays(gaussians), gaussians.count),
+        ("training frames", trained(frames), 0 if frames is None else frames.times.size),
+    ):
+        for name, array in named.items():
+            moments = {f"first {name}": adam.first.get(name), f"second {name}": adam.second.get(name)}
+            for label, found in ({name: array} | moments).items():
+                if found is not None and found.shape != (*array.shape[:-1], count):
+                    raise ValueError(f"{label}: {found.shape} for {count} {what}")
 
 
 def restore_rng(state: dict[str, Any]) -> np.random.Generator:

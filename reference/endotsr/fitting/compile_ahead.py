@@ -24,7 +24,7 @@ READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # referred to until this process ends: nobody waits for their last kernels
 
 
-def compile_ahead(config: Config, say: Callable[[str], None] = lambda line: None) -> bool:
+def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: None) -> bool:
     """Compile what a training with these settings calls, on two cores, if the folder of kernels does not hold it yet.
 
     say      takes a line for the user when something is compiled
@@ -89,7 +89,7 @@ def rehearse(config: Config) -> None:
 
 def _small(config: Config) -> tuple[Any, Any]:
     """Workshop and state of a few Gaussians and pixels: types and layouts as in any training, and nothing else."""
-    from endotsr.fitting.trainer import bench_state, workshop
+    from endotsr.fitting.state import bench_state, workshop
     from endotsr.scene import workload
 
     shop = workshop(workload.sequence(64, 48, frames=3), config)
@@ -155,8 +155,8 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
     from endotsr.fitting.fused.coefficients import coefficients_adam_step
     from endotsr.fitting.schedules import learning_rates
 
-    born = shop.config.training.residual_activation + 1
-    rates, o, rho = learning_rates(born, shop.config), shop.config.optimiser, shop.spectral.rho
+    activated = shop.config.training.residual_activation + 1
+    rates, o, rho = learning_rates(activated, shop.config), shop.config.optimiser, shop.spectral.rho
     colour, motion = state.gaussians.appearance_coefficients, state.gaussians.motion_coefficients
     for name, coefficients in (("appearance_coefficients", colour), ("motion_coefficients", motion)):
         if coefficients is None:
@@ -173,12 +173,14 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
 
 
 def rehearse_densification(shop: Any, state: Any) -> None:
-    """The gather of every array."""
+    """The gather of every array and of its moments."""
+    from endotsr.fitting.adam import regather
     from endotsr.scene.density_control import densify
 
     state.statistics.gradient_sum[:] = 1.0
     state.statistics.visits[:] = 1
-    densify(state.gaussians, state.adam, state.statistics, shop.config.density, state.rng, shop.extent)
+    made = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
+    regather(state.adam, list(state.adam.first), made.plan.source, made.plan.survivors)
 
 
 def _second_process() -> None:

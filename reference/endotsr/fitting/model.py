@@ -22,15 +22,17 @@ from endotsr.equations.dictionary import (
     frequencies,
     normalised_atoms,
 )
+from endotsr.equations.exposure import ExposureSaved, exposure_forward, exposure_reverse
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
+from endotsr.scene.parameters import Exposure, FrameParameters, exposure_at
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
-
-FloatArray = NDArray[np.floating]
 
 
 class Spectral(NamedTuple):
@@ -84,18 +86,24 @@ def raster_settings(config: Config) -> RasterSettings:
 
 
 def scene_at(
-    gaussians: Gaussians, spectral: Spectral, model: ModelConfig, t: float, ahead: OffsetsAhead | None = None
+    gaussians: Gaussians,
+    spectral: Spectral,
+    model: ModelConfig,
+    t: float,
+    ahead: OffsetsAhead | None = None,
+    timer: Timer = NO_TIMER,
 ) -> tuple[Scene, SceneSaved]:
     """The Gaussians at time t (normalised; any value, in [0, 1] meant).
 
     ahead   of `optimise`; used instead of a forward pass of the FDM if it is for these Gaussians and this time
+    timer   told of the stages "FDM" and "Fourier"
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
     ((position, quaternion, log_scale), deformation), (translation, motion), (residual, appearance) = parallel_calls(
-        lambda: _deformed(gaussians, model, t, ahead),
-        lambda: _translation(gaussians, spectral, t),
-        lambda: _residual(gaussians, spectral, model, t),
+        timed(timer, "FDM", lambda: _deformed(gaussians, model, t, ahead)),
+        timed(timer, "Fourier", lambda: _translation(gaussians, spectral, t)),
+        timed(timer, "Fourier", lambda: _residual(gaussians, spectral, model, t)),
     )
     if translation is not None:
         position = position + translation
@@ -160,6 +168,22 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
     return SceneGrads(by_field, offsets)
 
 
+def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
+    """The images with the exposure of their frame, equation (B13); without one, the images themselves."""
+    if exposure is None:
+        return rendered, None
+    colour, saved = exposure_forward(rendered.colour, exposure.log_gain, exposure.bias)
+    return rendered._replace(colour=colour), saved
+
+
+def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[FloatArray, Exposure | None]:
+    """Gradients by the rendered colours and by the exposure of the frame, from those by the exposed colours."""
+    if saved is None:
+        return d_colour, None
+    grads = exposure_reverse(d_colour, saved)
+    return grads.colour, Exposure(grads.log_gain, grads.bias)
+
+
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:
     """The same Gaussians with the named spectral components taken out."""
     if not appearance:
@@ -174,12 +198,15 @@ def render_at(
     camera: Camera,
     t: float,
     *,
+    frames: FrameParameters | None = None,
     background: FloatArray | None = None,
     appearance: bool = True,
     spectral_motion: bool = True,
 ) -> RenderOut:
     """Render the trained scene at any time in [0, 1] from any camera.
 
+    frames                        parameters of the training frames; the exposure is that of time t, between two
+                                  training frames the linear blend of theirs. None = no exposure
     appearance, spectral_motion   False leaves that component out, to see what it contributes
     returns                       colour (3, H, W), depth (H, W), opacity (H, W)
 
@@ -189,4 +216,5 @@ def render_at(
     scene, _ = scene_at(chosen, spectral, config.model, t)
     check_scene(scene)
     degree = config.model.harmonics_degree  # bands that are not active yet hold zeros
-    return render_forward(scene, camera, raster_settings(config), degree=degree, background=background)[0]
+    rendered, _ = render_forward(scene, camera, raster_settings(config), degree=degree, background=background)
+    return exposed(rendered, exposure_at(frames, t))[0]

@@ -2,7 +2,7 @@
 
 L = (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_msp L_msp + lambda_lap(iteration) L_lap
 
-The spectral penalty acts on coefficients, not on images, and is added by the trainer.
+The Matern penalty acts on coefficients, not on images, and is added in `view_gradients` and by the trainer.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config, LossConfig
-from endotsr.equations.calibration import Calibration, ViewGradients, calibrate, calibration_views, rms
+from endotsr.equations.calibration import Calibration, ViewRms, calibrate, calibration_views, rms
 from endotsr.equations.laplacian import (
     LEVELS,
     SupportMasks,
@@ -22,17 +22,20 @@ from endotsr.equations.laplacian import (
 )
 from endotsr.equations.pyramid import Upsampling
 from endotsr.fitting.model import Spectral, render_at
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.losses.depth import DepthTarget, depth_target, normalised_depth_forward, normalised_depth_reverse
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
 from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
+from endotsr.scene.parameters import FrameParameters
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
 
-FloatArray = NDArray[np.floating]
+TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothness", "laplacian": "pyramid"}
 
 
 class Targets(NamedTuple):
@@ -103,9 +106,11 @@ def depth_term(rendered: RenderOut, target: DepthTarget, weight: float) -> Term:
     return Term(value, None, normalised_depth_reverse(weight, saved))
 
 
-def smoothness_term(rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float) -> Term:
-    """Smooth depth away from its edges, and total variation."""
-    edges = canny_edges(rendered.depth)
+def smoothness_term(
+    rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float, edges: NDArray[np.bool_] | None
+) -> Term:
+    """Smooth depth away from its edges (None = Canny edges of this depth), and total variation."""
+    edges = canny_edges(rendered.depth) if edges is None else edges
     value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
     smooth = smoothness_reverse(weight, saved)
     return Term(value, smooth.rendered, smooth.rendered_depth)
@@ -119,8 +124,20 @@ def laplacian_term(
     return Term(value, laplacian_loss_reverse(weight, saved), None)
 
 
-def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, config: LossConfig) -> ImageLoss:
+def image_loss(
+    rendered: RenderOut,
+    targets: Targets,
+    weights: LossWeights,
+    config: LossConfig,
+    edges: NDArray[np.bool_] | None = None,
+    *,
+    timer: Timer = NO_TIMER,
+) -> ImageLoss:
     """All image terms of equation (6) for one view, taken at the same time and added in the order of the equation.
+
+    edges   (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth. A constant of
+            the loss either way: no gradient flows through it.
+    timer   told of the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
     """
@@ -130,10 +147,13 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
         calls["depth"] = lambda: depth_term(rendered, depth, weights.depth)
     if weights.smoothness > 0:
         factor = config.total_variation_factor
-        calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor)
+        calls["smoothness"] = lambda: smoothness_term(rendered, mask, weights.smoothness, factor, edges)
     if weights.laplacian > 0 and supports is not None:
         calls["laplacian"] = lambda: laplacian_term(colour, image, supports, weights.laplacian, config.upsampling)
-    photometric, *others = parallel_calls(lambda: photometric_loss(colour, targets, weights.ssim), *calls.values())
+    photometric, *others = parallel_calls(
+        timed(timer, "L1 and SSIM", lambda: photometric_loss(colour, targets, weights.ssim)),
+        *(timed(timer, TERM_STAGES[name], call) for name, call in calls.items()),
+    )
     loss, terms, d_colour, _ = photometric
     d_depth = np.zeros_like(rendered.depth)
     for name, term in zip(calls, others, strict=True):
@@ -146,10 +166,17 @@ def image_loss(rendered: RenderOut, targets: Targets, weights: LossWeights, conf
     return ImageLoss(loss, terms, d_colour, d_depth)
 
 
-def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, config: Config) -> Calibration:
+def calibrate_on(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    sequence: Sequence,
+    config: Config,
+    frames: FrameParameters | None = None,
+) -> Calibration:
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
-    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model.
+    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model. The
+    exposures of `frames` belong to the base model.
 
     Raises: CalibrationError with a per-view table when no view gives a ratio.
     """
@@ -157,13 +184,12 @@ def calibrate_on(gaussians: Gaussians, spectral: Spectral, sequence: Sequence, c
     views = []
     for index in chosen:
         frame = sequence.frame(int(index), gaussians.position.dtype)
-        rendered = render_at(
-            gaussians, spectral, config, frame.camera, frame.time, appearance=False, spectral_motion=False
-        )
+        at = (frame.camera, frame.time)
+        rendered = render_at(gaussians, spectral, config, *at, frames=frames, appearance=False, spectral_motion=False)
         targets = frame_targets(frame, config)
         supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)
         photometric = photometric_loss(rendered.colour, targets, config.loss.ssim_weight)
         _, saved = laplacian_loss_forward(rendered.colour, targets.image, supports, config.loss.upsampling)
         laplacian = laplacian_loss_reverse(1.0, saved)
-        views.append(ViewGradients(sequence.names[int(index)], rms(photometric.d_colour), rms(laplacian)))
+        views.append(ViewRms(sequence.names[int(index)], rms(photometric.d_colour), rms(laplacian)))
     return calibrate(views, config.loss.gradient_ratio)

@@ -1,7 +1,7 @@
-"""When and how much: every schedule of the training, as pure functions of (iteration, configuration).
+"""Every schedule of the training, as pure functions of (iteration, configuration).
 
-Iterations count from 1. This module knows no array and no state, so any iteration can be asked for at any
-time: a resumed run asks the same questions and gets the same answers.
+Iterations count from 1. This module has no state, so the value of any iteration can be computed at any time: a resumed
+run gets the same values.
 """
 
 from endotsr.config import Config
@@ -13,8 +13,8 @@ def exponential_decay(step: int, steps: int, initial: float, final: float) -> fl
     """initial^(1 - tau) final^tau, tau = clip(step / steps, 0, 1), 1 if steps = 0; 0 if an end is not positive."""
     if initial <= 0.0 or final <= 0.0:
         return 0.0
-    share = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
-    return initial * (final / initial) ** share
+    fraction = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
+    return initial * (final / initial) ** fraction
 
 
 def residuals_active(iteration: int, config: Config) -> bool:
@@ -24,25 +24,29 @@ def residuals_active(iteration: int, config: Config) -> bool:
 
 
 def residuals_activate(iteration: int, config: Config) -> bool:
-    """Whether this is the first iteration with residuals: their arrays and fresh moments are made before it."""
+    """Whether this is the first iteration with residuals, before which their arrays and moments are created."""
     return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
 
 
 def residual_decay(iteration: int, config: Config) -> float:
     """Factor on the residual rates, from 1 to `final_factor`.
 
-    With `restart_residual_schedule` it runs over the steps K_s .. iterations, else it is that of the base model.
+    With `restart_residual_schedule` the decay runs over the steps K_s .. iterations; otherwise it is that of the base
+    model.
     """
-    born = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
-    return exponential_decay(iteration - born, config.training.iterations - born, 1.0, config.optimiser.final_factor)
+    start = config.training.residual_activation if config.optimiser.restart_residual_schedule else 0
+    return exponential_decay(iteration - start, config.training.iterations - start, 1.0, config.optimiser.final_factor)
 
 
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
-    """Adam rates by field name of `Gaussians` at this iteration; the spectral residuals only while they are active.
+    """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
+
+    Those of the spectral residuals only while they are active, those of the exposures only if the model has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant; degree 0 and the higher degrees have their own rate
     fdm_weight        the position channels have the extra `deformation_position_factor`
+    exposure_*        decay like `position`
     *_coefficients    their factor x deformation rate x `residual_decay`
     """
     o = config.optimiser
@@ -61,6 +65,8 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
         "fdm_centre": deformation,
         "fdm_width": deformation,
     }
+    if config.model.exposure:
+        rates["exposure_log_gain"] = rates["exposure_bias"] = o.exposure * decay
     if residuals_active(iteration, config):
         residual = o.deformation * residual_decay(iteration, config)
         rates["appearance_coefficients"] = residual * o.appearance_factor
@@ -83,12 +89,12 @@ def smoothness_active(iteration: int, config: Config) -> bool:
 
 
 def active_degree(iteration: int, config: Config) -> int:
-    """Active harmonic degree: one more every `harmonics_interval` iterations, the interval's own iteration included."""
+    """Active harmonic degree: it rises by one at every multiple of `harmonics_interval`."""
     return min(config.model.harmonics_degree, iteration // config.training.harmonics_interval)
 
 
 def statistics_active(iteration: int, config: Config) -> bool:
-    """Whether screen gradients are gathered: until the last densification."""
+    """Whether screen gradients are accumulated: until the last densification."""
     return iteration < config.density.until
 
 

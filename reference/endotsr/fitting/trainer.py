@@ -1,29 +1,32 @@
 """The training: one view an iteration, on the published schedule (specification, equation 6 and B10-B12).
 
-`TrainingState` is all that a run carries from one iteration to the next and, but for `ahead`, which is then computed
-anew, all that a checkpoint holds; everything else (targets, atoms, rates) is a function of the state, the sequence and
-the configuration. So a resumed run equals an uninterrupted one bit by bit, and no result depends on the number of
-threads.
+`training_step` takes the steps of `view_gradients` (`fitting/view.py`, where they stand plainly) with the same
+functions; in place of the reverse passes of the time bases and of the Fourier coefficients it calls `optimise`, which
+joins them with their Adam step. No result depends on the number of threads.
 """
 
-import copy
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
-from endotsr.fitting.adam import AdamState, adam_state, add_array
-from endotsr.fitting.checkpoint import Checkpoint, save_checkpoint
+from endotsr.fitting.adam import adam_update, add_array, regather
 from endotsr.fitting.fused.step import optimise
-from endotsr.fitting.model import OffsetsAhead, Spectral, raster_settings, scene_at, scene_reverse, spectral_from
-from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, frame_targets, image_loss
+from endotsr.fitting.model import (
+    SceneGrads,
+    SceneSaved,
+    exposed,
+    exposed_reverse,
+    raster_settings,
+    scene_at,
+    scene_reverse,
+)
+from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
+from endotsr.fitting.sampling import View, draw_view, next_view
 from endotsr.fitting.schedules import (
     active_degree,
     densify_now,
@@ -33,120 +36,21 @@ from endotsr.fitting.schedules import (
     smoothness_active,
     statistics_active,
 )
-from endotsr.kernels.memory import keep_freed_memory
+from endotsr.fitting.state import TrainingState, Workshop, check_state, new_training, workshop
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
-from endotsr.scene.density_control import (
-    DensityStatistics,
-    densify,
-    empty_statistics,
-    gather_statistics,
-    scene_extent,
-)
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
+from endotsr.scene.density_control import densify, gather_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.scene.initialisation import activate_residuals, initialise
+from endotsr.scene.initialisation import activate_residuals
+from endotsr.scene.parameters import Exposure, column_gradients, exposure_of, trained
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import RenderGrads, RenderOut, check_finite, render_forward, render_reverse
+from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
 
-FloatArray = NDArray[np.floating]
 OnIteration = Callable[[dict[str, Any]], None]
 
 PSNR_EVERY = 10  # iterations between training PSNRs in the log: the figure costs a pass over the image
-
-
-class Timer(Protocol):
-    """What a benchmark hands in to see where the time goes."""
-
-    def mark(self, stage: str) -> None:
-        """The stage of this name has just ended."""
-
-
-class _NoTimer:
-    def mark(self, stage: str) -> None:
-        """Nothing to measure."""
-
-
-NO_TIMER = _NoTimer()
-
-
-@dataclass
-class TrainingState:
-    """Everything that a run carries from one iteration to the next."""
-
-    gaussians: Gaussians
-    adam: AdamState
-    iteration: int  # completed iterations
-    rng: np.random.Generator
-    statistics: DensityStatistics
-    lambda_lap: float | None  # full detail weight; None until an `auto` weight is calibrated
-    ahead: OffsetsAhead | None = None  # taken while the FDM was changed; not part of a checkpoint
-
-
-@dataclass
-class Workshop:
-    """What an iteration needs beside the state: functions of the sequence and the configuration."""
-
-    sequence: Sequence
-    config: Config
-    spectral: Spectral
-    extent: float
-    targets: dict[int, Targets]  # by frame, filled at first use
-
-    def targets_of(self, index: int) -> Targets:
-        """The loss targets of a frame, made once."""
-        if index not in self.targets:
-            self.targets[index] = frame_targets(self.sequence.frame(index, self.config.training.precision), self.config)
-        return self.targets[index]
-
-
-def workshop(sequence: Sequence, config: Config) -> Workshop:
-    """Spectral constants and scene extent of a sequence."""
-    keep_freed_memory()
-    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
-    extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    return Workshop(sequence, config, spectral, extent, {})
-
-
-def new_training(sequence: Sequence, config: Config) -> TrainingState:
-    """Initialise from the training frames, seeded. Raises InputError when the frames hold no usable pixel."""
-    rng = np.random.default_rng(config.training.seed)
-    gaussians = initialise(sequence, config.initialisation, config.model, rng, np.dtype(config.training.precision))
-    weight = config.loss.lambda_lap
-    return TrainingState(
-        gaussians,
-        adam_state(arrays(gaussians)),
-        0,
-        rng,
-        empty_statistics(gaussians.count),
-        None if weight == "auto" else float(weight),
-    )
-
-
-def save_state(path: Path, state: TrainingState, config: Config) -> None:
-    """Write a checkpoint, atomically.
-
-    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (its Gaussian would
-            only vanish from the picture). The previous checkpoint is then intact.
-    """
-    try:
-        check_finite(arrays(state.gaussians))
-    except ValueError as error:
-        raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
-    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap}
-    generator = dict(state.rng.bit_generator.state)
-    save_checkpoint(path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header)
-
-
-def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
-    """The state as it was saved."""
-    rng = np.random.default_rng()
-    rng.bit_generator.state = checkpoint.rng_state
-    weight = checkpoint.header.get("lambda_lap")
-    if weight is None and config.loss.lambda_lap != "auto":
-        weight = float(config.loss.lambda_lap)
-    return TrainingState(
-        checkpoint.gaussians, checkpoint.adam, checkpoint.iteration, rng, checkpoint.statistics, weight
-    )
 
 
 def train(
@@ -156,7 +60,7 @@ def train(
     on_iteration: OnIteration,
     on_checkpoint: Callable[[TrainingState], None],
     *,
-    on_message: Callable[[str], None] = print,
+    on_message: Callable[[str], object] = print,
 ) -> TrainingState:
     """Run to `config.training.iterations`; the state is changed in place and returned.
 
@@ -165,7 +69,7 @@ def train(
     Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite; ValueError naming array
             and index if the state holds a number that is not finite.
     """
-    check_finite(arrays(state.gaussians))
+    check_state(state)
     if state.lambda_lap is None and config.model.laplacian:
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
@@ -186,7 +90,7 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
     shop, state = workshop(sequence, base), new_training(sequence, base)
     while state.iteration < config.training.residual_activation:
         training_step(state, shop)
-    return calibrate_on(state.gaussians, shop.spectral, sequence, base).lambda_lap
+    return calibrate_on(state.gaussians, shop.spectral, sequence, base, state.frames).lambda_lap
 
 
 def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
@@ -194,76 +98,39 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     config, iteration = shop.config, state.iteration + 1
     if residuals_activate(iteration, config):
         _activate_residuals(state, config)
-    index, t = _draw_view(state.rng, shop)
-    targets = shop.targets_of(index)
-    camera = shop.sequence.cameras[index]
-    timer.mark("view")
-    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, t, state.ahead)
-    timer.mark("scene")
-    settings = raster_settings(config)
-    rendered, render_saved = render_forward(scene, camera, settings, degree=active_degree(iteration, config))
-    timer.mark("render")
-    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss)
-    timer.mark("losses")
-    grads = render_reverse(loss.d_colour, loss.d_depth, None, render_saved)
-    timer.mark("render reverse")
+    view = draw_view(state.rng, shop.sequence, config.training)
+    targets, camera = shop.targets_of(view.index), shop.sequence.cameras[view.index]
+    column = int(np.searchsorted(shop.sequence.train_index, view.index))
+    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, view.t, state.ahead, timer)
+    degree = active_degree(iteration, config)
+    rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
+    rendered, exposure_saved = exposed(rendered, exposure_of(state.frames, column))
+    loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
+    d_colour, d_exposure = exposed_reverse(loss.d_colour, exposure_saved)
+    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, timer=timer)
+    watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
-        lambda: scene_reverse(grads, scene_saved, coefficients=False),
-        lambda: _spectral_penalty(state.gaussians, shop),
-        lambda: _watch_density(state, grads, camera, statistics_active(iteration, config)),
+        lambda: scene_reverse(d_scene, scene_saved, coefficients=False),
+        timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, shop)),
+        timed(timer, "density control", lambda: _watch_density(state, d_scene, camera, watched)),
     )
-    timer.mark("scene reverse")
-    entry = _log_entry(iteration, index, loss, penalty, rendered, targets, state, config)
+    entry = _log_entry(iteration, view, loss, penalty, rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
-        rates = learning_rates(iteration, config)
-        later = _next_time(state.rng, shop) if iteration < config.training.iterations and not dense else None
-        state.ahead = optimise(
-            state.gaussians, state.adam, shop.spectral, config, scene_saved, grads, back, rates, later
-        )
-    timer.mark("optimiser")
+        _optimise(state, shop, scene_saved, d_scene, back, iteration, timer)
+        _optimise_frames(state, config, column, d_exposure, iteration)
     if dense:
-        _control_density(state, shop)
-        timer.mark("density control")
+        with timer.stage("density control"):
+            _control_density(state, shop)
     state.iteration = iteration
     return entry
 
 
-def _draw_view(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
-    """A training frame, uniform with replacement, and its time (jittered or bridged when asked for)."""
-    training = shop.config.training
-    if training.bridge_fraction > 0 and rng.random() < training.bridge_fraction:
-        return _draw_bridge(rng, shop)
-    index = int(shop.sequence.train_index[rng.integers(len(shop.sequence.train_index))])
-    t = float(shop.sequence.times[index])
-    jitter = training.time_jitter
-    return index, t + jitter * rng.uniform(-0.5, 0.5) / shop.sequence.count if jitter > 0 else t
-
-
-def _next_time(rng: np.random.Generator, shop: Workshop) -> float:
-    """Time of the next iteration, from a copy of the generator; density control would draw from it first."""
-    return _draw_view(copy.deepcopy(rng), shop)[1]
-
-
-def _draw_bridge(rng: np.random.Generator, shop: Workshop) -> tuple[int, float]:
-    """A time uniform between the first and the last training frame, and one of its two training neighbours.
-
-    The neighbour is drawn with the weight that linear interpolation would give it, so that the expected target at
-    every time is the blend of its neighbours: what lies between two frames is no longer free.
-    """
-    index = shop.sequence.train_index
-    times = shop.sequence.times[index]
-    t = float(rng.uniform(times[0], times[-1]))
-    right = min(max(int(np.searchsorted(times, t, side="right")), 1), len(times) - 1)
-    nearness = (t - times[right - 1]) / (times[right] - times[right - 1])
-    return int(index[right if rng.random() < nearness else right - 1]), t
-
-
 def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeights:
-    share = laplacian_ramp(iteration, config)
+    """The weights of the image terms in force at this iteration."""
     smoothness = config.loss.smoothness_weight if smoothness_active(iteration, config) else 0.0
-    full = state.lambda_lap or 0.0
-    return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, share * full)
+    laplacian = laplacian_ramp(iteration, config) * (state.lambda_lap or 0.0)
+    return LossWeights(config.loss.ssim_weight, config.loss.depth_weight, smoothness, laplacian)
 
 
 def _activate_residuals(state: TrainingState, config: Config) -> None:
@@ -276,30 +143,59 @@ def _activate_residuals(state: TrainingState, config: Config) -> None:
             add_array(state.adam, name, array)
 
 
-def _spectral_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
-    """L_msp; None without component S."""
+def _matern_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
+    """L_msp; None without component S. Its gradient is added in `optimise`."""
     coefficients = gaussians.motion_coefficients
     return None if coefficients is None else matern_penalty_forward(coefficients, shop.spectral.rho)[0]
 
 
-def _watch_density(state: TrainingState, grads: RenderGrads, camera: Camera, active: bool) -> None:
+def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
     """The statistics that density control goes by."""
     if active:
-        gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
+        gather_statistics(state.statistics, d_scene.mean2d, d_scene.visible, camera.width, camera.height)
+
+
+def _optimise(
+    state: TrainingState,
+    shop: Workshop,
+    saved: SceneSaved,
+    d_scene: RenderGrads,
+    back: SceneGrads,
+    iteration: int,
+    timer: Timer,
+) -> None:
+    """One Adam step of the Gaussians; the offsets of the next view are taken on the way if its time is known.
+
+    It is not before density control, which draws random numbers first, nor after the last iteration.
+    """
+    config, later = shop.config, None
+    if iteration < config.training.iterations and not densify_now(iteration, config):
+        later = next_view(state.rng, shop.sequence, config.training).t
+    rates = learning_rates(iteration, config)
+    gaussians, adam, spectral = state.gaussians, state.adam, shop.spectral
+    state.ahead = optimise(gaussians, adam, spectral, config, saved, d_scene, back, rates, later, timer)
+
+
+def _optimise_frames(
+    state: TrainingState, config: Config, column: int, d_exposure: Exposure | None, iteration: int
+) -> None:
+    """One Adam step of the parameters of frames: of all columns, with gradient 0 for the frames that were not seen."""
+    if state.frames is not None and d_exposure is not None:
+        o, gradients = config.optimiser, column_gradients(state.frames, column, d_exposure)
+        rates = learning_rates(iteration, config)
+        adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
 
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:
-    """Clone, split and prune; statistics start anew."""
-    density = shop.config.density
-    result = densify(
-        state.gaussians, state.adam, state.statistics, density, state.rng, shop.extent, consume_moments=True
-    )
-    state.gaussians, state.adam, state.statistics = result.gaussians, result.adam, result.statistics
+    """Clone, split and prune; moments follow, those of clones and children and all statistics start anew."""
+    result = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
+    regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
+    state.gaussians, state.statistics = result.gaussians, result.statistics
 
 
 def _log_entry(
     iteration: int,
-    index: int,
+    view: View,
     loss: ImageLoss,
     penalty: float | None,
     rendered: RenderOut,
@@ -310,9 +206,9 @@ def _log_entry(
     """What the log keeps of an iteration. Raises FloatingPointError on a loss that is not finite."""
     total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
     if not math.isfinite(total):
-        raise FloatingPointError(f"iteration {iteration}, frame {index}: loss is {total}; terms {loss.terms}")
+        raise FloatingPointError(f"iteration {iteration}, frame {view.index}: loss is {total}; terms {loss.terms}")
     terms = {name: float(value) for name, value in loss.terms.items()}
-    entry: dict[str, Any] = {"iteration": iteration, "frame": index, "loss": total, **terms}
+    entry: dict[str, Any] = {"iteration": iteration, "frame": view.index, "loss": total, **terms}
     if penalty is not None:
         entry["matern_penalty"] = penalty
     if iteration % PSNR_EVERY == 0 or iteration == 1:
@@ -327,16 +223,3 @@ def tissue_psnr(colour: FloatArray, targets: Targets) -> float | None:
     square = np.einsum("chw,chw,hw->", difference, difference, targets.mask, dtype=np.float64)
     count = 3 * int(np.count_nonzero(targets.mask))
     return -10.0 * math.log10(square / count) if square > 0 and count > 0 else None
-
-
-def bench_state(gaussians: Gaussians, config: Config, iteration: int) -> TrainingState:
-    """A state at a given iteration for benchmarks and tests, with fresh moments."""
-    weight = config.loss.lambda_lap
-    return TrainingState(
-        gaussians,
-        adam_state(arrays(gaussians)),
-        iteration,
-        np.random.default_rng(config.training.seed),
-        empty_statistics(gaussians.count),
-        0.83 if weight == "auto" else float(weight),
-    )

@@ -1,11 +1,11 @@
-"""The public gradient checker and the registry of every forward/reverse pair of the package.
+"""The public gradient checker, and every variant of every stage as a forward/reverse pair.
 
-Checking a port takes one call: `check_function(forward, reverse, inputs)` answers a `PairReport`.
+Checking a port takes one call: `check_function(forward, reverse, inputs)` returns a `PairReport`.
 """
 
 from endotsr.gradcheck.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair
 from endotsr.gradcheck.precision import PrecisionReport, check_precision
-from endotsr.gradcheck.registry import Pair, all_pairs, one_thread, pair_stream
+from endotsr.gradcheck.registry import Pair, all_pairs, one_thread, pair_of, pair_stream
 from endotsr.gradcheck.report import summary, table, to_json
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "check_pair",
     "check_precision",
     "one_thread",
+    "pair_of",
     "pair_stream",
     "summary",
     "table",

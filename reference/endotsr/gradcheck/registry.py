@@ -1,11 +1,10 @@
-"""The registry of forward/reverse pairs: gradient checks, golden cases and the equation table are driven from it.
+"""Every variant of every stage as a forward/reverse pair: what the gradient checks run, and what the tables list.
 
 A pair cannot exist unchecked: `tests/test_conventions.py` asserts that every `<stage>_forward` of the package
 is named by a pair that `all_pairs` returns.
 """
 
 import contextlib
-import importlib
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
@@ -13,16 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.stages.stage import Stage, Variant, real_of
 
 Arrays = Mapping[str, NDArray]
-
-PAIR_MODULES = ("pairs_equations", "pairs_deformation", "pairs_splatting", "pairs_losses", "pairs_chain")
 
 
 class Pair(NamedTuple):
     """One forward pass and its reverse pass, wrapped so that a checker needs to know nothing about them.
 
-    name      stage name, with its variant where there are several
+    name      variant of a stage, or any name for a pair of one's own
     equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
     inputs    rng -> float64 arrays; every one of them is differentiable; non-vacuous and away from kinks
     forward   inputs -> outputs, by name; float arrays (a scalar loss is an array of shape ())
@@ -48,16 +46,51 @@ class Pair(NamedTuple):
     single: str = ""
 
 
+def pair_of(stage: Stage, variant: Variant) -> Pair:
+    """The stage with the settings and the fixed inputs of one of its variants.
+
+    Raises: ValueError for a stage without a reverse pass.
+    """
+    reverse_pass, trace_pass = stage.reverse, stage.trace
+    if reverse_pass is None:
+        raise ValueError(f"stage {stage.name} has no reverse pass that variant {variant.name} could check")
+
+    def whole(inputs: Arrays) -> Arrays:
+        return inputs if variant.fixed is None else {**inputs, **variant.fixed(real_of(inputs))}
+
+    def forward(inputs: Arrays) -> dict[str, NDArray]:
+        outputs, _ = stage.forward(whole(inputs), variant.settings)
+        return {name: np.asarray(value) for name, value in outputs.items()}
+
+    def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
+        _, saved = stage.forward(whole(inputs), variant.settings)
+        found = reverse_pass(cotangents, saved)
+        return {name: np.asarray(found[name]) for name in inputs}
+
+    def trace(inputs: Arrays) -> Mapping[str, NDArray]:
+        assert trace_pass is not None
+        everything = whole(inputs)
+        return trace_pass(everything, variant.settings, stage.forward(everything, variant.settings)[1])
+
+    return Pair(
+        variant.name,
+        stage.equation,
+        variant.function or stage.function,
+        variant.inputs,
+        forward,
+        reverse,
+        variant.blocks,
+        trace if trace_pass is not None else None,
+        variant.hard,
+        variant.single,
+    )
+
+
 def all_pairs() -> dict[str, Pair]:
-    """Every registered pair by name, in the order of the specification."""
-    found: dict[str, Pair] = {}
-    for name in PAIR_MODULES:
-        module = importlib.import_module(f"endotsr.gradcheck.{name}")
-        for pair in module.PAIRS:
-            if pair.name in found:
-                raise ValueError(f"pair {pair.name} is registered twice")
-            found[pair.name] = pair
-    return found
+    """Every variant of every stage by name, in the order of the specification."""
+    from endotsr.stages.registry import all_stages
+
+    return {variant.name: pair_of(stage, variant) for stage in all_stages().values() for variant in stage.variants}
 
 
 def pair_stream(name: str, seed: int) -> np.random.Generator:

@@ -1,1 +1,1 @@
-"""Kernel support: how a kernel is compiled, shared among threads and given registers. Knows no equation."""
+"""Kernel support: compilation, threads, local arrays, the exponential, array types. This room holds no equation."""

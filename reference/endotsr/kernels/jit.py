@@ -1,7 +1,8 @@
-"""The one place that says how a kernel is compiled.
+"""How kernels are compiled: the only module that calls `numba.njit`.
 
 Kernels are plain module-level functions, compiled by assignment (`blend = jit(_blend)` or
-`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools.
+`blend = jit(blend)`), so that the Python body stays visible to coverage and mutation tools. The formulas that they
+carry to all items are compiled by the decorator `jit_formula`.
 
 No fast-math: sums keep the order they are written in. The fast path may contract a*b+c into one fused
 multiply-add (`contract=True`), which stays bitwise reproducible on one machine.
@@ -71,7 +72,7 @@ def kernel_source_hash() -> str:
 
 def _use_hashed_cache_folder() -> None:
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return  # the caller chose a folder and keeps it fresh
+        return  # the caller chose the folder and is responsible for stale entries
     from platformdirs import user_cache_dir
 
     folder = Path(user_cache_dir("endotsr")) / "kernels" / kernel_source_hash()
@@ -81,7 +82,7 @@ def _use_hashed_cache_folder() -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Whether files can be made there. Numba would take another place without a word: beside the sources, unhashed."""
+    """Whether files can be created there. Otherwise Numba would silently cache beside the sources, without the hash."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -91,7 +92,7 @@ def _takes_files(folder: Path) -> bool:
 
 
 def _passing_folder(wanted: Path) -> Path:
-    """A folder of this process and its children, gone with it."""
+    """A temporary folder for this process and its children, removed at exit."""
     folder = tempfile.mkdtemp(prefix="endotsr-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = folder
@@ -105,7 +106,7 @@ def _passing_folder(wanted: Path) -> Path:
 
 _use_hashed_cache_folder()
 if not os.environ.get("NUMBA_THREADING_LAYER"):
-    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # asked for the thread count only
+    numba.config.THREADING_LAYER = "workqueue"  # type: ignore[attr-defined]  # only its thread count is used
 
 
 def jit(function: F, *, contract: bool = False) -> F:
@@ -125,4 +126,14 @@ def jit(function: F, *, contract: bool = False) -> F:
 def jit_inline(function: F) -> F:
     """Compile a small helper that other kernels call; it is inlined into them and has no cache entry of its own."""
     compiled: Any = numba.njit(inline="always", error_model="numpy")(function)
+    return compiled
+
+
+def jit_formula(function: F) -> F:
+    """Compile a formula of scalars and tuples of scalars; every kernel that calls it holds it inlined. A decorator.
+
+    Unlike `jit_inline` it leaves the inlining to LLVM: types are inferred once for each dtype and not at every call,
+    which halves the compilation of the projection. A local array of `vectors` must not be passed to it.
+    """
+    compiled: Any = numba.njit(forceinline=True, error_model="numpy")(function)
     return compiled

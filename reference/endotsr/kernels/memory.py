@@ -1,4 +1,4 @@
-"""How freed memory is kept: a training frees and asks for the same image-sized arrays in every iteration."""
+"""Reuse of freed memory: every training iteration frees and allocates the same image-sized arrays."""
 
 import ctypes
 import sys
@@ -9,9 +9,9 @@ _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # of mallopt(3)
 def keep_freed_memory() -> bool:
     """Let glibc reuse freed arrays instead of returning their pages to the system.
 
-    Each return costs a page fault per 4 kB when the array is asked for again: 20 ms of an iteration at 640x512, and
-    with a million Gaussians two seconds. So no array gets pages of its own, and the heap keeps what is freed.
-    returns  whether the setting was taken; on other C libraries nothing happens
+    A returned page costs a page fault when it is allocated again, one per 4 kB: 20 ms of an iteration at 640x512, and
+    two seconds with a million Gaussians. Therefore no array is mapped separately, and the heap keeps what is freed.
+    returns  whether the setting was accepted; on other C libraries nothing changes
     """
     if not sys.platform.startswith("linux"):
         return False

@@ -1,12 +1,12 @@
-"""One serial kernel, several threads: `parallel_for` splits the rows (or blocks, or Gaussians) of a kernel among them.
+"""Threads for serial kernels: `parallel_for` distributes the rows (or blocks, or Gaussians) of a kernel.
 
 A kernel `kernel(first, stop, *arguments)` handles the tasks first ... stop - 1 and is compiled once, as a plain
 loop without the interpreter lock. Python threads call it for ranges of tasks. Every task writes cells of its own,
 so neither the number of threads nor the ranges can change a bit of the result.
 
-Why not Numba's `parallel=True`: it compiles the body of a loop about five times (the similarity kernel takes 4.4 s
-instead of 0.9 s, a cold start three times as long), its regions cost 130 us each instead of 15 us, and its fixed
-halves leave both threads waiting for the slower one when the machine has other work.
+Numba's `parallel=True` is not used. It compiles the body of a loop about five times (4.4 s instead of 0.9 s for the
+similarity kernel, three times as long for a cold start). Its regions cost 130 us each instead of 15 us. Its static
+split makes every thread wait for the slowest one when the machine has other work.
 """
 
 import os
@@ -55,9 +55,8 @@ def parallel_for(kernel: Callable[..., Any], tasks: int, *arguments: Any) -> Non
 def parallel_calls(*calls: Callable[[], Any]) -> list[Any]:
     """The results of calls that do not depend on one another, in their order, made at the same time.
 
-    For work between kernels: a thread that has nothing else to do takes the next call, or helps in the
-    `parallel_for` of one.
-    With one thread, or without compiled code, which would hold the interpreter lock: one after the other.
+    This is for the work between kernels: an idle thread takes the next call, or joins the `parallel_for` of a running
+    one. With one thread, or with the JIT off (Python code holds the interpreter lock), the calls run in sequence.
     Raises:  what a call raises, after all have ended.
     """
     alone = numba.config.DISABLE_JIT  # type: ignore[attr-defined]
@@ -74,9 +73,9 @@ def parallel_calls(*calls: Callable[[], Any]) -> list[Any]:
 
 
 def use_threads(asked: int) -> int:
-    """Let compiled kernels use `asked` threads (0 = all cores), which changes no result; returns the number.
+    """Set the number of threads of compiled kernels (0 = all cores) and return it. No result depends on it.
 
-    More than Numba has started, one a core, means all of them. Raises InputError for a number below 0.
+    A number above that of the threads Numba started (one a core) means all of them. Raises InputError below 0.
     """
     if asked < 0:
         raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")
@@ -95,7 +94,7 @@ def len_cores() -> int:
 def _distribute(
     kernel: Callable[..., Any], arguments: tuple[Any, ...], pieces: list[tuple[int, int]], threads: int
 ) -> None:
-    """Every piece in one of the threads, this one included; waits for all of them."""
+    """Run every piece in one of the threads, this one included, and wait for all of them."""
     _hire(threads - 1)
     job = _Job(kernel, arguments, iter(pieces), SimpleQueue())
     for _ in range(threads - 1):
@@ -107,7 +106,7 @@ def _distribute(
 
 
 def ranges(tasks: int, threads: int) -> list[tuple[int, int]]:
-    """Ranges of 0 ... tasks - 1, each half of a thread's share of what is left: nobody waits long for the last one."""
+    """Ranges that make up 0 ... tasks - 1. Each is half of what remains for a thread, so the last ones are short."""
     smallest = -(-tasks // (threads * RANGES_PER_THREAD))
     found, first = [], 0
     while first < tasks:
@@ -128,7 +127,7 @@ def _work(job: _Job) -> None:
 
 def _serve(jobs: SimpleQueue) -> None:
     while True:
-        _work(jobs.get())  # no name is kept: a waiting thread must not hold on to the last arrays
+        _work(jobs.get())  # without a local name, which would keep the last arrays alive in a waiting thread
 
 
 def _hire(count: int) -> None:

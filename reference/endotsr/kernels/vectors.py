@@ -1,14 +1,14 @@
-"""Small arrays that live in a kernel's registers: what plain arrays cannot tell the compiler.
+"""Small arrays in a kernel's registers, which plain NumPy arrays cannot express.
 
-An array from `np.empty` lies in memory that others may point to, so the compiler reloads and stores it at every step
-and guards each loop against overlap. A local array is the kernel's own: sums over a loop stay in vector registers
-and no guard is needed. The blend's reverse pass takes two thirds of the time with them; in float64 a half, because
-a loop over the eight lanes of a register, too short for guards, becomes vector code. A loop that reads and writes many
-arrays keeps the results of a GROUP of items in one and copies them out: the projection takes a third of the time.
+Memory from `np.empty` may alias other arrays, so the compiler reloads and stores it at every step and guards each
+loop against overlap. A local array aliases nothing: sums over a loop stay in vector registers, and no guard is needed.
+With local arrays the reverse pass of the blend takes two thirds of the time; in float64 it takes half, because a loop
+over the eight lanes of a register, too short for guards, becomes vector code. The loops of `kernels.groups`, which
+apply a formula to all items, are built on local arrays.
 
-Each function below is a plain Python function, which is its definition and runs when the JIT is off, beside the
-instructions that stand for it in compiled code. A local array must not leave the function that made it: it may be
-passed to functions inlined into that one (`jit_inline`), not returned, stored, or passed on to others.
+Each function below has two forms: a plain Python function, which defines it and runs when the JIT is off, and the
+instructions that replace it in compiled code. A local array must not leave the function that made it: it may be
+passed to functions inlined into that one (`jit_inline`), but not returned, stored, or passed to any other.
 """
 
 from collections.abc import Callable
@@ -24,17 +24,14 @@ from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
 
-from endotsr.kernels.jit import jit_inline
-
-GROUP = 64  # items of a loop whose results wait in a local array
 FEWEST_LANES = 8  # lanes: loops over fewer do not become vector code
 _INT32 = ir.IntType(32)
-_instructions: Any = intrinsic  # to a type checker too, the decorated function takes what a kernel passes
+_instructions: Any = intrinsic  # for a type checker, the decorated function takes what a kernel passes
 
 
 def _register_bytes() -> int:
-    """64 with AVX-512; else 32, which sixteen short registers of other machines hold as well."""
-    features = numba.config.CPU_FEATURES  # type: ignore[attr-defined]  # what Numba was told to compile for
+    """64 with AVX-512; otherwise 32, which also fits into sixteen registers of 16 bytes."""
+    features = numba.config.CPU_FEATURES  # type: ignore[attr-defined]  # the target that Numba compiles for
     if features is None:
         features = get_host_cpu_features().flatten()
     return 64 if "+avx512f" in features else 32
@@ -71,26 +68,12 @@ def fold(values: NDArray[np.floating]) -> np.floating:
 
 
 def lowest_bit(bits: np.uint64) -> np.uint64:
-    """Number of the lowest bit that is 1; there must be one."""
+    """Index of the lowest set bit; at least one bit must be set."""
     return np.uint64((int(bits) & -int(bits)).bit_length() - 1)
 
 
 def prefetch(table: NDArray[Any], row: int) -> None:
-    """Ask for a row of a C-ordered table ahead of its use; changes nothing. The row must exist."""
-
-
-def _write_group(results: NDArray[np.floating], start: int, count: int, out: NDArray[np.floating]) -> None:
-    """The columns of `results`, GROUP numbers each, to columns start ... start + count - 1 of the rows of `out`.
-
-    For loops that read and write many arrays: with the results of a group of items in a local array, the loop over
-    the group becomes vector code, as nothing that it reads can change.
-    """
-    for column in range(out.shape[0]):
-        for item in range(count):
-            out[np.uint64(column), np.uint64(start + item)] = results[np.uint64(column * GROUP + item)]
-
-
-write_group = jit_inline(_write_group)
+    """Load a row of a C-ordered table into the cache ahead of its use. No value changes; the row must exist."""
 
 
 def _lanes_of(like: Any) -> int:
@@ -98,9 +81,9 @@ def _lanes_of(like: Any) -> int:
 
 
 def _make_local(context: Any, builder: Any, kind: Any, size: int) -> Any:
-    """A place on the stack, as a one-dimensional array without an owner.
+    """A one-dimensional array on the stack, without an owner.
 
-    Not by `cgutils.alloca_once`, which fills it with zeros, number by number: seconds of compilation for a tile.
+    `cgutils.alloca_once` would fill it with zeros, number by number: seconds of compilation for a tile.
     """
     number = context.get_data_type(kind.dtype)
     with builder.goto_entry_block():
@@ -131,7 +114,7 @@ def _vector(typing: Any, like: Any) -> Any:
 
 @_instructions
 def _fold(typing: Any, values: Any) -> Any:
-    """Loads the vector once; halves are shuffles of the register."""
+    """The vector is loaded once; its halves are shuffles of the register."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         number, count = context.get_data_type(values.dtype), _lanes_of(values)
@@ -157,7 +140,7 @@ def _lowest_bit(typing: Any, bits: Any) -> Any:
 
 @_instructions
 def _prefetch(typing: Any, table: Any, row: Any) -> Any:
-    """First and last number of the row: it may lie in two cache lines (of three the middle one comes by itself)."""
+    """Prefetch the first and the last number: a row may lie in two cache lines (of three, hardware adds the middle)."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = make_array(table)(context, builder, arguments[0])

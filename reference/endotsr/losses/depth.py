@@ -1,6 +1,6 @@
-"""Normalised depth loss (B8): both depth images divided by their largest value, compared over tissue.
+"""Normalised depth loss (B8): both depth images are divided by their largest value and compared over tissue.
 
-The scale of the depth prior therefore does not matter, but the largest rendered depth is part of the loss: its
+The loss is therefore independent of the scale of the prior depth. The largest rendered depth is part of the loss: its
 derivative goes to the pixel that holds it.
 """
 
@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
-from endotsr.losses.rows import BoolArray, FloatArray, check_mask, check_plane, row_total
+from endotsr.losses.rows import check_mask, check_plane, row_total
 
-FEWEST_VALID = 10  # with fewer pixels that have a prior, a frame says nothing about depth
+FEWEST_VALID = 10  # pixels with a prior; a frame with fewer has no depth loss
 
 
 class DepthTarget(NamedTuple):
-    """What is fixed for a frame; may be kept between iterations."""
+    """The part that is constant for a frame and may be cached between iterations."""
 
     normalised: FloatArray  # (H, W)  prior / largest prior of the image, 0 where there is none
     valid: BoolArray  # (H, W)  tissue with a finite prior > 0
@@ -32,7 +33,7 @@ class DepthSaved(NamedTuple):
 
 
 def depth_target(prior_depth: FloatArray, mask: BoolArray) -> DepthTarget:
-    """Normalise the depth prior of a frame.
+    """Normalise the prior depth of a frame.
 
     prior_depth  (H, W)  scene units; 0, negative, NaN and Inf all mean "no depth" (D4)
     mask         (H, W)  bool, True = tissue

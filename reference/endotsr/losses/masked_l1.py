@@ -1,20 +1,21 @@
 """Masked L1 between the render and the observed frame (B6): the mean absolute difference over tissue.
 
 In: planar images (C, H, W) and the tissue mask. Out: a scalar and its derivative by the render. The difference
-is selected, not multiplied, by the mask: whatever stands under an instrument, NaN included, does not matter.
+is selected, not multiplied, by the mask: values under an instrument, NaN included, have no effect.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.losses.rows import check_image, row_total
 
 
 class MaskedL1Saved(NamedTuple):
-    """The inputs of the loss; the sign of the difference is taken again in the reverse pass."""
+    """The inputs of the loss; the reverse pass computes the sign of the difference again."""
 
     rendered: FloatArray  # (C, H, W)
     observed: FloatArray  # (C, H, W)

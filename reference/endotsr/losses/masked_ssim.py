@@ -11,7 +11,7 @@ Written with the difference e = x - y and the sum s = x + y, the same quantity i
 
 because B1 - A1 = (mu_x - mu_y)^2 and B2 - A2 is the variance of x - y. This form needs no covariance, is exactly 1
 with an exactly zero gradient for x = y, is symmetric in x and y to the last bit, and keeps 1 - SSIM to full
-relative precision. It also needs no moments of the target: nothing but the masked target itself is worth keeping.
+relative precision. It needs no moments of the target either: only the masked target itself is cached.
 
 Variances are sums of squares about the window's own central value c,  sigma^2 = sum w (x - c)^2 - (sum w (x - c))^2,
 first down columns, then along rows (variance of a mixture = mean of variances + variance of means). The central
@@ -23,9 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, row_total
+from endotsr.losses.rows import check_image, row_total
 
 RADIUS = 5  # the window spans 11 pixels
 TAPS = 2 * RADIUS + 1
@@ -35,7 +36,7 @@ C2 = 0.03**2  # (0.03 x display range)^2
 
 
 class SsimTarget(NamedTuple):
-    """What is fixed for a frame; may be kept between iterations."""
+    """The part that is constant for a frame and may be cached between iterations."""
 
     image: FloatArray  # (C, H, W)  observed, 0 where the mask is False
     mask: BoolArray  # (H, W)
@@ -52,7 +53,7 @@ class SsimSaved(NamedTuple):
 
 
 def ssim_target(observed: FloatArray, mask: BoolArray) -> SsimTarget:
-    """The observed frame (C, H, W) in display units with everything outside `mask` (True = tissue) set to 0."""
+    """The observed frame (C, H, W) in display units set to 0 outside `mask` (True = tissue)."""
     observed = check_image("observed", observed, mask)
     image = np.where(mask, observed, observed.dtype.type(0))
     return SsimTarget(image, np.ascontiguousarray(mask), observed.shape[0] * int(np.count_nonzero(mask)))
@@ -113,7 +114,7 @@ def window(dtype: np.dtype) -> FloatArray:
 
 
 def _clear_border(padded: FloatArray) -> None:
-    """The padding of the last two axes set to 0."""
+    """Set the padding of the last two axes to 0."""
     for border in (slice(None, RADIUS), slice(-RADIUS, None)):
         padded[..., border, :] = 0
         padded[..., border] = 0
@@ -165,8 +166,8 @@ def _similarity(first, stop, difference, total, mask, weights, slopes, totals):
     """1 - SSIM summed along each row, and the three slope maps of the reverse pass.
 
     d sum_p SSIM_p / dx_q = sum_p w(p - q) [a + 2 b (e_q - mu_e) + 2 c (s_q - mu_s)] with, all at tissue pixel p,
-    a = dSSIM/dmu_e + dSSIM/dmu_s, b = dSSIM/dsigma_e^2, c = dSSIM/dsigma_s^2. Stored is what multiplies
-    1, 2 e_q and 2 s_q.
+    a = dSSIM/dmu_e + dSSIM/dmu_s, b = dSSIM/dsigma_e^2, c = dSSIM/dsigma_s^2. The slopes are the factors
+    of 1, 2 e_q and 2 s_q.
     """
     height, width = mask.shape
     real = difference.dtype.type

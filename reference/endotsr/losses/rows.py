@@ -1,16 +1,14 @@
-"""What the image losses share: one sum over a row, the count of tissue pixels, and the check of shapes.
+"""Helpers of the image losses: the sum over a row, and the checks of shapes and masks.
 
-A loss is a sum over (channel, row) of float64 row totals. Every row is summed in the same order whatever the
-number of threads, and the row totals are added by one thread, so a loss is bitwise reproducible.
+A loss is a sum over (channel, row) of float64 row totals. The order of the sum over a row does not depend on the
+number of threads, and one thread adds the row totals, so a loss is bitwise reproducible.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
-
-FloatArray = NDArray[np.floating]
-BoolArray = NDArray[np.bool_]
 
 
 def _row_total(row):
@@ -31,7 +29,7 @@ row_total = jit(_row_total)
 
 
 def check_image(name: str, image: FloatArray, mask: BoolArray) -> FloatArray:
-    """`image` (C, H, W) as a contiguous array. Raises ValueError unless its H, W are those of the boolean mask."""
+    """`image` (C, H, W) as a contiguous array. Raises ValueError unless H, W are those of the boolean mask."""
     check_mask(mask)
     if image.ndim != 3 or image.shape[1:] != mask.shape:
         raise ValueError(f"{name} has shape {image.shape}; expected (C, {mask.shape[0]}, {mask.shape[1]})")
@@ -46,6 +44,6 @@ def check_plane(name: str, plane: NDArray, shape: tuple[int, ...]) -> NDArray:
 
 
 def check_mask(mask: BoolArray) -> None:
-    """Raises ValueError unless `mask` is a boolean (H, W) array: True is tissue, never 255 or a soft value."""
+    """Raises ValueError unless `mask` is a boolean (H, W) array: True = tissue; 255 and soft values are refused."""
     if mask.dtype != np.bool_ or mask.ndim != 2:
         raise ValueError(f"mask must be boolean (H, W), got {mask.dtype} {mask.shape}")

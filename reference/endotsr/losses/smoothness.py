@@ -6,22 +6,23 @@ S    sum over horizontal and vertical pairs of (D_a - D_b)^2 v_a v_b / (sum v + 
 TV   sum over horizontal and vertical pairs of |x_a - x_b| / (C H W)
 
 A pair across the mask border is kept: tissue counts as 0 in (1 - M) x, so the border is a step to zero with a
-gradient. Edges come as a boolean array from outside (the edge detector is not differentiated); depth keeps its units.
+gradient. Edges are an input, a boolean array: the edge detector is not differentiated. Depth keeps its units.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-from endotsr.losses.rows import BoolArray, FloatArray, check_image, check_plane, row_total
+from endotsr.losses.rows import check_image, check_plane, row_total
 
-FEW_PIXELS = 1e-6  # keeps S finite without valid pixels
+FEW_PIXELS = 1e-6  # added to sum v: keeps S finite without valid pixels
 
 
 class SmoothnessSaved(NamedTuple):
-    """The inputs of the loss; pair differences are taken again in the reverse pass."""
+    """The inputs of the loss; the reverse pass computes the differences of the pairs again."""
 
     rendered_depth: FloatArray  # (H, W)
     rendered: FloatArray  # (C, H, W)
@@ -50,7 +51,7 @@ def smoothness_forward(
     rendered                (C, H, W)  display units, not clamped
     mask                    (H, W)     bool, True = tissue
     edges                   (H, W)     bool, True = an edge of the depth image: no smoothing across it
-    total_variation_factor  f, 30 in SurgicalGS; 0 leaves the two TV terms out
+    total_variation_factor  f, 30 in SurgicalGS; 0 omits the two TV terms
     returns                 (loss, saved); summed in float64
 
     Reverse: `smoothness_reverse`; subgradient 0 where a TV pair is equal.

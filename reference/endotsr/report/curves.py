@@ -1,10 +1,9 @@
-"""Charts of a run from its log (one JSON object per line) and its evaluation, drawn with matplotlib on Agg.
+"""Charts of a run from its log (one JSON object per line) and its evaluation.
 
 Every chart exists for a light and for a dark page (transparent ground). A key that the log lacks is a curve that
 is not drawn; a chart without any curve is left out.
 """
 
-import io
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,22 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
+
 LogEntries = list[dict[str, Any]]
 
 TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
-UNSIGNED = {"Software": None}  # no version and no address of the drawing library inside the pictures
-THEMES = {
-    "light": {
-        "ink": "#24303a",
-        "faint": "#c9d1d8",
-        "colours": ("#0b6e99", "#c2501e", "#5b8c2a", "#8a4fa3", "#b08a00", "#6b7680"),
-    },
-    "dark": {
-        "ink": "#d7dee4",
-        "faint": "#46525c",
-        "colours": ("#58b4dd", "#f08a5d", "#9ccc65", "#c79be0", "#e6c14a", "#9aa6b0"),
-    },
-}
 
 
 @dataclass(frozen=True)
@@ -37,7 +25,7 @@ class Chart:
     """A titled chart; `draw(axes, theme)` puts the curves on matplotlib axes."""
 
     title: str
-    draw: Callable[[Any, dict[str, Any]], None]
+    draw: Callable[[Any, Theme], None]
     along: str = "iteration"  # what the horizontal axis counts
 
 
@@ -115,49 +103,30 @@ def frame_lines(evaluation: dict[str, Any], key: str) -> list[tuple[str, NDArray
 
 def chart_png(chart: Chart, theme: str, width: float = 4.4, height: float = 2.75, dots: int = 220) -> bytes:
     """One chart as a PNG file with a transparent ground, `width` x `height` inches."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height, constrained=False)
     figure.subplots_adjust(left=0.13, right=0.985, top=0.97, bottom=0.17)
     _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dots, transparent=True, metadata=UNSIGNED)
-    return buffer.getvalue()
+    return encoded(figure, "png", dots, transparent=True)
 
 
 def curves_png(log: LogEntries, evaluation: dict[str, Any] | None = None) -> bytes | None:
     """All charts in one PNG on white, for the run folder; None if there is nothing to draw."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     found = charts(log, evaluation)
     if not found:
         return None
     rows = (len(found) + 1) // 2
-    figure = Figure(figsize=(10.4, 3.3 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(10.4, 3.3 * rows)
     for position, chart in enumerate(found):
-        _draw(figure.add_subplot(rows, 2, position + 1), chart, THEMES["light"], title=True)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=150, metadata=UNSIGNED)
-    return buffer.getvalue()
+        _draw(figure.add_subplot(rows, 2, position + 1), chart, LIGHT, title=True)
+    return encoded(figure)
 
 
-def _draw(axes: Any, chart: Chart, theme: dict[str, Any], title: bool) -> None:
-    ink, faint = theme["ink"], theme["faint"]
+def _draw(axes: Any, chart: Chart, theme: Theme, title: bool) -> None:
     chart.draw(axes, theme)
-    if title:
-        axes.set_title(chart.title, color=ink, fontsize=11, loc="left")
-    axes.set_xlabel(chart.along, color=ink, fontsize=9)
-    axes.tick_params(which="both", colors=ink, labelsize=9, length=0)
-    axes.grid(True, color=faint, linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in axes.spines.values():
-        side.set_visible(False)
+    name_axes(axes, chart.along, title=chart.title if title else "", theme=theme)
+    plain_axes(axes, theme)
     if len(axes.get_legend_handles_labels()[1]) > 0:
-        axes.legend(frameon=False, fontsize=9, labelcolor=ink, ncols=2 if len(axes.lines) > 4 else 1)
+        legend(axes, theme, ncols=2 if len(axes.lines) > 4 else 1)
 
 
 def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: bool = True) -> None:
@@ -170,17 +139,17 @@ def _curve(axes: Any, log: LogEntries, key: str, colour: str, label: str, raw: b
     axes.plot(iterations, smoothed(values, window), color=colour, linewidth=1.6, label=label)
 
 
-def _draw_loss(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
-    _curve(axes, log, "loss", theme["colours"][0], "")
+def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
+    _curve(axes, log, "loss", theme.colours[0], "")
     _log_scale(axes, log, ("loss",))
 
 
-def _draw_terms(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
+def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
         positive = [{**entry, key: value} for entry in log if (value := _term(entry, key)) is not None and value > 0]
         if positive:  # a weight that is still zero has no place on a logarithmic axis
             label = "1 − ssim" if key == "ssim" else key
-            _curve(axes, positive, key, theme["colours"][position], label, raw=False)
+            _curve(axes, positive, key, theme.colours[position], label, raw=False)
     _log_scale(axes, log, TERMS)
 
 
@@ -203,26 +172,26 @@ def _log_scale(axes: Any, log: LogEntries, keys: tuple[str, ...]) -> None:
         axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _draw_psnr(axes: Any, theme: dict[str, Any], log: LogEntries, evaluation: dict[str, Any]) -> None:
-    _curve(axes, log, "psnr", theme["colours"][0], "training view")
+def _draw_psnr(axes: Any, theme: Theme, log: LogEntries, evaluation: dict[str, Any]) -> None:
+    _curve(axes, log, "psnr", theme.colours[0], "training view")
     levels = (("held_out", "held-out frames, end", "--", 1), ("training", "training frames, end", ":", 2))
     for key, label, dashes, colour in levels:
         value = ((evaluation.get(key) or {}).get("mean") or {}).get("psnr_full")
         if value is not None:
             axes.axhline(
-                value, color=theme["colours"][colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"
+                value, color=theme.colours[colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"
             )
 
 
-def _draw_count(axes: Any, theme: dict[str, Any], log: LogEntries) -> None:
+def _draw_count(axes: Any, theme: Theme, log: LogEntries) -> None:
     iterations, values = series(log, "gaussians")
-    axes.plot(iterations, values, color=theme["colours"][0], linewidth=1.6)
+    axes.plot(iterations, values, color=theme.colours[0], linewidth=1.6)
     axes.set_ylim(bottom=0)
 
 
-def _draw_frames(axes: Any, theme: dict[str, Any], lines: list[tuple[str, NDArray, NDArray]]) -> None:
+def _draw_frames(axes: Any, theme: Theme, lines: list[tuple[str, NDArray, NDArray]]) -> None:
     for position, (label, frames, values) in enumerate(lines):
         marker = "o" if position == 0 else "s"
         axes.plot(
-            frames, values, marker=marker, markersize=5, linewidth=1.4, color=theme["colours"][position], label=label
+            frames, values, marker=marker, markersize=5, linewidth=1.4, color=theme.colours[position], label=label
         )

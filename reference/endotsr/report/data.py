@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 # key in metrics.json, heading, decimals, +1 if larger is better and -1 if smaller is
 COLUMNS = (

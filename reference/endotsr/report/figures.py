@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
+
 ByteImage = NDArray[np.uint8]  # (H, W, 3), RGB
 
 ERROR_MAP = "magma"

@@ -1,11 +1,10 @@
-"""Pieces of the report as HTML text: escaping, numbers, tables, pictures, and the one style sheet.
+"""Pieces of the report as HTML text: escaping, numbers, pictures, and the one style sheet.
 
 Everything that comes from a run passes through `text`, so that no name can break the page. No script, no link.
 """
 
 import html
 import math
-from collections.abc import Iterable
 from typing import Any
 
 from endotsr.report import figures
@@ -48,20 +47,6 @@ def section(title: str, *content: str, note: str = "") -> str:
         return ""
     lead = f'<p class="note">{note}</p>' if note else ""
     return f"<section><h2>{text(title)}</h2>{lead}\n{body}</section>"
-
-
-def table(columns: Iterable[str], rows: Iterable[Iterable[str]], classes: Iterable[str] = (), caption: str = "") -> str:
-    """A table that scrolls sideways on a narrow page; the first column stays in sight. Cells are HTML already."""
-    head = "".join(f'<th scope="col">{text(c)}</th>' for c in columns)
-    kinds = list(classes)
-    body = []
-    for position, (first, *rest) in enumerate(rows):
-        kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
-        body.append(f'<tr{kind}><th scope="row">{first}</th>' + "".join(f"<td>{c}</td>" for c in rest) + "</tr>")
-    title = f"<caption>{text(caption)}</caption>" if caption else ""
-    return (
-        f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div>'
-    )
 
 
 def details(summary: str, content: str, opened: bool = False) -> str:

@@ -8,6 +8,7 @@ from endotsr.evaluation.evaluate import left_out
 from endotsr.report import curves, figures
 from endotsr.report import parts as parts
 from endotsr.report.data import COLUMNS, FramePictures, ReportData
+from endotsr.report.tables import html_table
 
 OPENED_FRAMES = 3  # the worst frames are unfolded, the others one touch away
 
@@ -94,7 +95,7 @@ def held_out(data: ReportData) -> str:
         "Mean over the held-out frames. Baselines use training frames only. Best measured value of a column in colour; "
         "published rows are quoted, not measured here."
     )
-    table = parts.table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
+    table = html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
     return parts.section("Held-out frames against doing without a model", table, _absent_reasons(data), note=note)
 
 
@@ -131,7 +132,7 @@ def temporal_gap(data: ReportData) -> str:
                 continue
             values = (inside, outside, inside - outside)
             rows.append([parts.text(label), *(parts.number(value, digits) for value in values)])
-        table = parts.table(["Mean over frames", "Training", "Held-out", "Gap"], rows)
+        table = html_table(["Mean over frames", "Training", "Held-out", "Gap"], rows)
     chart = curves.frame_chart(data.evaluation, "psnr_tissue")
     pair = f'<div class="charts">{table}{_chart(chart)}</div>' if chart else table
     note = (
@@ -216,7 +217,7 @@ def components(data: ReportData) -> str:
     for entry in data.components:
         rows = [[_free_cell(value, column) for value, column in zip(row, entry.columns)] for row in entry.rows]
         note = f'<p class="note">{parts.text(entry.note)}</p>' if entry.note else ""
-        blocks.append(f"<h3>{parts.text(entry.title)}</h3>{note}{parts.table(entry.columns, rows)}")
+        blocks.append(f"<h3>{parts.text(entry.title)}</h3>{note}{html_table(entry.columns, rows)}")
     return parts.section("What each component contributed", *blocks)
 
 
@@ -240,7 +241,7 @@ def the_run(data: ReportData) -> str:
     if data.input_hashes:
         rows = [[parts.text(k), f"<code>{parts.text(v)}</code>"] for k, v in data.input_hashes.items()]
         summary = f"Input files<small>{len(rows)}, SHA-256</small>"
-        blocks.append(parts.details(summary, parts.table(["File", "SHA-256"], rows)))
+        blocks.append(parts.details(summary, html_table(["File", "SHA-256"], rows)))
     return parts.section("The run", *blocks)
 
 

@@ -1,1 +1,8 @@
-"""Run folders: their files, the sequence and the model that they remember."""
+"""Run folders: what a run writes and remembers, and how it is trained, resumed and read again.
+
+folder    the folder and its records          log       log.jsonl, cut at the checkpoint when a run is resumed
+files     files replaced whole, or refused    machine   versions, processor, memory, time
+sources   sequences by name: a folder, or `simulated`; the only module that knows both readers and simulator
+model     checkpoint -> model or training     training  a training that fills the folder
+stopping  signals, remembered while an iteration finishes
+"""

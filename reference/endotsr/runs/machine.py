@@ -11,7 +11,7 @@ from typing import Any
 
 from endotsr import __version__
 
-LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless", "scikit-image", "msgspec")
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless")
 
 
 def versions() -> dict[str, str]:

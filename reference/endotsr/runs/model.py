@@ -17,6 +17,7 @@ from endotsr.runs.folder import RunFolder
 if TYPE_CHECKING:
     from endotsr.fitting.checkpoint import Checkpoint
     from endotsr.scene.gaussians import Gaussians
+    from endotsr.scene.parameters import FrameParameters
 
 CHANGE_NO_NUMBER = {"training.threads", "training.checkpoint_every"}  # may differ from what the checkpoint remembers
 
@@ -28,6 +29,7 @@ class Model(NamedTuple):
     spectral: Any  # frequencies, atom statistics and penalty weights of the training time stamps
     config: Config
     iteration: int
+    frames: "FrameParameters | None" = None  # parameters of the training frames; None if the model has none
 
 
 def load_model(folder: RunFolder) -> Model:
@@ -44,21 +46,25 @@ def load_model(folder: RunFolder) -> Model:
     checkpoint = _checkpoint_of(folder, config)
     times = np.array(record["times"])[record["train_index"]]
     spectral = spectral_from(config.model, times)
-    return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration)
+    return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration, checkpoint.frames)
 
 
 def save_training(folder: RunFolder, state: Any, config: Config) -> None:
     """Put the state of a training in place of the last checkpoint."""
-    from endotsr.fitting.trainer import save_state
+    from endotsr.fitting.state import save_state
 
     save_state(folder.checkpoint, state, config)
 
 
 def load_training(folder: RunFolder, config: Config) -> Any:
     """The training at its last checkpoint. Raises InputError if it is damaged or of other settings."""
-    from endotsr.fitting.trainer import state_from_checkpoint
+    from endotsr.fitting.state import state_from_checkpoint
 
-    return state_from_checkpoint(_checkpoint_of(folder, config), config)
+    checkpoint = _checkpoint_of(folder, config)
+    try:
+        return state_from_checkpoint(checkpoint, config)
+    except InputError as error:
+        raise InputError(f"{folder.checkpoint}: {error}") from None
 
 
 def _checkpoint_of(folder: RunFolder, config: Config) -> "Checkpoint":
@@ -87,15 +93,16 @@ def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[
     """The settings that show in the arrays themselves."""
     from endotsr.fitting.schedules import residuals_active
 
-    gaussians, born = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
+    gaussians, active = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
     yield "training.precision", gaussians.position.dtype.name
     yield "model.harmonics_degree", math.isqrt(len(gaussians.harmonics)) - 1
     yield "model.deformation", gaussians.fdm_weight is not None
+    yield "model.exposure", checkpoint.frames is not None
     if gaussians.fdm_weight is not None:
         yield "model.bases", gaussians.fdm_weight.shape[1]
     residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}
     for name, coefficients in residuals.items():
-        if born or coefficients is not None:  # before their birth they are missing in any model
+        if active or coefficients is not None:  # before their activation they are missing in any model
             yield f"model.{name}", coefficients is not None
         if coefficients is not None:
             yield "model.frequencies", coefficients.shape[1] // 2

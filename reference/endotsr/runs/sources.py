@@ -2,7 +2,7 @@
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -13,7 +13,12 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 SIMULATED = "simulated"  # the word that stands for the embedded sequence; a folder of that name is `./simulated`
+IN_MEMORY = "arrays in memory"  # the source of a sequence that was passed from Python and not read from files
 ARRAYS = ("images", "masks", "depth", "times")
 
 
@@ -23,6 +28,8 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
         from endotsr.simulator.simulate import simulate
 
         return simulate(simulated_settings(simulator, config)).sequence
+    if source == IN_MEMORY:
+        raise InputError("the run was trained on arrays in memory; allowed: the folder that holds the same frames")
     from endotsr.sequences.endonerf import read_endonerf
 
     return read_endonerf(Path(source), config.sequence, config.raster.near)
@@ -49,7 +56,7 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
     poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
     digests["cameras"] = _digest(poses)
     record = {
-        "source": source if source == SIMULATED else str(Path(source).resolve()),
+        "source": source if source in (SIMULATED, IN_MEMORY) else str(Path(source).resolve()),
         "frames": sequence.count,
         "width": sequence.width,
         "height": sequence.height,
@@ -62,7 +69,7 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
     }
     if source == SIMULATED:
         record["simulator"] = msgspec.to_builtins(simulator)
-    else:
+    elif source != IN_MEMORY:
         from endotsr.sequences.endonerf import input_hashes
 
         record["files_sha256"] = input_hashes(Path(source), config.sequence)
@@ -106,7 +113,6 @@ def sequence_record(sequence: Sequence) -> dict[str, Any]:
     cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras
     return {
         "unit": sequence.unit,
-        "near": sequence.near,
         "largest_depth": float(sequence.depth.max()),
         "static_camera": sequence.static_camera,
         "names": sequence.names,
@@ -115,6 +121,11 @@ def sequence_record(sequence: Sequence) -> dict[str, Any]:
         "test_index": sequence.test_index,
         "cameras": [camera._asdict() for camera in cameras],
     }
+
+
+def nearest_frame(times: "list[float] | NDArray[np.float64]", time: float) -> int:
+    """The frame whose time is nearest; of two at the same distance the earlier one."""
+    return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
 
 
 def remembered_cameras(record: dict[str, Any]) -> list[Camera]:

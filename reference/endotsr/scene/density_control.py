@@ -1,12 +1,14 @@
-"""Density control, equation (B11): where the picture pulls hard on Gaussians, make more; where they are faint, remove.
+"""Density control, equation (B11): add Gaussians where the screen gradient is large, remove those that are faint.
 
-In: Gaussians, their Adam moments and gathered screen gradients. Out: new ones, every array gathered by one index,
-so that lengths always agree. This module knows no renderer and no iteration number.
+In: Gaussians and gathered screen gradients. Out: new Gaussians, every array gathered by one index, and the plan of
+that gathering, by which the caller gathers whatever else it keeps for every Gaussian. This module knows no
+optimiser, no renderer and no iteration number.
 
 Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
 gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
 `dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
-removed. Scales are canonical, not deformed. Children inherit every other array; their moments start at zero.
+removed. Scales are canonical, not deformed. Children inherit every other array; what an optimiser remembers of a
+Gaussian, it forgets for clones and children (`GatherPlan`).
 Clones are not split in the same call.
 """
 
@@ -18,14 +20,10 @@ from numpy.typing import NDArray
 
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
-from endotsr.fitting.adam import AdamState
-from endotsr.kernels.jit import jit
-from endotsr.kernels.threads import parallel_for
+from endotsr.kernels.arrays import FloatArray, IndexArray
+from endotsr.kernels.gather import gather_columns
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera, camera_centre
-
-FloatArray = NDArray[np.floating]
-IndexArray = NDArray[np.intp]
 
 CHILDREN = 2  # of a split Gaussian
 SHRINK = 0.8 * CHILDREN  # the children's semi-axes are 1/1.6 of the parent's
@@ -40,11 +38,18 @@ class DensityStatistics(NamedTuple):
     visits: NDArray[np.int64]  # (N,) number of views in which the Gaussian was visible
 
 
+class GatherPlan(NamedTuple):
+    """Where the M new Gaussians come from: survivors first, then the fresh ones (clones and children)."""
+
+    source: IndexArray  # (M,) index among the old Gaussians: itself, or the parent
+    survivors: int  # columns from this one on are fresh
+
+
 class Densified(NamedTuple):
     """Result of `densify`; counts refer to the Gaussians before it."""
 
     gaussians: Gaussians
-    adam: AdamState
+    plan: GatherPlan  # for moments and whatever else has one column per Gaussian
     statistics: DensityStatistics  # all zero
     cloned: int
     split: int
@@ -88,47 +93,33 @@ def scene_extent(config: DensityConfig, cameras: Sequence[Camera]) -> float:
 
 def densify(
     gaussians: Gaussians,
-    adam: AdamState,
     statistics: DensityStatistics,
     config: DensityConfig,
     rng: np.random.Generator,
     extent: float,
-    *,
-    consume_moments: bool = False,
 ) -> Densified:
     """Clone, split and prune in one gather; the inputs are left as they are.
 
-    consume_moments   empty `adam` while the new moments are made, so that old and new never stand in memory together
-
     extent   scene units, see `scene_extent`
     returns  survivors in their old order, then clones, then first children, then second children, the last three
-             in the order of their parents; Adam moments in the same order; statistics of zeros
+             in the order of their parents; the plan of this order; statistics of zeros
 
     Edges: never visited -> gradient 0; N = 0 and pruning down to 0 are fine; when `maximum` leaves no room for
-    all, the steepest candidates go first (ties by index). Step counters of Adam are not changed.
+    all, the steepest candidates go first (ties by index).
     Draws: one `rng.standard_normal((2, 3, S))` for S split parents, none if S = 0.
     """
     alive, clone, split = _choose(gaussians, statistics, config, extent)
     keep = alive.copy()
     keep[split] = False
     survivors = np.flatnonzero(keep)
-    index = np.concatenate([survivors, clone, *[split] * CHILDREN])
-    result = gaussians._replace(**{name: _take(a, index, index.size) for name, a in arrays(gaussians).items()})
+    source = np.concatenate([survivors, clone, *[split] * CHILDREN])
+    gathered = {name: gather_columns(a, source, source.size) for name, a in arrays(gaussians).items()}
+    result = gaussians._replace(**gathered)
     if split.size:
         _place_children(result, gaussians, split, rng)
-    moments = [
-        _take_moments(group if consume_moments else dict(group), index, survivors.size)
-        for group in (adam.first, adam.second)
-    ]
     pruned = gaussians.count - int(alive.sum())
-    return Densified(
-        result,
-        AdamState(moments[0], moments[1], dict(adam.step)),
-        empty_statistics(index.size),
-        clone.size,
-        split.size,
-        pruned,
-    )
+    plan, fresh = GatherPlan(source, survivors.size), empty_statistics(source.size)
+    return Densified(result, plan, fresh, clone.size, split.size, pruned)
 
 
 def _choose(
@@ -184,42 +175,3 @@ def _rotations(quaternion: FloatArray) -> FloatArray:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def _take(array: FloatArray, index: IndexArray, old: int) -> FloatArray:
-    """array[..., index] with zeros in the columns from `old` on."""
-    out = np.empty((*array.shape[:-1], index.size), array.dtype)
-    if out.size:
-        rows = array.size // array.shape[-1]
-        source = np.ascontiguousarray(array).reshape(rows, -1)
-        parallel_for(_take_kernel, rows, source, index, old, out.reshape(rows, -1))
-    return out
-
-
-def _take_moments(group: dict[str, FloatArray], index: IndexArray, old: int) -> dict[str, FloatArray]:
-    """The moments of the new Gaussians; `group` is emptied on the way."""
-    return {name: _take(group.pop(name), index, old) for name in list(group)}
-
-
-def _take_rows(first, stop, source, index, old, out):
-    for row in range(first, stop):
-        from_row, to_row = source[row], out[row]
-        for i in range(old):
-            to_row[i] = from_row[index[i]]
-        for i in range(old, index.size):
-            to_row[i] = from_row.dtype.type(0)
-
-
-_take_kernel = jit(_take_rows)
-
-
-def check_lengths(gaussians: Gaussians, adam: AdamState) -> None:
-    """Raise ValueError if an array or a moment has not N columns."""
-    for name, array in arrays(gaussians).items():
-        for what, found in (
-            (name, array),
-            (f"first {name}", adam.first.get(name)),
-            (f"second {name}", adam.second.get(name)),
-        ):
-            if found is not None and found.shape != (*array.shape[:-1], gaussians.count):
-                raise ValueError(f"{what}: {found.shape} for {gaussians.count} Gaussians")

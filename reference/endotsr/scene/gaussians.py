@@ -6,10 +6,7 @@ last axis) clone, split, prune and permute every array, its optimiser moments in
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 POSITION_CHANNELS = slice(0, 3)  # of the ten deformation channels
 QUATERNION_CHANNELS = slice(3, 7)
@@ -35,12 +32,6 @@ class Gaussians(NamedTuple):
     def count(self) -> int:
         """Number of Gaussians N."""
         return self.position.shape[-1]
-
-
-def gather(gaussians: Gaussians, index: NDArray[np.integer]) -> Gaussians:
-    """The Gaussians named by `index` (in that order, repeats allowed), every array copied."""
-    taken = {name: np.ascontiguousarray(a[..., index]) for name, a in arrays(gaussians).items()}
-    return gaussians._replace(**taken)
 
 
 def arrays(gaussians: Gaussians) -> dict[str, FloatArray]:

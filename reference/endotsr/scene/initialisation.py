@@ -15,12 +15,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import backproject
-
-FloatArray = NDArray[np.floating]
 
 START_OPACITY = 0.1
 SQUARED_DISTANCE_FLOOR = 1e-7  # scene units squared; duplicates and single points get this

@@ -6,19 +6,17 @@ each border. Every draw is seeded, so the same arguments give the same arrays. S
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import Config
+from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 
-FloatArray = NDArray[np.floating]
-
 WIDTH, HEIGHT, FOCAL = 640, 512, 570.0
 SIGMA_PIXELS = {20_000: 3.6, 60_000: 2.4, 150_000: 1.7}
-BORDER = 0.04  # share of the picture beyond each border that holds Gaussians too
-OPAQUE_SHARE = 0.55
+BORDER = 0.04  # fraction of the picture beyond each border that holds Gaussians too
+OPAQUE_FRACTION = 0.55
 FRAMES = 9  # of the sequence, if nothing else is asked for: frame 1 is held out
 
 
@@ -48,7 +46,7 @@ def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> G
     scale = size * sigma * np.exp(rng.normal(0, 0.45, (count, 3))).T
     scale[2] *= 0.25
     quaternion = _facing(rng, count)
-    opaque = rng.random(count) < OPAQUE_SHARE
+    opaque = rng.random(count) < OPAQUE_FRACTION
     opacity = np.where(opaque, rng.uniform(0.6, 0.98, count), rng.uniform(0.03, 0.5, count))
     bands = (config.model.harmonics_degree + 1) ** 2
     harmonics = rng.normal(0, 0.05, (bands, 3, count))
@@ -129,7 +127,6 @@ def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11, frames: i
         times=index / frames,
         cameras=[view] * frames,
         names=[f"{i:06d}" for i in index],
-        near=0.2,
         unit="scene units",
         static_camera=True,
         train_index=np.delete(index, 1),

@@ -1,1 +1,1 @@
-"""What is read: EndoNeRF folders, splits, validation, depth priors. Every refusal names file, frame and reason."""
+"""Reading sequences: EndoNeRF folders, splits, validation, prior depth. Every error names file, frame and reason."""

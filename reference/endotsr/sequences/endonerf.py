@@ -1,12 +1,12 @@
-"""EndoNeRF folders, read and written.
+"""Reading and writing EndoNeRF folders.
 
     images/*.png     RGB                              poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
     depth/*.png      z in millimetres, 0 = none
     masks/*.png      or gt_masks/*.png, white = excluded unless the configuration says otherwise
 
 File names are free, in one pattern a folder; frames are ordered and paired by the number in the name. In: a folder and
-the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assumption. Whatever cannot be used is an
-`InputError` of one line that names file, frame and reason. Knows nothing of models or training.
+the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assumption. Input that cannot be used raises
+an `InputError` of one line that names file, frame and reason. This module does not depend on models or training.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -20,17 +20,23 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, read_png, write_png
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures, shortened
-from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_share, sparse_step, threshold_masks
+from endotsr.sequences.masks import (
+    check_polarity,
+    check_single_masks,
+    check_tissue_fraction,
+    sparse_step,
+    threshold_masks,
+)
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames, time_stamps
 from endotsr.splatting.camera import scale_camera
 
 NEAR = 0.2  # near plane of every preset, scene units
-LEAST_SIDE = 16  # pixels; below, the three-level pyramid has nothing left to compare
+LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
 FAR_OFF = 4.0  # times the usual median depth; measured medians of a sequence lie within 1.2
 ANOTHER_SCALE = 64.0  # times the usual median depth: 8 bits stretched to 16 make 256
-LEAST_DEPTH_SHARE = 0.05  # of a frame: the median of less may be that of a few outliers
+LEAST_DEPTH_FRACTION = 0.05  # of a frame: the median of fewer pixels may be that of a few outliers
 UNIT = "mm"
 
 
@@ -71,7 +77,7 @@ def select_files(folder: Path, config: SequenceConfig) -> Folder:
 def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> Sequence:
     """Read the frames that `config` selects.
 
-    near     near plane in millimetres, stored with the sequence
+    near     near plane, scene units: depth that lies wholly in front of it is refused
 
     Order of the steps: frame range, split and t = i / n over the selected frames; masks thresholded and turned to
     True = tissue; depth clipped per frame to percentiles of its non-zero values (0 stays 0); then everything is
@@ -82,17 +88,17 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     """
     low, high = config.depth_percentiles
     if not 0 <= low < high <= 100:
-        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed are two rising values in [0, 100]")
+        raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: two ascending values in [0, 100]")
     files = select_files(folder, config)
     rows = read_pose_rows(files.poses, files.total)
     notes: list[str] = []
     images, white, depth = _read_pictures(files, config, notes)
     masks = ~white if config.excluded_value == "white" else white
     where = str(Path(folder) / config.masks)
-    share = check_tissue_share(masks, where, config.excluded_value, config.allow_tissue_fraction)
+    fraction = check_tissue_fraction(masks, where, config.excluded_value, config.allow_tissue_fraction)
     evidence = check_polarity(masks, depth, images, where, config.excluded_value, config.allow_tissue_fraction)
     notes += [
-        f"{config.masks}: {config.excluded_value} = excluded; tissue share {share:.4f}; {evidence}",
+        f"{config.masks}: {config.excluded_value} = excluded; tissue fraction {fraction:.4f}; {evidence}",
         _depth_note(depth, near, files.depth),
     ]
     mask_names = [str(file) for file in files.masks]
@@ -104,12 +110,12 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         height, width = images.shape[2:]
         scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
         cameras = [scaled[id(camera)] for camera in cameras]
-        notes.append(f"scaled to {width}x{height}; tissue share {masks.mean():.4f}")
-        check_tissue_share(
+        notes.append(f"scaled to {width}x{height}; tissue fraction {masks.mean():.4f}")
+        check_tissue_fraction(
             masks, f"{where} at scale {config.scale:g}", config.excluded_value, config.allow_tissue_fraction
         )
     if min(width, height) < LEAST_SIDE:
-        raise InputError(f"{folder}: images of {width}x{height} pixels: no side may be under {LEAST_SIDE}")
+        raise InputError(f"{folder}: images of {width}x{height} pixels: allowed: at least {LEAST_SIDE} on each side")
     train, test = split_frames(len(images), config.split, config.block_length)
     return Sequence(
         images=images,
@@ -118,7 +124,6 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
         times=time_stamps(len(images)),
         cameras=cameras,
         names=[file.stem for file in files.images],
-        near=near,
         unit=UNIT,
         static_camera=static,
         train_index=train,
@@ -177,7 +182,7 @@ def _read_pictures(
         depth[i] = clip_depth(raw, config.depth_percentiles)
 
     with ThreadPoolExecutor() as pool:
-        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame that has one
+        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame with one
     _check_depth_scale(depth, files.depth, depth_types)
     return images, threshold_masks(masks, [str(file) for file in files.masks], notes), depth
 
@@ -218,7 +223,7 @@ def _read_sized(path: Path, width: int, height: int) -> NDArray:
 
 
 def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path]) -> str:
-    """A sentence on the depth prior; refuses a sequence without any."""
+    """The note on the prior depth. Raises InputError for a sequence without any."""
     valid = depth > 0
     where = files[0].parent
     if not valid.any():
@@ -239,12 +244,12 @@ def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path]) -> s
 
 
 def _check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype]) -> None:
-    """Refuse a depth picture that fills the 16 bits while others hold millimetres in 8 bits.
+    """Refuse a depth picture that is scaled to 16 bits while others hold millimetres in 8 bits.
 
-    Mixed bit depths alone are legal, published sequences have them: one far value makes a picture 16-bit.
+    Mixed bit depths alone are legal and occur in published sequences: one far value makes a picture 16-bit.
     """
     for i, ratio in _far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
-        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_SHARE * depth[i].size:
+        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_FRACTION * depth[i].size:
             bits = 8 * types[i].itemsize
             other = next(j for j, kind in enumerate(types) if kind != types[i])
             raise InputError(
@@ -254,7 +259,7 @@ def _check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: lis
 
 
 def _far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]]:
-    """Frames whose median depth is over `factor` times the usual one or under its inverse, with that ratio."""
+    """Frames whose median depth is over `factor` times the usual one, or under 1 / `factor`; with that ratio."""
     step = sparse_step(depth.shape[1])
     sparse = depth[:, ::step, ::step]
     medians = {i: float(np.median(frame[frame > 0])) for i, frame in enumerate(sparse) if (frame > 0).any()}
@@ -267,13 +272,13 @@ def _scaled(
     images: NDArray[np.uint8], masks: NDArray[np.bool_], depth: NDArray[np.float32], scale: float, where: str
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
     if scale > 1:
-        raise InputError(f"{where}: scale {scale:g}: images can only be made smaller, allowed are values in (0, 1]")
+        raise InputError(f"{where}: scale {scale:g}: images are only reduced; allowed: values in (0, 1]")
     n, _, old_height, old_width = images.shape
     width, height = round(old_width * scale), round(old_height * scale)
     if min(width, height) < LEAST_SIDE:
         raise InputError(
             f"{where}: scale {scale:g} makes {width}x{height} pixels of {old_width}x{old_height};"
-            f" no side may be under {LEAST_SIDE}"
+            f" allowed: at least {LEAST_SIDE} on each side"
         )
     small = np.empty((n, 3, height, width), np.uint8)
     tissue = np.empty((n, height, width), bool)
@@ -281,6 +286,6 @@ def _scaled(
     for i in range(n):
         small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
         tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
-        share = area_resize((depth[i] > 0).astype(np.float32), width, height)
-        np.divide(area_resize(depth[i], width, height), share, out=prior[i], where=share > 0)
+        fraction = area_resize((depth[i] > 0).astype(np.float32), width, height)
+        np.divide(area_resize(depth[i], width, height), fraction, out=prior[i], where=fraction > 0)
     return small, tissue, prior

@@ -1,4 +1,4 @@
-"""The picture files of a sequence folder: listing them in time order, pairing them across folders, hashing them."""
+"""The picture files of a sequence folder: listed in time order, paired across folders, hashed."""
 
 import hashlib
 import os
@@ -15,8 +15,8 @@ ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, 
 def list_pictures(folder: Path) -> list[Path]:
     """PNG files of a folder in time order: by the numbers in their names, or by name where no name has a number.
 
-    Raises:  InputError if the folder is missing or holds no PNG, if a name is not UTF-8 or has more or fewer numbers in
-    it than the others, or if two files carry the same number.
+    Raises:  InputError if the folder is missing or holds no PNG, if a name is not UTF-8 or contains more or
+    fewer numbers than the others, or if two files carry the same number.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
@@ -86,7 +86,7 @@ def _check_same_keys(here: list, there: list, reference: list[Path], other: list
 
 
 def _check_names_are_text(files: list[Path]) -> None:
-    """Refuse a path that is not UTF-8: it could be read, but not be written into the record of a run."""
+    """Refuse a path that is not UTF-8: the record of a run could not hold it."""
     for file in files:
         try:
             str(file).encode("utf-8")
@@ -96,7 +96,7 @@ def _check_names_are_text(files: list[Path]) -> None:
 
 
 def _check_names_alike(files: list[Path]) -> None:
-    """Refuse a file whose name holds more or fewer numbers than most: no order by number would include it."""
+    """Refuse a file whose name holds more or fewer numbers than most: it has no place in an order by number."""
     counts = [len(re.findall(r"\d+", file.stem)) for file in files]
     usual, frequency = Counter(counts).most_common(1)[0]
     if frequency == len(files):
@@ -124,13 +124,13 @@ def _departing(files: list[Path]) -> Path:
 
 
 def _name_keys(files: list[Path]) -> list[tuple[str]]:
-    """What pairs names without numbers: all before the first dot if that tells the files apart, else the stem."""
+    """Keys of names without numbers: the part before the first dot if it is unique, else the stem."""
     short = [file.name.split(".")[0] for file in files]
     return [(key,) for key in (short if len(set(short)) == len(short) else [file.stem for file in files])]
 
 
 def shortened(names: list[str]) -> str:
-    """A list of names for a message: five of them at most, and how many more there are."""
+    """At most five of the names, and the number of the others, for a message."""
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 

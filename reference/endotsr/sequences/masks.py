@@ -1,16 +1,16 @@
-"""From mask files to tissue masks: which values are white, which polarity holds, and whether that can be true.
+"""From mask files to tissue masks: thresholds, polarity, and checks of the polarity.
 
-Polarity is stated in the configuration and never guessed, but a wrong statement is recognised. Evidence, measured on a
+The configuration states the polarity; it is never guessed, but a wrong statement is detected. Evidence, measured on a
 public sequence (63 frames, 34 % of the pixels without depth):
 
-| masks folder | share without depth: tissue / excluded | redness R - B: tissue / excluded |
+| masks folder | fraction without depth: tissue / excluded | redness R - B: tissue / excluded |
 |---|---|---|
 | `masks`, right polarity | 0.000 / 1.000 | 69 / 4 |
 | `gt_masks`, right polarity | 0.093 / 1.000 | 66 / -3 |
 
-With the wrong polarity each pair is swapped, while the tissue share (0.34 and 0.27) would still look plausible.
-Instruments and borders are where stereo depth is missing, so depth decides when enough of it is missing; else the
-colour does.
+With the wrong polarity each pair is swapped, while the tissue fraction (0.34 and 0.27) would still look plausible.
+Stereo depth is missing on instruments and at borders, so depth decides when enough of it is missing. Otherwise the
+colour decides.
 """
 
 from collections import Counter
@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.sequences.files import shortened
 
-LEAST_TISSUE_SHARE = 0.05
-MOST_SOFT_SHARE = 0.05  # of a frame: more pixels between black and white are no mask
-LEAST_MISSING_SHARE = 0.01  # of all pixels: with less missing depth, depth says nothing about polarity
+LEAST_TISSUE_FRACTION = 0.05
+MOST_SOFT_FRACTION = 0.05  # of a frame: a picture with more pixels between black and white is no mask
+LEAST_MISSING_FRACTION = 0.01  # of all pixels: with less missing depth, depth is no evidence of polarity
 MISSING_MARGIN = 0.25  # measured differences are 0.9 and more
 REDNESS_MARGIN = 20.0  # grey levels; measured differences are 65 and more
-SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN for one frame, where less evidence must weigh more
-OPPOSITE_SHARE = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
+SINGLE_MISSING_MARGIN = 0.5  # as MISSING_MARGIN, for the smaller evidence of one frame
+OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next frame, by at most 0.36 from any other
 ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fraction = true)"
 
 
@@ -51,7 +51,7 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
         np.greater_equal(picture, (white + 1) // 2, out=result[i])
         soft = picture.size - np.count_nonzero(picture == 0) - np.count_nonzero(picture == white)
         soft_total += soft
-        if soft > MOST_SOFT_SHARE * picture.size:
+        if soft > MOST_SOFT_FRACTION * picture.size:
             raise InputError(
                 f"{names[i]}: {soft / picture.size:.1%} of the pixels are neither 0 nor {white}: this is not a mask"
                 " (another kind of picture in the mask folder, or masks written with different scales?)"
@@ -63,20 +63,20 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
     return result
 
 
-def check_tissue_share(masks: NDArray[np.bool_], where: str, excluded_value: str, allow: bool) -> float:
-    """The tissue share of all frames, refused below 5 % and at exactly 100 % unless `allow`.
+def check_tissue_fraction(masks: NDArray[np.bool_], where: str, excluded_value: str, allow: bool) -> float:
+    """The tissue fraction of all frames, refused below 5 % and at exactly 100 % unless `allow`.
 
-    Raises:  InputError naming the folder, the share, the likely cause and the setting that overrides.
+    Raises:  InputError naming the folder, the fraction, the likely cause and the setting that overrides.
     """
-    share = float(masks.mean())
-    if allow or LEAST_TISSUE_SHARE <= share < 1.0:
-        return share
+    fraction = float(masks.mean())
+    if allow or LEAST_TISSUE_FRACTION <= fraction < 1.0:
+        return fraction
     cause = (
         f"the masks may have the other polarity (excluded_value is {excluded_value!r})"
-        if share < LEAST_TISSUE_SHARE
+        if fraction < LEAST_TISSUE_FRACTION
         else f"the masks exclude nothing: they may be empty or hold no {excluded_value} pixel"
     )
-    raise InputError(f"{where}: {share:.1%} of the pixels count as tissue; {cause}; if this is right, set {ALLOW}")
+    raise InputError(f"{where}: {fraction:.1%} of the pixels count as tissue; {cause}; if this is right, set {ALLOW}")
 
 
 def check_polarity(
@@ -87,14 +87,14 @@ def check_polarity(
     excluded_value: str,
     allow: bool,
 ) -> str:
-    """Refuse a polarity that the pictures contradict; otherwise a sentence on what supports it.
+    """Refuse a polarity that the pictures contradict; otherwise return a sentence on the evidence for it.
 
     masks    (n, H, W) True = tissue, as understood so far
     depth    (n, H, W) 0 = missing
     images   (n, 3, H, W) display RGB
 
-    Wrong if (a) at least 1 % of all pixels lack depth and the share lacking it is larger by 0.25 on "tissue" than on
-    excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
+    Wrong if (a) at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on "tissue" than
+    on excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
     in mean R - B, than "tissue" by 20 grey levels.
     """
     if masks.all() or not masks.any():
@@ -106,7 +106,7 @@ def check_polarity(
         f"the masks seem to have the other polarity: set --sequence.excluded-value {other}"
         f' (TOML: [sequence] excluded_value = "{other}"); to go on with these masks, set {ALLOW}'
     )
-    if missing.mean() >= LEAST_MISSING_SHARE and abs(on_tissue - on_excluded) > MISSING_MARGIN:
+    if missing.mean() >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:
             raise InputError(f"{where}: with {excluded_value} = excluded, {found}; {advice}")
@@ -125,25 +125,25 @@ def check_single_masks(
     names: list[str],
     allow: bool,
 ) -> list[str]:
-    """Refuse a mask that is wrong while the others are right, which no sum over the frames shows.
+    """Refuse a single wrong mask among right ones, which sums over all frames do not reveal.
 
     masks, depth, images   as for `check_polarity`
     names    n mask files
-    returns  notes on frames without any tissue or without anything excluded: both are legal, and rare
+    returns  notes on frames without tissue or without excluded pixels: both are legal and rare
 
     Wrong if (a) a frame has some tissue, but less than 5 %, while half the frames have more; (b) it differs on more
     than 75 % of the pixels from the frame before and the frame after it (frames without tissue left out); or (c) it
     resembles the opposite of most masks, and the pictures contradict it but not most of the others.
 
-    Raises:  InputError naming the file, the reason and the setting that overrides; with `allow` it becomes a note.
+    Raises:  InputError naming the file, the reason and the setting that overrides. With `allow` it becomes a note.
     """
     step = sparse_step(masks.shape[1])
     sparse = masks[:, ::step, ::step]
-    shares = np.count_nonzero(masks, axis=(1, 2)) / masks[0].size
-    wrong = _too_little_tissue(shares) | _against_pictures(
+    fractions = np.count_nonzero(masks, axis=(1, 2)) / masks[0].size
+    wrong = _too_little_tissue(fractions) | _against_pictures(
         sparse, depth[:, ::step, ::step], images[:, :, ::step, ::step]
     )
-    wrong |= _against_neighbours(sparse, shares)
+    wrong |= _against_neighbours(sparse, fractions)
     notes = []
     if wrong:
         first = min(wrong)
@@ -152,19 +152,19 @@ def check_single_masks(
         if not allow:
             raise InputError(f"{found}; is this mask inverted? If it is right, set {ALLOW}")
         notes.append(found)
-    for frames, what in ((shares == 0, "no tissue, hence nothing to compare"), (shares == 1, "nothing excluded")):
+    for frames, what in ((fractions == 0, "no tissue, hence nothing to compare"), (fractions == 1, "nothing excluded")):
         if frames.any():
             notes.append(f"{what}: mask {shortened([Path(names[i]).name for i in np.flatnonzero(frames)])}")
     return notes
 
 
 def sparse_step(height: int) -> int:
-    """The step between rows and columns that leaves about 128 rows: enough for a share or a median, and quick."""
+    """The step between rows and columns that leaves about 128 rows, enough for a fraction or a median."""
     return max(1, height // 128)
 
 
 def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
-    """Refuse 8-bit masks among 16-bit ones: what is white in one kind is almost black in the other."""
+    """Refuse 8-bit masks among 16-bit ones: white in one kind is almost black in the other."""
     usual, frequency = Counter(types).most_common(1)[0]
     odd = next((i for i, kind in enumerate(types) if kind != usual), None)
     if odd is not None:
@@ -174,22 +174,22 @@ def _check_one_bit_depth(names: list[str], types: list[np.dtype]) -> None:
         )
 
 
-def _too_little_tissue(shares: NDArray[np.floating]) -> dict[int, str]:
-    usual = float(np.median(shares))
-    if usual < LEAST_TISSUE_SHARE:
+def _too_little_tissue(fractions: NDArray[np.floating]) -> dict[int, str]:
+    usual = float(np.median(fractions))
+    if usual < LEAST_TISSUE_FRACTION:
         return {}
-    few = np.flatnonzero((shares > 0) & (shares < LEAST_TISSUE_SHARE))
-    return {int(i): f"{shares[i]:.1%} of the pixels count as tissue, in the median frame {usual:.1%}" for i in few}
+    few = np.flatnonzero((fractions > 0) & (fractions < LEAST_TISSUE_FRACTION))
+    return {int(i): f"{fractions[i]:.1%} of the pixels count as tissue, in the median frame {usual:.1%}" for i in few}
 
 
-def _against_neighbours(masks: NDArray[np.bool_], shares: NDArray[np.floating]) -> dict[int, str]:
-    """Frames that are nearly the opposite of the two nearest frames with tissue."""
+def _against_neighbours(masks: NDArray[np.bool_], fractions: NDArray[np.floating]) -> dict[int, str]:
+    """Frames whose mask is nearly the opposite of those of the two nearest frames with tissue."""
     found = {}
-    usable = [int(i) for i in np.flatnonzero(shares > 0)]
+    usable = [int(i) for i in np.flatnonzero(fractions > 0)]
     for k, i in enumerate(usable):
-        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # the first and the last frame have both on one side
+        start = min(max(k - 1, 0), max(len(usable) - 3, 0))  # at the first and the last frame, both are on one side
         differing = [float((masks[i] != masks[j]).mean()) for j in usable[start : start + 3] if j != i]
-        if shares[i] < 1 and len(differing) == 2 and min(differing) > OPPOSITE_SHARE:
+        if fractions[i] < 1 and len(differing) == 2 and min(differing) > OPPOSITE_FRACTION:
             found[i] = (
                 f"it differs from the masks of the nearest two frames on {min(differing):.1%} of the pixels or more"
             )
@@ -203,18 +203,18 @@ def _against_pictures(
     verdicts = [_verdict(mask, frame == 0, image) for mask, frame, image in zip(masks, depth, images)]
     signs = np.array([sign for sign, _ in verdicts])
     if np.count_nonzero(signs < 0) >= np.count_nonzero(signs > 0):
-        return {}  # not single frames: a matter of `check_polarity`
+        return {}  # not a fault of single frames: `check_polarity` handles it
     usual = masks.mean(axis=0) >= 0.5
     resembles_opposite = (masks != usual).mean(axis=(1, 2)) > 0.5
     return {int(i): verdicts[i][1] for i in np.flatnonzero((signs < 0) & resembles_opposite)}
 
 
 def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray[np.uint8]) -> tuple[int, str]:
-    """Whether the picture supports one mask (1), contradicts it (-1) or says nothing (0), and by what."""
+    """Whether the picture supports one mask (1), contradicts it (-1) or neither (0), and the evidence."""
     if mask.all() or not mask.any():
         return 0, ""
     on_tissue, on_excluded = float(missing[mask].mean()), float(missing[~mask].mean())
-    if missing.mean() >= LEAST_MISSING_SHARE and abs(on_tissue - on_excluded) > SINGLE_MISSING_MARGIN:
+    if missing.mean() >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > SINGLE_MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of its tissue and {on_excluded:.1%} of its excluded pixels"
         return (-1 if on_tissue > on_excluded else 1), found
     redness = image[0].astype(np.int32) - image[2]

@@ -1,4 +1,4 @@
-"""Cameras from an LLFF pose file, and back.
+"""Cameras from an LLFF pose file, and pose rows from cameras.
 
 A row holds a 3x5 matrix, row-major, and two bounds: [R | t | (H, W, f)], near, far. Columns 0-2 of R are the
 camera-to-world axes with x right, y up, z backward; they become OpenCV axes as [c0, -c1, -c2] (the conversion
@@ -18,8 +18,8 @@ POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 ARRAY_START = b"\x93NUMPY"  # first bytes of every .npy file
 ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
 FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
-ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 that still is a rotation written with few digits
-STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry spreads by more
+ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
+STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry varies by more
 
 
 def find_pose_file(folder: Path) -> Path:
@@ -31,14 +31,14 @@ def find_pose_file(folder: Path) -> Path:
 
 
 def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
-    """The rows of a pose file, (count, 17), checked to be numbers that a camera can be made of.
+    """The rows of a pose file, (count, 17), checked to be finite numbers.
 
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
     try:
         with path.open("rb") as stream:
             start = stream.read(len(ARRAY_START))
-        # NumPy would take any other file for a pickle and advise to load that.
+        # NumPy would treat any other file as a pickle and advise loading it.
         rows = np.load(path, allow_pickle=False) if start == ARRAY_START else None
     except (OSError, ValueError, EOFError) as error:
         reason = "it holds Python objects" if "allow_pickle" in str(error) else str(error).splitlines()[0]
@@ -62,13 +62,14 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
 def cameras_from_rows(
     rows: NDArray[np.float64], width: int, height: int, path: Path, frames: range
 ) -> tuple[list[Camera], bool]:
-    """Cameras of the chosen rows, and whether the camera is static (then one Camera object is shared).
+    """Cameras of the chosen rows, and whether the camera is static (all entries are then one Camera object).
 
     rows    (n, 17) rows of the pose file
     width, height  size of the image files, pixels
     path, frames   for messages; `frames` also chooses the rows
 
-    Raises:  InputError if a row states another image size, a focal length that is not positive, or no rotation.
+    Raises:  InputError if a row states another image size, a focal length that is not positive, or a matrix
+             that is no rotation.
     """
     cameras = [_camera(rows[i], width, height, f"{path}: frame {i}") for i in frames]
     chosen = rows[list(frames)][:, :15]

@@ -1,7 +1,7 @@
-"""A sequence in memory: what every reader and the simulator deliver, and all that the trainer and the evaluation see.
+"""A sequence in memory: the output of every reader and of the simulator, the input of training and evaluation.
 
-Pictures stay 8-bit (one byte a channel); `Sequence.frame` converts one of them on demand. No file format and no
-mask polarity is known here: a mask is True on tissue, a depth of 0 is no depth.
+Pictures stay 8-bit (one byte a channel); `Sequence.frame` converts one of them on demand. File formats and
+mask polarities do not occur here: a mask is True on tissue, and a depth of 0 means no depth.
 """
 
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from endotsr.splatting.camera import Camera
 
 
 class Frame(NamedTuple):
-    """One frame as the losses take it. Image and depth have the precision that was asked for."""
+    """One frame as the losses use it. Image and depth have the requested precision."""
 
     image: NDArray[np.floating]  # (3, H, W) display RGB in [0, 1]
     mask: NDArray[np.bool_]  # (H, W)    True = tissue
@@ -27,7 +27,7 @@ class Frame(NamedTuple):
 class Sequence:
     """n frames of H x W pixels with masks, depth prior, cameras and a split.
 
-    The notes say in full sentences what the reader assumed and found: polarity, shares, thresholds, repairs.
+    The notes are full sentences on what the reader assumed and found: polarity, fractions, thresholds, repairs.
     """
 
     images: NDArray[np.uint8]  # (n, 3, H, W) display RGB
@@ -36,7 +36,6 @@ class Sequence:
     times: NDArray[np.float64]  # (n,)         normalised, in [0, 1)
     cameras: list[Camera]  # n entries; one and the same object when the camera is static
     names: list[str]  # n names, for messages and written pictures
-    near: float  # near plane, scene units
     unit: str  # the scene unit, in words
     static_camera: bool
     train_index: NDArray[np.intp]  # ascending
@@ -78,7 +77,7 @@ class Sequence:
 
     @property
     def tissue_fraction(self) -> float:
-        """Share of all pixels of all frames that are tissue."""
+        """Fraction of all pixels of all frames that is tissue."""
         return float(self.masks.mean())
 
     def frame(self, index: int, dtype: DTypeLike = np.float32) -> Frame:

@@ -1,15 +1,14 @@
-"""Which frames are held out, and at which normalised time a frame lies.
+"""The split into training and held-out frames, and the normalised time of a frame.
 
 In: the number of frames that were selected (a frame range is applied before the split). Out: two sorted index
-arrays. Nothing here looks at the pictures.
+arrays. The split does not depend on the pictures.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-
-IndexArray = NDArray[np.intp]
+from endotsr.kernels.arrays import IndexArray
 
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2
@@ -32,11 +31,11 @@ def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:
 
 
 def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
-    """Contiguous held-out blocks, which ask for more than the mean of two neighbours.
+    """Contiguous held-out blocks, for which the mean of the two neighbouring frames no longer suffices.
 
     The sequence is cut into periods of max(24, 2 length) frames and a block of `length` frames is held out in the
-    middle of each. A block that would leave no training frame behind it is dropped: held-out frames always have
-    a training frame on both sides.
+    middle of each. A block without a training frame after it is dropped: held-out frames always have a
+    training frame on both sides.
 
     returns  (train (n_train,), test (n_test,)), ascending
     Raises:  InputError if no block fits.
@@ -71,11 +70,11 @@ def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray,
 
 
 def parse_frame_range(text: str, count: int) -> range:
-    """Frames named by "start:stop[:step]" in Python's slice notation; "" is all of them.
+    """Frames selected by "start:stop[:step]" in Python's slice notation; "" selects all.
 
     Negative numbers count from the end. Unlike a Python slice, an end beyond the sequence is refused rather than
     cut off, and the step is at least 1.
-    Raises:  InputError that repeats the text and says what is allowed.
+    Raises:  InputError naming the text and what is allowed.
     """
     if not text.strip():
         return range(count)

@@ -1,4 +1,4 @@
-"""Sequences with known truth: a deforming tissue sheet under an endoscope, each effect a separate switch."""
+"""Sequences with known truth: a deforming tissue sheet under an endoscope. Every effect has its own switch."""
 
 from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 from endotsr.simulator.simulate import SimulatedSequence, Truth, simulate

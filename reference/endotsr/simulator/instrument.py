@@ -1,6 +1,6 @@
 """A grasper between camera and tissue, drawn in the image plane: shaft, wrist and two jaws.
 
-In: settings, image size, time. Out: its linear light, its coverage and the pixels a mask must exclude.
+In: settings, image size, time. Out: its linear light, its coverage and the pixels that the mask excludes.
 """
 
 from typing import NamedTuple
@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
-
-Array = NDArray[np.floating]
 
 ENTRY = np.array([1.12, 0.78])  # where the shaft leaves the picture, image widths
 HOME = np.array([0.70, 0.52])  # middle of the path of the wrist
@@ -23,8 +22,8 @@ SLEEVE = np.array([0.045, 0.045, 0.05])
 class Drawing(NamedTuple):
     """The instrument in one frame."""
 
-    light: Array  # (3, H, W) linear RGB
-    coverage: Array  # (H, W)    0 .. 1, smooth over one pixel at the outline
+    light: FloatArray  # (3, H, W) linear RGB
+    coverage: FloatArray  # (H, W)    0 .. 1, smooth over one pixel at the outline
     excluded: NDArray[np.bool_]  # (H, W) instrument and margin
 
 
@@ -56,12 +55,12 @@ def draw(settings: SimulatorSettings, t: float) -> Drawing:
         light = light * (1 - cover) + colour[:, None, None] * (_sheen(side / half_width) * cover)
         coverage = cover + coverage * (1 - cover)
         outline = np.minimum(outline, distance - half_width)
-    # the light of a half covered pixel is that of the instrument alone; the coverage does the blending
+    # a partly covered pixel has the light of the instrument alone; the coverage blends it with the tissue
     light = np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
     return Drawing(light, coverage, outline < part.margin + pixel)
 
 
-def _segment(x: Array, y: Array, start: Array, end: Array) -> tuple[Array, Array]:
+def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Distance of every pixel from a segment, and the signed distance from its line."""
     axis = end - start
     length = np.linalg.norm(axis)
@@ -72,13 +71,13 @@ def _segment(x: Array, y: Array, start: Array, end: Array) -> tuple[Array, Array
     return distance, dx * axis[1] - dy * axis[0]
 
 
-def _sheen(side: Array) -> Array:
+def _sheen(side: FloatArray) -> FloatArray:
     """Brightness across a round, polished bar, side in [-1, 1]."""
     profile = np.sqrt(np.clip(1 - side**2, 0.0, 1.0))
     return 0.25 + 0.6 * profile + 1.2 * np.exp(-(((side - 0.25) / 0.16) ** 2))
 
 
-def _turned(vector: Array, angle: float) -> Array:
+def _turned(vector: FloatArray, angle: float) -> FloatArray:
     return np.array(
         [np.cos(angle) * vector[0] - np.sin(angle) * vector[1], np.sin(angle) * vector[0] + np.cos(angle) * vector[1]]
     )

@@ -1,27 +1,21 @@
-"""What is simulated: the scene, and one section with a switch for every effect.
+"""Settings of the simulator: the scene, and one section with a switch for every effect.
 
 Lengths are in millimetres, times in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
-that is off is exactly absent: nothing of it is computed and no random number is drawn for it.
+that is off is exactly absent: no part of it is computed, and no random number is drawn for it.
 """
 
 from typing import Annotated
 
 import msgspec
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-NonNegative = Annotated[float, msgspec.Meta(ge=0)]
-Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
-Count = Annotated[int, msgspec.Meta(ge=0)]
+from endotsr.config import Count, Fraction, NonNegative, Positive, Section
+
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]
 
 
-class _Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Common strictness of all sections."""
-
-
-class Breathing(_Section, frozen=True, kw_only=True):
-    """The whole tissue is lifted towards the camera and shifted, unevenly, with every breath."""
+class Breathing(Section, frozen=True, kw_only=True):
+    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
 
     on: bool = True
     """switch"""
@@ -31,7 +25,7 @@ class Breathing(_Section, frozen=True, kw_only=True):
     """breaths per sequence"""
 
 
-class Pulsation(_Section, frozen=True, kw_only=True):
+class Pulsation(Section, frozen=True, kw_only=True):
     """A round region beats; the beat has two harmonics."""
 
     on: bool = True
@@ -44,7 +38,7 @@ class Pulsation(_Section, frozen=True, kw_only=True):
     """Gaussian radius of the region, mm"""
 
 
-class Pull(_Section, frozen=True, kw_only=True):
+class Pull(Section, frozen=True, kw_only=True):
     """A spot is pulled sideways and towards the camera, held, and released."""
 
     on: bool = True
@@ -52,14 +46,14 @@ class Pull(_Section, frozen=True, kw_only=True):
     amplitude: NonNegative = 5.0
     """displacement of the spot while it is held, mm"""
     width: Positive = 11.0
-    """Gaussian radius of what moves along, mm"""
+    """Gaussian radius of the tissue that moves along, mm"""
     start: Fraction = 0.15
     """normalised time at which the pull begins"""
     stop: Fraction = 0.9
     """normalised time at which the tissue is back"""
 
 
-class Exposure(_Section, frozen=True, kw_only=True):
+class Exposure(Section, frozen=True, kw_only=True):
     """The gain of the camera drifts, red and blue slightly apart (white balance)."""
 
     on: bool = True
@@ -70,7 +64,7 @@ class Exposure(_Section, frozen=True, kw_only=True):
     """cycles per sequence"""
 
 
-class Brightening(_Section, frozen=True, kw_only=True):
+class Brightening(Section, frozen=True, kw_only=True):
     """A region of the tissue itself grows paler and recovers (as under pressure)."""
 
     on: bool = True
@@ -83,7 +77,7 @@ class Brightening(_Section, frozen=True, kw_only=True):
     """Gaussian radius, mm"""
 
 
-class Highlights(_Section, frozen=True, kw_only=True):
+class Highlights(Section, frozen=True, kw_only=True):
     """Mirror reflections of the light on the wet surface."""
 
     on: bool = True
@@ -94,8 +88,8 @@ class Highlights(_Section, frozen=True, kw_only=True):
     """sharpness"""
 
 
-class Instrument(_Section, frozen=True, kw_only=True):
-    """A grasper in front of the tissue: drawn, and excluded by the mask together with its depth."""
+class Instrument(Section, frozen=True, kw_only=True):
+    """A grasper in front of the tissue. It is drawn; the mask and the prior depth exclude its pixels."""
 
     on: bool = True
     """switch"""
@@ -104,10 +98,10 @@ class Instrument(_Section, frozen=True, kw_only=True):
     cycles: Positive = 1.0
     """cycles per sequence"""
     margin: NonNegative = 0.006
-    """how far the mask reaches beyond the drawn instrument, image widths"""
+    """width of the masked border around the drawn instrument, image widths"""
 
 
-class CameraMotion(_Section, frozen=True, kw_only=True):
+class CameraMotion(Section, frozen=True, kw_only=True):
     """The camera swings around the middle of the tissue; off = one Camera object for all frames."""
 
     on: bool = False
@@ -118,7 +112,7 @@ class CameraMotion(_Section, frozen=True, kw_only=True):
     """cycles per sequence"""
 
 
-class Noise(_Section, frozen=True, kw_only=True):
+class Noise(Section, frozen=True, kw_only=True):
     """Sensor noise in the picture."""
 
     on: bool = True
@@ -127,8 +121,8 @@ class Noise(_Section, frozen=True, kw_only=True):
     """standard deviation, display units [0, 1]"""
 
 
-class DepthErrors(_Section, frozen=True, kw_only=True):
-    """What stereo matching does to a depth prior. The true depth is kept apart and stays exact."""
+class DepthErrors(Section, frozen=True, kw_only=True):
+    """Errors of stereo matching in the prior depth. The true depth is stored separately and stays exact."""
 
     on: bool = False
     """switch"""
@@ -138,7 +132,7 @@ class DepthErrors(_Section, frozen=True, kw_only=True):
     """columns without depth at the left, image widths"""
 
 
-class SimulatorSettings(_Section, frozen=True, kw_only=True):
+class SimulatorSettings(Section, frozen=True, kw_only=True):
     """Scene, size and effects of a simulated sequence."""
 
     width: Side = 160
@@ -156,7 +150,7 @@ class SimulatorSettings(_Section, frozen=True, kw_only=True):
     focal: Positive = 0.89
     """focal length, image widths"""
     block_length: Count = 0
-    """0 = every eighth frame is held out; else contiguous blocks of so many frames"""
+    """0 = every eighth frame is held out; otherwise the length of contiguous held-out blocks, frames"""
     breathing: Breathing = Breathing()
     pulsation: Pulsation = Pulsation()
     pull: Pull = Pull()

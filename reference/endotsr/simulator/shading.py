@@ -1,30 +1,27 @@
-"""From geometry and reflectance to linear light: one small lamp at the camera, fall-off with distance, highlights.
+"""From geometry and reflectance to linear light: a point light at the camera, fall-off with distance, highlights.
 
-In: a `View` of the sheet, its texture, the camera, the time. Out: linear RGB; `to_display` makes it a picture.
+In: a `View` of the sheet, its texture, the camera, the time. Out: linear RGB, which `to_display` encodes for display.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.surface import View, gaussian_weight
 from endotsr.simulator.texture import Texture, sample
 from endotsr.splatting.camera import Camera, camera_centre
 
-Array = NDArray[np.floating]
-
-GAIN = 0.95  # linear light of a reflectance of 1 seen squarely at the scene's distance
-WRAP = 0.15  # light that scatters inside tissue softens the shadow side
+GAIN = 0.95  # linear light of a reflectance of 1, perpendicular to the view, at the scene's distance
+WRAP = 0.15  # light scattered inside the tissue softens the shading
 BEAM = 3.0  # exponent of the lamp's fall-off towards the edge of its cone
 GAMMA = 2.2
 
 
-def shade(settings: SimulatorSettings, texture: Texture, view: View, camera: Camera, t: float) -> Array:
+def shade(settings: SimulatorSettings, texture: Texture, view: View, camera: Camera, t: float) -> FloatArray:
     """Linear light (3, H, W) from the tissue, before exposure.
 
     reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.l)^exponent with the same
-    fall-off, where l points to the lamp at the camera, r is the way of the light and n' is the normal bent by the fine
-    relief.
+    fall-off, where l points to the lamp at the camera, r is its distance and n' is the normal of the fine relief.
     """
     maps = sample(texture, view.material)
     towards = camera_centre(camera)[:, None, None] - view.point
@@ -46,7 +43,7 @@ def shade(settings: SimulatorSettings, texture: Texture, view: View, camera: Cam
     return light
 
 
-def exposure_gain(settings: SimulatorSettings, t: float) -> Array:
+def exposure_gain(settings: SimulatorSettings, t: float) -> FloatArray:
     """Gain of the three channels at time t, (3,); exactly 1 while the effect is off."""
     part = settings.exposure
     if not part.on:
@@ -57,12 +54,12 @@ def exposure_gain(settings: SimulatorSettings, t: float) -> Array:
     )
 
 
-def to_display(light: Array) -> Array:
-    """Linear light to display values in [0, 1]: cut at 1, then the power 1/2.2."""
+def to_display(light: FloatArray) -> FloatArray:
+    """Linear light to display values in [0, 1]: clipped at 1, then raised to the power 1/2.2."""
     return np.clip(light, 0.0, 1.0) ** (1 / GAMMA)
 
 
-def _brightening(settings: SimulatorSettings, material: Array, t: float) -> Array:
+def _brightening(settings: SimulatorSettings, material: FloatArray, t: float) -> FloatArray:
     part = settings.brightening
     centre = (-0.14 * settings.distance, -0.12 * settings.distance)
     weight = gaussian_weight(centre, part.width)(material[0], material[1])[0]

@@ -1,7 +1,7 @@
-"""A simulated sequence with known geometry, motion and light: the same `Sequence` as a reader delivers, plus the truth.
+"""A simulated sequence with known geometry, motion and light: the `Sequence` of a reader, and the truth.
 
 In: `SimulatorSettings`. Out: frames, masks, depth prior, cameras, split, and per pixel the material point that is seen.
-Equal settings give bitwise equal sequences. Knows nothing of the model.
+Equal settings give bitwise equal sequences. This module does not depend on the model.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,11 @@ from endotsr.simulator.surface import Surface, View, make_surface, see, surface_
 from endotsr.simulator.texture import Texture, make_texture
 from endotsr.splatting.camera import Camera
 
-NEAR = 0.2  # mm
 UNIT = "mm"
 
 
 class Truth(NamedTuple):
-    """What no real sequence tells. Behind the instrument, all values are those of the hidden tissue."""
+    """Quantities that a real sequence does not contain. Behind the instrument they are those of the hidden tissue."""
 
     depth: NDArray[np.floating]  # (n, H, W)    view-space z of the tissue, mm
     material_coordinates: NDArray[np.floating]  # (n, 2, H, W) material point at the pixel centre, mm
@@ -45,7 +44,7 @@ class SimulatedSequence:
         return surface_point(self.truth.surface, material, t)
 
     def true_flow(self, source: int, target: int) -> NDArray[np.floating]:
-        """Motion in pixels (2, H, W), x first, of what frame `source` shows, to its place in frame `target`."""
+        """Motion in pixels (2, H, W), x first, of the tissue at every pixel of frame `source` to frame `target`."""
         camera = self.sequence.cameras[target]
         material = self.truth.material_coordinates[source]
         point = self.surface_point(material, float(self.sequence.times[target]))
@@ -90,18 +89,17 @@ def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
         times=times,
         cameras=cameras,
         names=[f"simulated-{i:06d}" for i in range(n)],
-        near=NEAR,
         unit=UNIT,
         static_camera=not settings.camera_motion.on,
         train_index=train,
         test_index=test,
-        notes=[f"simulated with seed {settings.seed}; tissue share {tissue.mean():.4f}"],
+        notes=[f"simulated with seed {settings.seed}; tissue fraction {tissue.mean():.4f}"],
     )
     return SimulatedSequence(sequence, Truth(depth, material, covered, surface), settings)
 
 
 def make_cameras(settings: SimulatorSettings, times: NDArray[np.floating]) -> list[Camera]:
-    """One camera a frame: at rest at the origin, looking along z; moving, it swings about the middle of the tissue."""
+    """One camera a frame: at the origin, looking along z; with motion, it swings about the middle of the tissue."""
     focal = settings.focal * settings.width
     rest = Camera(
         np.eye(3), np.zeros(3), focal, focal, settings.width / 2, settings.height / 2, settings.width, settings.height
@@ -145,7 +143,7 @@ def _picture(
 def _depth_prior(
     settings: SimulatorSettings, depth: NDArray[np.floating], tissue: NDArray[np.bool_], i: int
 ) -> NDArray[np.float32]:
-    """The depth a reader would deliver: 0 where the instrument is, and with errors if those are on."""
+    """The prior depth of a reader: 0 on the instrument, and with errors if they are switched on."""
     prior = np.where(tissue, depth, 0.0)
     if settings.depth_errors.on:
         rng = np.random.default_rng([settings.seed, 3, i])

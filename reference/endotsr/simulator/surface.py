@@ -1,4 +1,4 @@
-"""The tissue sheet as a formula: where every material point is at every time, and what a camera sees of it.
+"""The tissue sheet as a formula: the position of every material point over time, and its view from a camera.
 
 A material point has two coordinates (a, b) in millimetres. At rest it lies at (a, b, distance + h(a, b)); at time t at
 
@@ -13,14 +13,15 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
 
-Array = NDArray[np.floating]
-Weight = Callable[[Array, Array], tuple[Array, Array, Array]]  # (a, b) -> weight, its derivatives by a and b
+Weight = Callable[
+    [FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
+]  # (a, b) -> weight, its derivatives by a and b
 
 RESIDUAL_TOLERANCE = 1e-10  # mm, beside the ray
 MOST_STEPS = 30
@@ -32,26 +33,26 @@ class Motion(NamedTuple):
 
     course: Callable[[float], float]  # t -> mm, 0 at t = 0
     weight: Weight  # dimensionless
-    direction: Array  # (3,)
+    direction: FloatArray  # (3,)
 
 
 class Surface(NamedTuple):
     """The sheet: a sum of plane waves at rest, and its motions."""
 
     distance: float  # mm
-    amplitude: Array  # (M,) mm
-    wave: Array  # (2, M) radians per mm
-    phase: Array  # (M,)
+    amplitude: FloatArray  # (M,) mm
+    wave: FloatArray  # (2, M) radians per mm
+    phase: FloatArray  # (M,)
     motions: list[Motion]
 
 
 class View(NamedTuple):
-    """What a camera sees of the sheet, per pixel."""
+    """The part of the sheet that a camera sees, per pixel."""
 
-    material: Array  # (2, H, W) material coordinates a, b, mm
-    point: Array  # (3, H, W) world position, mm
-    normal: Array  # (3, H, W) unit normal, towards the camera
-    depth: Array  # (H, W) view-space z, mm
+    material: FloatArray  # (2, H, W) material coordinates a, b, mm
+    point: FloatArray  # (3, H, W) world position, mm
+    normal: FloatArray  # (3, H, W) unit normal, towards the camera
+    depth: FloatArray  # (H, W) view-space z, mm
 
 
 def make_surface(settings: SimulatorSettings) -> Surface:
@@ -71,12 +72,12 @@ def make_surface(settings: SimulatorSettings) -> Surface:
     return Surface(settings.distance, settings.relief * height, wave, rng.uniform(0, 2 * np.pi, 5), motions)
 
 
-def surface_point(surface: Surface, material: Array, t: float) -> Array:
+def surface_point(surface: Surface, material: FloatArray, t: float) -> FloatArray:
     """World position of material points at normalised time t. (2, ...) mm to (3, ...) mm."""
     return _evaluate(surface, material[0], material[1], t)[0]
 
 
-def _evaluate(surface: Surface, a: Array, b: Array, t: float) -> tuple[Array, Array, Array]:
+def _evaluate(surface: Surface, a: FloatArray, b: FloatArray, t: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Position and its derivatives by a and by b, each (3, ...)."""
     point = np.stack([a, b, np.full_like(a, surface.distance)])
     along_a, along_b = np.zeros_like(point), np.zeros_like(point)
@@ -106,7 +107,7 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     the ray (p_x, p_y, 1) through the pixel centre. The start is the plane z = distance, the same for every call, so
     equal inputs give bitwise equal views.
 
-    Raises:  InputError if a ray has no solution or the sheet turns its back: settings that fold the sheet over.
+    Raises:  InputError if a ray has no solution or meets the back of the sheet: the settings fold the sheet over.
     """
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
@@ -122,7 +123,7 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     return view
 
 
-def _see_rays(surface: Surface, camera: Camera, t: float, ray_x: Array, ray_y: Array) -> View:
+def _see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
     a, b = _start(surface, camera, ray_x, ray_y)
     for _ in range(MOST_STEPS):
         point, along_a, along_b = _evaluate(surface, a, b, t)
@@ -142,38 +143,38 @@ def _see_rays(surface: Surface, camera: Camera, t: float, ray_x: Array, ray_y: A
     normal /= np.sqrt((normal**2).sum(axis=0))
     facing = _rotate(camera.rotation, normal)
     if (ray_x * facing[0] + ray_y * facing[1] + facing[2]).max() >= 0 or seen[2].min() <= 0:
-        raise InputError(f"simulator: at t = {t:g} the sheet turns its back: motion or relief is too strong")
+        raise InputError(f"simulator: at t = {t:g} a ray meets the back of the sheet: motion or relief is too strong")
     return View(np.stack([a, b]), point, normal, seen[2])
 
 
-def to_camera(camera: Camera, point: Array) -> Array:
+def to_camera(camera: Camera, point: FloatArray) -> FloatArray:
     """World positions (3, ...) in camera axes."""
     return _rotate(camera.rotation, point) + camera.translation.reshape(3, *[1] * (point.ndim - 1))
 
 
-def _start(surface: Surface, camera: Camera, ray_x: Array, ray_y: Array) -> tuple[Array, Array]:
-    """Where the rays meet the plane z = distance."""
+def _start(surface: Surface, camera: Camera, ray_x: FloatArray, ray_y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Material coordinates at which the rays meet the plane z = distance."""
     direction = _rotate(camera.rotation.T, np.stack([ray_x, ray_y, np.ones_like(ray_x)]))
     centre = -camera.rotation.T @ camera.translation
     length = (surface.distance - centre[2]) / direction[2]
     return centre[0] + length * direction[0], centre[1] + length * direction[1]
 
 
-def _rotate(rotation: Array, vectors: Array) -> Array:
+def _rotate(rotation: FloatArray, vectors: FloatArray) -> FloatArray:
     if np.array_equal(rotation, np.eye(3)):  # the static camera: nothing to do
         return vectors
     x, y, z = vectors
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in rotation])
 
 
-def _cross(u: Array, v: Array) -> tuple[Array, Array, Array]:
+def _cross(u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 def gaussian_weight(centre: tuple[float, float], width: float) -> Weight:
     """exp(-r^2 / (2 width^2)) around a material point, with its derivatives."""
 
-    def weight(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    def weight(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         da, db = a - centre[0], b - centre[1]
         value = np.exp(-(da**2 + db**2) / (2 * width**2))
         return value, -da / width**2 * value, -db / width**2 * value
@@ -182,9 +183,9 @@ def gaussian_weight(centre: tuple[float, float], width: float) -> Weight:
 
 
 def _breathing(settings: SimulatorSettings) -> Motion:
-    wave_a, wave_b = 2 * np.pi / 120.0, 2 * np.pi / 90.0  # the lift differs slowly across the tissue
+    wave_a, wave_b = 2 * np.pi / 120.0, 2 * np.pi / 90.0  # the lift varies slowly across the tissue
 
-    def weight(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    def weight(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         argument = wave_a * a + wave_b * b
         slope = 0.3 * np.cos(argument)
         return 0.7 + 0.3 * np.sin(argument), wave_a * slope, wave_b * slope

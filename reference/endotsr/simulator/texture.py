@@ -1,7 +1,7 @@
-"""What the tissue looks like in itself: colour and fine relief over material coordinates, as one tabulated map.
+"""The appearance of the tissue: colour and fine relief over material coordinates, as one tabulated map.
 
 The map is made from smooth random fields (cubic B-splines over a lattice in millimetres) and random vessel trees. All
-random numbers belong to millimetres, not to pixels: another image size samples the same tissue more finely.
+random numbers are drawn per millimetre, not per pixel: a larger image samples the same tissue more finely.
 """
 
 from typing import NamedTuple, cast
@@ -9,9 +9,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
-
-Array = NDArray[np.floating]
 
 FLESH = np.array([0.62, 0.20, 0.15])  # linear reflectances
 PALE = np.array([0.80, 0.42, 0.28])
@@ -23,7 +22,7 @@ SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit norm
 
 
 class Texture(NamedTuple):
-    """Maps over material coordinates, sampled bilinearly; outside, the border value."""
+    """Maps over material coordinates, sampled bilinearly. Outside, the border value holds."""
 
     values: NDArray[np.float32]  # (5, rows, columns) linear RGB reflectance, relief slope by a and by b
     origin: tuple[float, float]  # material coordinates (a, b) of texel [0, 0], mm
@@ -31,7 +30,7 @@ class Texture(NamedTuple):
 
 
 def make_texture(settings: SimulatorSettings) -> Texture:
-    """Tissue for the part of the sheet that the camera can see, with a margin for motion."""
+    """The texture of the part of the sheet that the camera can see, with a margin for motion."""
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
     half_a = 0.5 * settings.width * pixel * 1.2 + 8.0
@@ -46,7 +45,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     return Texture(values, (float(a[0]), float(b[0])), (float(a[1] - a[0]), float(b[1] - b[0])))
 
 
-def sample(texture: Texture, material: Array) -> Array:
+def sample(texture: Texture, material: FloatArray) -> FloatArray:
     """All five maps at material coordinates (2, H, W): (5, H, W) float64."""
     rows, columns = texture.values.shape[1:]
     x = np.clip((material[0] - texture.origin[0]) / texture.step[0], 0, columns - 1.001)
@@ -60,7 +59,7 @@ def sample(texture: Texture, material: Array) -> Array:
     return upper * (1 - down) + lower * down
 
 
-def _colour(a: Array, b: Array, rng: np.random.Generator) -> Array:
+def _colour(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Linear reflectance (3, rows, columns)."""
     mottle = sum(
         weight * _field(a, b, rng, spacing) for spacing, weight in ((14, 0.5), (6, 0.35), (2.5, 0.25), (1, 0.15))
@@ -74,8 +73,8 @@ def _colour(a: Array, b: Array, rng: np.random.Generator) -> Array:
     return np.clip(colour, 0.01, 0.95)
 
 
-def _fine_relief(a: Array, b: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Slopes of the wet, finely uneven surface; they bend the normal for highlights only, never the geometry."""
+def _fine_relief(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Slopes of the fine relief of the wet surface. They change the normal of highlights only, never the geometry."""
     slope_a, slope_b = np.zeros((len(b), len(a))), np.zeros((len(b), len(a)))
     for spacing, slope in ((5.0, 0.20), (2.2, 0.14), (0.9, 0.05)):
         da, db = _field_slopes(a, b, rng, spacing)
@@ -84,13 +83,15 @@ def _fine_relief(a: Array, b: Array, rng: np.random.Generator) -> tuple[Array, A
     return slope_a, slope_b
 
 
-def _field(a: Array, b: Array, rng: np.random.Generator, spacing: float) -> Array:
+def _field(a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float) -> FloatArray:
     """A smooth random field (rows, columns) of deviation about 1 with features of `spacing` mm."""
     over_a, over_b = _spline_basis(a, spacing)[0], _spline_basis(b, spacing)[0]
     return over_b @ _lattice(rng, over_a, over_b) @ over_a.T
 
 
-def _field_slopes(a: Array, b: Array, rng: np.random.Generator, spacing: float) -> tuple[Array, Array]:
+def _field_slopes(
+    a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float
+) -> tuple[FloatArray, FloatArray]:
     """Derivatives of such a field by a and by b, per mm."""
     over_a, slope_a = _spline_basis(a, spacing)
     over_b, slope_b = _spline_basis(b, spacing)
@@ -98,11 +99,11 @@ def _field_slopes(a: Array, b: Array, rng: np.random.Generator, spacing: float) 
     return over_b @ lattice @ slope_a.T, slope_b @ lattice @ over_a.T
 
 
-def _lattice(rng: np.random.Generator, over_a: Array, over_b: Array) -> Array:
+def _lattice(rng: np.random.Generator, over_a: FloatArray, over_b: FloatArray) -> FloatArray:
     return rng.standard_normal((over_b.shape[1], over_a.shape[1])) / SPLINE_DEVIATION
 
 
-def _spline_basis(x: Array, spacing: float) -> tuple[Array, Array]:
+def _spline_basis(x: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
     """Cubic B-splines on knots of `spacing` that cover x, and their derivatives: two (len(x), knots) matrices."""
     position = (x - x[0]) / spacing
     distance = position[:, None] - np.arange(-1, int(position[-1]) + 3)
@@ -113,7 +114,7 @@ def _spline_basis(x: Array, spacing: float) -> tuple[Array, Array]:
     return value, slope / spacing
 
 
-def _vessels(a: Array, b: Array, rng: np.random.Generator, count: int, width: float) -> Array:
+def _vessels(a: FloatArray, b: FloatArray, rng: np.random.Generator, count: int, width: float) -> FloatArray:
     """Coverage in [0, 1] of `count` winding, branching vessels of about `width` mm."""
     from scipy.ndimage import distance_transform_edt
 
@@ -124,14 +125,18 @@ def _vessels(a: Array, b: Array, rng: np.random.Generator, count: int, width: fl
     inside = (column >= 0) & (column < len(a)) & (row >= 0) & (row < len(b))
     radius_map = np.zeros((len(b), len(a)))
     radius_map[row[inside], column[inside]] = radii[inside]
-    distance, nearest = cast(tuple[Array, Array], distance_transform_edt(radius_map == 0, return_indices=True))
+    distance, nearest = cast(
+        tuple[FloatArray, FloatArray], distance_transform_edt(radius_map == 0, return_indices=True)
+    )
     radius = radius_map[nearest[0], nearest[1]]
     edge = np.maximum(0.3 * radius, 0.7 * step)
     return 1 / (1 + np.exp(np.clip((distance * step - radius) / (0.4 * edge), -40, 40)))
 
 
-def _vessel_paths(a: Array, b: Array, rng: np.random.Generator, count: int, width: float) -> tuple[Array, Array]:
-    """Centre-line points (2, P) and radii (P,) of random walks that keep their heading and now and then branch."""
+def _vessel_paths(
+    a: FloatArray, b: FloatArray, rng: np.random.Generator, count: int, width: float
+) -> tuple[FloatArray, FloatArray]:
+    """Centre-line points (2, P) and radii (P,) of random walks with persistent heading and occasional branches."""
     stride = 0.04  # mm; denser than any texel
     walks = [
         (rng.uniform(a[0], a[-1]), rng.uniform(b[0], b[-1]), rng.uniform(0, 2 * np.pi), 0.5 * width, 2)
@@ -155,5 +160,5 @@ def _vessel_paths(a: Array, b: Array, rng: np.random.Generator, count: int, widt
     return np.concatenate(points, axis=1), np.concatenate(radii)
 
 
-def _mix(under: Array, over: Array, share: Array) -> Array:
-    return under * (1 - share) + over * share
+def _mix(under: FloatArray, over: FloatArray, fraction: FloatArray) -> FloatArray:
+    return under * (1 - fraction) + over * fraction

@@ -1,9 +1,9 @@
-"""Which Gaussians reach which tile, in depth order (B5, support and order).
+"""The lists of Gaussians that reach each tile, in depth order (B5, support and order).
 
 Three steps: a pixel box for every Gaussian (its support), a stable sort by view depth with ties in index
-order, and a counting sort of (tile, Gaussian) pairs. Every pair owns one slot: the reverse pass writes its
-gradient there and a gather adds the slots of a Gaussian in tile order, so no two threads share a cell and
-the sum does not depend on the number of threads.
+order, and a counting sort of (tile, Gaussian) pairs. Every pair has one slot: the reverse pass writes the
+gradient of the pair there, and a gather adds the slots of a Gaussian in tile order. No two threads write the same cell,
+and the sum does not depend on the number of threads.
 """
 
 import math
@@ -12,13 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray, IntArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.projection import Projected
 from endotsr.splatting.settings import RasterSettings
-
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 
 CHUNKS = 16  # fixed, so that the lists do not depend on the number of threads
 LEGACY_TILE = 16
@@ -122,9 +120,9 @@ def _radix_order(key, visible):
 
 def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, tile_box, counts, pair_starts):
     """First and last tile column and row of each Gaussian; pairs of each (chunk, tile), and of each Gaussian at the
-    next place of `pair_starts`.
+    next entry of `pair_starts`.
 
-    A division takes as long as all the rest, so it is done here once, and without sign: boxes lie in the picture.
+    A division takes as long as all the rest, so it is done here once. It is unsigned, because boxes lie in the image.
     """
     n = order.size
     w, h = np.uint32(tile_width), np.uint32(tile_height)
@@ -142,7 +140,7 @@ def _count_pairs(first, last, box, order, tile_width, tile_height, tiles_x, tile
 
 
 def _tile_starts(counts, starts, pair_starts):
-    """Running sums: where each tile begins, where each (chunk, tile) does (in `counts`), where each Gaussian does."""
+    """Running sums: the start of each tile, of each (chunk, tile) (in `counts`), and of each Gaussian."""
     total = 0
     for t in range(starts.size - 1):
         starts[t] = total
@@ -156,7 +154,7 @@ def _tile_starts(counts, starts, pair_starts):
 
 
 def _fill_lists(first, last, tile_box, tiles_x, counts, pair_starts, ranks, slots):
-    """Every pair to its place; `counts` runs along."""
+    """Write every pair to its place; `counts` holds the next free place of each (chunk, tile)."""
     n = tile_box.shape[0]
     for chunk in range(first, last):
         position = counts[chunk]
@@ -184,7 +182,7 @@ def screen_boxes(
     """Pixel boxes (N, 4) x0, x1, y0, y1 inclusive, and which Gaussians reach at least one pixel box (N,).
 
     log_opacity  (N,) natural log of the opacity
-    Edges:       without an alpha cutoff the ellipse has no end: every Gaussian reaches every pixel
+    Edges:       without an alpha cutoff the ellipse is unbounded: every Gaussian reaches every pixel
     """
     support = settings.support if settings.alpha_cutoff > 0 or settings.support != "ellipse" else "everywhere"
     box = np.zeros((projected.depth.size, 4), np.int32)
@@ -201,7 +199,7 @@ def screen_boxes(
 def depth_order(depth: FloatArray, visible: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Indices of the visible Gaussians, nearest first, ties in index order. Depth must be > 0 where visible.
 
-    The bit pattern of a positive float ascends with its value, so an integer radix sort is an exact sort.
+    The bit pattern of a positive float increases with its value, so an integer radix sort is exact.
     """
     return _radix_kernel(depth.view(np.uint32 if depth.dtype == np.float32 else np.uint64), visible)
 

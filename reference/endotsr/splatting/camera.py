@@ -7,9 +7,8 @@ back-projection uses the same rule. The pose stored is world-to-camera: x_camera
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.arrays import FloatArray
 
 
 class Camera(NamedTuple):

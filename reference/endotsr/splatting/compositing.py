@@ -1,20 +1,20 @@
 """Front-to-back compositing of colour, depth and opacity: the definition, for every setting (B5).
 
-Per pixel, nearest first: alpha_i = min(alpha_max, opacity exp(-q/2)); below the cutoff it contributes
-nothing; before T falls below the stop, the pixel is finished. colour = sum c_i alpha_i T_i + T background,
+Per pixel, nearest first: alpha_i = min(alpha_max, opacity exp(-q/2)); an alpha below the cutoff contributes
+nothing; the pixel is finished before T falls below the stop. colour = sum c_i alpha_i T_i + T background,
 depth = sum z_i alpha_i T_i, opacity = sum alpha_i T_i.
 
 The reverse pass keeps T_i and walks back to front with R_i = alpha_i c_i + (1 - alpha_i) R_{i+1}: no
-division by T or 1 - alpha, so it is right for alpha = 1 and behind opaque stacks. `compositing_blocks`
-computes the same for the `paper` preset, many pixels at a time.
+division by T or 1 - alpha, so it is exact for alpha = 1 and behind opaque stacks. `fast.blocks` computes the
+same for the `paper` preset, many pixels at a time.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.binning import TileLists
@@ -43,8 +43,6 @@ from endotsr.splatting.records import (
 )
 from endotsr.splatting.settings import RasterSettings
 
-FloatArray = NDArray[np.floating]
-
 TILE_WIDTH = 16
 TILE_HEIGHT = 16
 
@@ -70,7 +68,7 @@ class CompositeSaved(NamedTuple):
 
 
 def empty_composite(width: int, height: int, dtype) -> Composite:
-    """Images to be written."""
+    """Images of this size, not initialised."""
     plane = (height, width)
     return Composite(np.empty((3, *plane), dtype), *(np.empty(plane, dtype) for _ in range(3)))
 
@@ -239,5 +237,5 @@ def composite_reverse(
 
 
 def background_gradient(d_colour: FloatArray, transmittance: FloatArray) -> FloatArray:
-    """dL/dbackground (3,): the final T of every pixel carries it."""
+    """dL/dbackground (3,): sum over the pixels of dL/dcolour times the final T."""
     return np.einsum("chw,hw->c", d_colour, transmittance)

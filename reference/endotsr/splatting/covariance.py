@@ -8,19 +8,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endotsr.kernels.jit import jit
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.groups import GROUP, column, keep, write_group
+from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.threads import parallel_for
-from endotsr.kernels.vectors import GROUP, local_array, write_group
-
-FloatArray = NDArray[np.floating]
+from endotsr.kernels.vectors import local_array
 
 LOG_SCALE_LIMIT = 40.0  # exp(+-40) spans 34 decades: beyond it the scale is clipped and its gradient is zero
-ROTATION = 9 * GROUP  # numbers that the results of a group take: the matrix
-GRADIENTS = 7 * GROUP  # and by quaternion and log-scale
+ROTATION, GRADIENTS = 9 * GROUP, 7 * GROUP  # numbers that the results of a group take
 SHORTEST_QUATERNION = 1e-20  # a shorter quaternion gets the gradient of this length: 1/|q| would overflow in float32
-
 
 _U64 = np.uint64  # no index may count from the end
 
@@ -47,81 +44,112 @@ class CovarianceGrads(NamedTuple):
     log_scale: FloatArray  # (3, N)
 
 
-def _unit_quaternion(w, x, y, z):
+# One Gaussian: the formulas of the specification, each above its reverse.
+
+
+@jit_formula
+def unit_quaternion(w, x, y, z):
     """The normalised quaternion and 1/norm; (1, 0, 0, 0) and 0 for the zero quaternion.
 
     Dividing by the largest entry first keeps the squares inside the exponent range for norms of 1e-300 to 1e300.
     """
-    zero = w - w
-    one = zero + type(zero)(1)
+    real = type(w)
+    zero, one = real(0), real(1)
     largest = max(max(abs(w), abs(x)), max(abs(y), abs(z)))
     if largest == zero:
         return one, zero, zero, zero, zero
-    w /= largest
-    x /= largest
-    y /= largest
-    z /= largest
-    n = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / n, x / n, y / n, z / n, (one / n) / max(largest, type(zero)(SHORTEST_QUATERNION))
+    w, x, y, z = w / largest, x / largest, y / largest, z / largest
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    inverse_norm = (one / norm) / max(largest, real(SHORTEST_QUATERNION))
+    return w / norm, x / norm, y / norm, z / norm, inverse_norm
 
 
-unit_quaternion = jit(_unit_quaternion)
+@jit_formula
+def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit):
+    """By the raw quaternion: the part of the gradient along the unit one is removed, the rest divided by the norm."""
+    d_w, d_x, d_y, d_z = d_unit
+    along = d_w * w + d_x * x + d_y * y + d_z * z
+    return (
+        (d_w - along * w) * inverse_norm,
+        (d_x - along * x) * inverse_norm,
+        (d_y - along * y) * inverse_norm,
+        (d_z - along * z) * inverse_norm,
+    )
+
+
+@jit_formula
+def rotation_of(w, x, y, z):
+    """R(q) of a unit quaternion, row by row."""
+    one, two = type(w)(1), type(w)(2)
+    return (
+        one - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y),
+        two * (x * y + w * z), one - two * (x * x + z * z), two * (y * z - w * x),
+        two * (x * z - w * y), two * (y * z + w * x), one - two * (x * x + y * y),
+    )  # fmt: skip
+
+
+@jit_formula
+def rotation_reverse(w, x, y, z, d_rotation):
+    """By the unit quaternion, from G = dL/dR, all nine entries independent, row by row."""
+    two = type(w)(2)
+    g00, g01, g02, g10, g11, g12, g20, g21, g22 = d_rotation
+    return (
+        two * (x * (g21 - g12) + y * (g02 - g20) + z * (g10 - g01)),
+        two * (-two * x * (g11 + g22) + y * (g01 + g10) + z * (g02 + g20) + w * (g21 - g12)),
+        two * (x * (g01 + g10) - two * y * (g00 + g22) + z * (g12 + g21) + w * (g02 - g20)),
+        two * (x * (g02 + g20) + y * (g12 + g21) - two * z * (g00 + g11) + w * (g10 - g01)),
+    )
+
+
+@jit_formula
+def semi_axis(log_scale):
+    """S = exp(s), s clipped."""
+    limit = type(log_scale)(LOG_SCALE_LIMIT)
+    return math.exp(min(max(log_scale, -limit), limit))
+
+
+@jit_formula
+def semi_axis_reverse(log_scale, scale, d_scale):
+    """By the log-scale; zero where it was clipped."""
+    inside = abs(log_scale) <= type(log_scale)(LOG_SCALE_LIMIT)
+    return d_scale * scale if inside else type(log_scale)(0)
+
+
+# All Gaussians: a group at a time, as vector code (`groups`).
 
 
 def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
-    """`rotation` (9, N). Results of a group wait in a local array, so that its loop is vector code (`vectors`)."""
-    real = quaternion.dtype.type
-    one, two, limit = real(1), real(2), real(LOG_SCALE_LIMIT)
+    """`rotation` (9, N)."""
     results = local_array(ROTATION, quaternion)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
-        for lane in range(count):
-            i = _U64(start + lane)
-            w, x, y, z, _ = unit_quaternion(quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i])
-            results[_U64(lane)] = one - two * (y * y + z * z)
-            results[_U64(GROUP + lane)] = two * (x * y - w * z)
-            results[_U64(2 * GROUP + lane)] = two * (x * z + w * y)
-            results[_U64(3 * GROUP + lane)] = two * (x * y + w * z)
-            results[_U64(4 * GROUP + lane)] = one - two * (x * x + z * z)
-            results[_U64(5 * GROUP + lane)] = two * (y * z - w * x)
-            results[_U64(6 * GROUP + lane)] = two * (x * z - w * y)
-            results[_U64(7 * GROUP + lane)] = two * (y * z + w * x)
-            results[_U64(8 * GROUP + lane)] = one - two * (x * x + y * y)
+        for item in range(count):
+            w, x, y, z, _ = unit_quaternion(*column(quaternion, 4, start + item))
+            keep(results, item, rotation_of(w, x, y, z))
         write_group(results, start, count, rotation)
-        for k in range(3):
-            for lane in range(count):
-                i = _U64(start + lane)
-                scale[k, i] = math.exp(min(max(log_scale[k, i], -limit), limit))
+        for k in range(3):  # a loop of its own: the exponential is not vector code
+            for item in range(count):
+                i = _U64(start + item)
+                scale[k, i] = semi_axis(log_scale[k, i])
 
 
 def _covariance_reverse(first, stop, quaternion, log_scale, scale, d_rotation, d_scale, d_out):
-    """`d_out` (7, N): gradients by quaternion and log-scale."""
-    real = quaternion.dtype.type
-    two, limit, zero = real(2), real(LOG_SCALE_LIMIT), real(0)
+    """`d_rotation` (9, N); `d_out` (7, N): gradients by quaternion and log-scale."""
     results = local_array(GRADIENTS, quaternion)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
-        for lane in range(count):
-            i = _U64(start + lane)
-            w, x, y, z, inverse_norm = unit_quaternion(
-                quaternion[0, i], quaternion[1, i], quaternion[2, i], quaternion[3, i]
+        for item in range(count):
+            i = start + item
+            w, x, y, z, inverse_norm = unit_quaternion(*column(quaternion, 4, i))
+            d_unit = rotation_reverse(w, x, y, z, column(d_rotation, 9, i))
+            d_q = unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit)
+            s, axes, d_axes = column(log_scale, 3, i), column(scale, 3, i), column(d_scale, 3, i)
+            d_s = (
+                semi_axis_reverse(s[0], axes[0], d_axes[0]),
+                semi_axis_reverse(s[1], axes[1], d_axes[1]),
+                semi_axis_reverse(s[2], axes[2], d_axes[2]),
             )
-            g00, g01, g02 = d_rotation[0, 0, i], d_rotation[0, 1, i], d_rotation[0, 2, i]
-            g10, g11, g12 = d_rotation[1, 0, i], d_rotation[1, 1, i], d_rotation[1, 2, i]
-            g20, g21, g22 = d_rotation[2, 0, i], d_rotation[2, 1, i], d_rotation[2, 2, i]
-            gw = two * (x * (g21 - g12) + y * (g02 - g20) + z * (g10 - g01))
-            gx = two * (-two * x * (g11 + g22) + y * (g01 + g10) + z * (g02 + g20) + w * (g21 - g12))
-            gy = two * (x * (g01 + g10) - two * y * (g00 + g22) + z * (g12 + g21) + w * (g02 - g20))
-            gz = two * (x * (g02 + g20) + y * (g12 + g21) - two * z * (g00 + g11) + w * (g10 - g01))
-            # normalisation: remove the part along q, divide by the norm (inverse_norm is 0 for the zero quaternion)
-            along = gw * w + gx * x + gy * y + gz * z
-            results[_U64(lane)] = (gw - along * w) * inverse_norm
-            results[_U64(GROUP + lane)] = (gx - along * x) * inverse_norm
-            results[_U64(2 * GROUP + lane)] = (gy - along * y) * inverse_norm
-            results[_U64(3 * GROUP + lane)] = (gz - along * z) * inverse_norm
-            for k in range(3):
-                inside = abs(log_scale[k, i]) <= limit
-                results[_U64((4 + k) * GROUP + lane)] = d_scale[k, i] * scale[k, i] if inside else zero
+            keep(results, item, d_q + d_s)
         write_group(results, start, count, d_out)
 
 
@@ -152,7 +180,7 @@ def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrad
     """Gradients by quaternion and log-scale from those by rotation (all nine entries independent) and scale."""
     n = saved.quaternion.shape[1]
     d_out = np.empty((7, n), saved.quaternion.dtype)
-    parallel_for(_reverse_kernel, n, *saved, d_shape.rotation, d_shape.scale, d_out)
+    parallel_for(_reverse_kernel, n, *saved, d_shape.rotation.reshape(9, n), d_shape.scale, d_out)
     return CovarianceGrads(d_out[:4], d_out[4:])
 
 

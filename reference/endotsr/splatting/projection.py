@@ -11,21 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.sums import sum_columns
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.camera import Camera, CameraGrads
+from endotsr.splatting.camera_model import Pinhole, intrinsics_of
 from endotsr.splatting.covariance import Shape
-from endotsr.splatting.projection_kernels import (
-    AXES,
-    POSES_PER_SUM,
-    WITH_POSE,
-    WITHOUT_POSE,
-    pose_reverse_kernel,
-    project_kernel,
-    project_reverse_kernel,
-)
+from endotsr.splatting.projection_formulas import Pose, Rules
+from endotsr.splatting.projection_kernels import WITH_POSE, WITHOUT_POSE, project_kernel, project_reverse_kernel
 from endotsr.splatting.settings import RasterSettings
 
-FloatArray = NDArray[np.floating]
+POSES_PER_SUM = 256  # Gaussians whose pose gradients are added up together
 
 # px. A projected semi-axis beyond this is clipped (zero gradient to it): its square and the determinant stay finite.
 # A centre farther out is not drawn.
@@ -48,8 +44,9 @@ class ProjectionSaved(NamedTuple):
     position: FloatArray
     shape: Shape
     camera: Camera
-    constants: FloatArray
-    pose: FloatArray
+    lens: Pinhole
+    pose: Pose
+    rules: Rules
     projected: Projected
 
 
@@ -71,26 +68,6 @@ class ProjectionGrads(NamedTuple):
     camera: CameraGrads | None
 
 
-def _constants(camera: Camera, settings: RasterSettings, dtype) -> FloatArray:
-    """fx, fy, cx, cy, low-pass, near, off-axis limits in x and y (0 = none), factor of the clamp term, axis limit."""
-    limit = settings.jacobian_clamp
-    return np.array(
-        [
-            camera.fx,
-            camera.fy,
-            camera.cx,
-            camera.cy,
-            settings.low_pass,
-            settings.near,
-            limit * camera.width / (2 * camera.fx) if limit > 0 else np.inf,
-            limit * camera.height / (2 * camera.fy) if limit > 0 else np.inf,
-            2.0 if settings.deviations.double_clamp_term else 1.0,
-            AXIS_LIMIT[np.dtype(dtype)],
-        ],
-        dtype,
-    )
-
-
 def projection_forward(
     position: FloatArray, shape: Shape, camera: Camera, settings: RasterSettings
 ) -> tuple[Projected, ProjectionSaved]:
@@ -109,12 +86,14 @@ def projection_forward(
     """
     dtype = position.dtype
     n = position.shape[1]
-    constants = _constants(camera, settings, dtype)
-    pose = np.ascontiguousarray(np.concatenate([camera.rotation, camera.translation[:, None]], axis=1), dtype)
+    real, rotation = dtype.type, shape.rotation.reshape(9, n)
+    lens = intrinsics_of(camera, settings, dtype)
+    pose = Pose(tuple(camera.rotation.astype(dtype).flat), tuple(camera.translation.astype(dtype)))
+    rules = Rules(real(settings.low_pass), real(settings.near), real(AXIS_LIMIT[dtype]))
     results, visible = np.empty((7, n), dtype), np.empty(n, np.bool_)
-    parallel_for(project_kernel, n, position, shape.rotation, shape.scale, constants, pose, results, visible)
+    parallel_for(project_kernel, n, position, rotation, shape.scale, lens, pose, rules, results, visible)
     out = Projected(results[:2], results[2:5], results[5], results[6], visible)
-    return out, ProjectionSaved(position, shape, camera, constants, pose, out)
+    return out, ProjectionSaved(position, shape, camera, lens, pose, rules, out)
 
 
 def projection_reverse(
@@ -157,14 +136,11 @@ def projection_reverse_footprint(
     d_out = np.empty((WITH_POSE if pose_gradient else WITHOUT_POSE, n), dtype)
     parallel_for(
         project_reverse_kernel, n,
-        saved.position, saved.shape.rotation, saved.shape.scale, saved.constants, saved.pose,
+        saved.position, saved.shape.rotation.reshape(9, n), saved.shape.scale, saved.lens, saved.pose, saved.rules,
         saved.projected.visible, saved.projected.determinant, d_mean2d, d_footprint, d_depth, d_out,
     )  # fmt: skip
     camera = None
     if pose_gradient:
-        d_poses = np.zeros(((n + POSES_PER_SUM - 1) // POSES_PER_SUM, AXES, 4), dtype)
-        parallel_for(pose_reverse_kernel, d_poses.shape[0], saved.position, saved.projected.visible, d_out, d_poses)
-        d_pose = d_poses.sum(axis=0)
-        camera = CameraGrads(d_pose[:, :3].copy(), d_pose[:, 3].copy())
-    d_rotation = d_out[6:WITHOUT_POSE].reshape(AXES, AXES, n)
-    return ProjectionGrads(d_out[:3], d_rotation, d_out[3:6], camera)
+        d_pose = sum_columns(d_out[WITHOUT_POSE:], POSES_PER_SUM)
+        camera = CameraGrads(d_pose[:9].reshape(3, 3), d_pose[9:])
+    return ProjectionGrads(d_out[:3], d_out[6:WITHOUT_POSE].reshape(3, 3, n), d_out[3:6], camera)

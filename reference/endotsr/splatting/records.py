@@ -1,8 +1,8 @@
-"""What compositing reads and writes for each Gaussian, packed in depth order.
+"""The records that compositing reads and writes for each Gaussian, packed in depth order.
 
 The exponent of a Gaussian on the screen is -q/2 with q = r dy^2 + A (dx - m dy)^2, A = c/det, m = b/c,
-r = 1/c: a sum of squares, so q >= 0 always and a needle keeps its digits (B5). One record of 11 numbers
-per Gaussian stands in one or two cache lines (float64: two or three); its gradient record has 10.
+r = 1/c: a sum of squares, so that q >= 0 always and a needle keeps its digits (B5). One record of 11 numbers
+per Gaussian occupies one or two cache lines (float64: two or three). Its gradient record has 10 numbers.
 """
 
 import math
@@ -10,14 +10,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.kernels.vectors import prefetch
 from endotsr.splatting.binning import TileLists
 from endotsr.splatting.projection import Projected
-
-FloatArray = NDArray[np.floating]
 
 # columns of a record
 U, V, PRECISION, SLOPE, INVERSE_C, LOG2_OPACITY, RED, GREEN, BLUE, DEPTH, OPACITY = range(11)
@@ -27,7 +26,7 @@ RECORD = 11
 SUM_S, SUM_SE, SUM_SY, SUM_SEE, SUM_SEY, SUM_SYY, SUM_RED, SUM_GREEN, SUM_BLUE, SUM_DEPTH = range(10)
 GRADIENT = 10
 
-GRADIENTS_AHEAD = 16  # pairs between asking for a gradient record and adding it
+GRADIENTS_AHEAD = 16  # pairs between the prefetch of a gradient record and its addition
 
 
 def _log_sigmoid(first, stop, logit, out):
@@ -97,7 +96,7 @@ def _gather(
         for j in range(GRADIENT):
             total[j] = zero
         for p in range(pair_starts[k], pair_starts[k + 1]):
-            if p + GRADIENTS_AHEAD < slots.size:  # tile order is random order here, and each row would be waited for
+            if p + GRADIENTS_AHEAD < slots.size:  # tile order is random here: without it, each row is a cache miss
                 prefetch(pair_gradients, slots[p + GRADIENTS_AHEAD])
             row = pair_gradients[slots[p]]
             for j in range(GRADIENT):
@@ -112,7 +111,7 @@ def _gather(
         d_footprint[0, i] = factor * (-half * total[SUM_SEE])
         d_footprint[1, i] = factor * (a * total[SUM_SEY])
         d_footprint[2, i] = factor * (-half * total[SUM_SYY])
-        # sum of s, times 1 - opacity; the bound keeps exp from raising where it is not compiled
+        # sum of s, times 1 - opacity; the bound keeps math.exp from raising with the JIT off
         d_logit[i] = total[SUM_S] / (one + math.exp(min(opacity_logit[i], largest)))
         d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
         d_depth[i] = total[SUM_DEPTH] if keep_depth else zero

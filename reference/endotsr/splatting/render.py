@@ -1,15 +1,17 @@
-"""One view of the Gaussians at one instant: all splatting stages composed, forward and reverse.
+"""One view of the Gaussians at one time: all splatting stages composed, forward and reverse.
 
-Comes in: deformed raw parameters and a camera. Goes out: colour, depth, opacity and, in reverse, gradients to
-every parameter and, when asked for, to the background and the camera pose. Knows nothing of time.
+Input: deformed raw parameters and a camera. Output: colour, depth, opacity and, in reverse, gradients by every
+parameter and, on request, by the background and the camera pose. This module does not depend on time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.timer import NO_TIMER, Timer
 from endotsr.splatting import compositing
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera, CameraGrads, camera_centre
@@ -20,15 +22,13 @@ from endotsr.splatting.projection import Projected, ProjectionSaved, projection_
 from endotsr.splatting.records import gather_footprint_gradients, log_opacity, pack_records
 from endotsr.splatting.settings import RasterSettings
 
-FloatArray = NDArray[np.floating]
-
 CONIC_EPSILON = 1e-7  # of the released code, added to det^2; used by the deviation `conic_epsilon` only
 
 Compositor = Literal["auto", "definition", "blocks"]
 
 
 class Scene(NamedTuple):
-    """Deformed, raw (pre-activation) parameters of N Gaussians at one instant."""
+    """Deformed, raw (pre-activation) parameters of N Gaussians at one time."""
 
     position: FloatArray  # (3, N) scene units
     quaternion: FloatArray  # (4, N)
@@ -62,7 +62,7 @@ class RenderSaved(NamedTuple):
 
 
 class RenderGrads(NamedTuple):
-    """Gradients of one view; `background` and `camera` are None unless they were asked for."""
+    """Gradients of one view; `background` and `camera` are None unless requested."""
 
     position: FloatArray
     quaternion: FloatArray
@@ -77,7 +77,7 @@ class RenderGrads(NamedTuple):
 
 
 def check_finite(arrays: Mapping[str, FloatArray | None]) -> None:
-    """Refuse numbers that are not finite, before any kernel runs. Raises: ValueError naming array and index."""
+    """Check that all numbers are finite, before any kernel runs. Raises: ValueError naming array and index."""
     for name, array in arrays.items():
         if array is None or np.isfinite(array).all():
             continue
@@ -91,7 +91,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def choose_compositor(settings: RasterSettings, compositor: Compositor) -> Compositor:
-    """`auto` takes the fast path wherever it computes the settings."""
+    """Resolve `auto`: the fast path where it supports the settings. Raises: ValueError for `blocks` elsewhere."""
     if compositor == "auto":
         return "blocks" if compositing_blocks.supports(settings) else "definition"
     if compositor == "blocks" and not compositing_blocks.supports(settings):
@@ -109,36 +109,38 @@ def render_forward(
     degree: int = 3,
     background: FloatArray | None = None,
     compositor: Compositor = "auto",
+    timer: Timer = NO_TIMER,
 ) -> tuple[RenderOut, RenderSaved]:
     """Render one view (specification B2-B5).
 
     scene       raw parameters, N >= 0 Gaussians
-    settings    a preset of `settings.PRESETS` or any point between
+    settings    a preset of `settings.PRESETS`, or other values of its fields
     degree      active degree of the harmonics, 0..3
     background  (3,) colour, default black
+    timer       told of the stages "projection" (B2-B4), "binning" and "blend forward"
     returns     RenderOut in the dtype of scene.position
 
     Reverse: `render_reverse`.
     Edges:   N = 0 or nothing visible gives the background and zero depth.
     Oracle:  tests/oracle/splatting_oracle.py.
     """
-    dtype = scene.position.dtype
     width, height = camera.width, camera.height
-    back = np.zeros(3, dtype) if background is None else np.ascontiguousarray(background, dtype)
-    shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
-    projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
-    centre = camera_centre(camera)
-    colour, harmonics_saved = harmonics_forward(scene.harmonics, scene.residual, scene.position, centre, degree)
-    log_alpha = log_opacity(scene.opacity_logit)
-    box, visible = screen_boxes(projected, log_alpha, settings, width, height)
-    order = depth_order(projected.depth, visible)
-    records = pack_records(order, projected, log_alpha, colour)
-    if choose_compositor(settings, compositor) == "blocks":
-        lists = tile_lists(box, order, compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT, width, height)
-        out, saved = compositing_blocks.composite_blocks_forward(records, lists, settings, back, width, height)
-    else:
-        lists = tile_lists(box, order, compositing.TILE_WIDTH, compositing.TILE_HEIGHT, width, height)
-        out, saved = compositing.composite_forward(records, lists, settings, back, width, height)
+    back = np.ascontiguousarray(np.zeros(3) if background is None else background, scene.position.dtype)
+    (tile_width, tile_height), composite = _forward_compositor(settings, compositor)
+    with timer.stage("projection"):
+        shape, covariance_saved = covariance_forward(scene.quaternion, scene.log_scale)
+        projected, projection_saved = projection_forward(scene.position, shape, camera, settings)
+        colour, harmonics_saved = harmonics_forward(
+            scene.harmonics, scene.residual, scene.position, camera_centre(camera), degree
+        )
+    with timer.stage("binning"):
+        log_alpha = log_opacity(scene.opacity_logit)
+        box, visible = screen_boxes(projected, log_alpha, settings, width, height)
+        order = depth_order(projected.depth, visible)
+        records = pack_records(order, projected, log_alpha, colour)
+        lists = tile_lists(box, order, tile_width, tile_height, width, height)
+    with timer.stage("blend forward"):
+        out, saved = composite(records, lists, settings, back, width, height)
     stages = (covariance_saved, projection_saved, harmonics_saved, projected, order, visible, saved)
     return RenderOut(out.colour, out.depth, out.opacity), RenderSaved(scene, settings, camera, *stages)
 
@@ -151,26 +153,24 @@ def render_reverse(
     *,
     background_gradient: bool = False,
     pose_gradient: bool = False,
+    timer: Timer = NO_TIMER,
 ) -> RenderGrads:
-    """Gradients of a loss by everything the view depends on.
+    """Gradients of a loss by every input of the view.
 
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
+    timer      told of the stages "blend reverse", "binning" and "projection"
     """
     composite = saved.composite
-    if isinstance(composite, compositing_blocks.BlocksSaved):
-        pairs = compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, composite)
-    else:
-        d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
-        pairs = compositing.composite_reverse(d_colour, d_depth, d_opacity, composite)
-    deviations = saved.settings.deviations
-    d_mean2d, d_footprint, d_logit, d_rgb, d_z = gather_footprint_gradients(
-        saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
-        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
-        keep_depth=not deviations.drop_depth_to_z,
-    )  # fmt: skip
-    harmonics = harmonics_reverse(d_rgb, saved.harmonics)
-    projection = projection_reverse_footprint(d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient)
-    covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
+    with timer.stage("blend reverse"):
+        pairs = _composite_reverse(d_colour, d_depth, d_opacity, composite)
+    with timer.stage("binning"):
+        d_mean2d, d_footprint, d_logit, d_rgb, d_z = _gather(pairs, saved)
+    with timer.stage("projection"):
+        harmonics = harmonics_reverse(d_rgb, saved.harmonics)
+        projection = projection_reverse_footprint(
+            d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient
+        )
+        covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
     return RenderGrads(
         position=projection.position + harmonics.position,
         quaternion=covariance.quaternion,
@@ -187,8 +187,39 @@ def render_reverse(
     )
 
 
+def _forward_compositor(settings: RasterSettings, compositor: Compositor) -> tuple[tuple[int, int], Callable]:
+    """Tile width and height in pixels, and the forward pass of the chosen compositor."""
+    if choose_compositor(settings, compositor) == "blocks":
+        tile = compositing_blocks.TILE_WIDTH, compositing_blocks.TILE_HEIGHT
+        return tile, compositing_blocks.composite_blocks_forward
+    return (compositing.TILE_WIDTH, compositing.TILE_HEIGHT), compositing.composite_forward
+
+
+def _composite_reverse(
+    d_colour: FloatArray,
+    d_depth: FloatArray,
+    d_opacity: FloatArray | None,
+    saved: compositing.CompositeSaved | compositing_blocks.BlocksSaved,
+) -> FloatArray:
+    """Gradients of every pair by the reverse pass of the compositor that made `saved`."""
+    if isinstance(saved, compositing_blocks.BlocksSaved):
+        return compositing_blocks.composite_blocks_reverse(d_colour, d_depth, d_opacity, saved)
+    d_opacity = np.zeros_like(d_depth) if d_opacity is None else d_opacity
+    return compositing.composite_reverse(d_colour, d_depth, d_opacity, saved)
+
+
+def _gather(pairs: FloatArray, saved: RenderSaved) -> tuple[FloatArray, ...]:
+    """Gradients of the pairs added up by Gaussian: by mean, footprint, opacity logit, colour and depth."""
+    composite, deviations = saved.composite, saved.settings.deviations
+    return gather_footprint_gradients(
+        saved.order, composite.records, composite.lists, pairs, saved.projected.determinant, saved.scene.opacity_logit,
+        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
+        keep_depth=not deviations.drop_depth_to_z,
+    )  # fmt: skip
+
+
 def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera: Camera) -> CameraGrads:
-    """Add the share that reaches the pose through the view direction: centre = -rotation^T translation."""
+    """Add the part that reaches the pose through the view direction: centre = -rotation^T translation."""
     assert projection is not None
     translation = np.asarray(camera.translation, d_centre.dtype)
     rotation = np.asarray(camera.rotation, d_centre.dtype)

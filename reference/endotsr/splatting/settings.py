@@ -1,4 +1,4 @@
-"""Settings of the rasteriser: three named presets, between which every field is a free dial."""
+"""Settings of the rasteriser: three named presets; every field can also be set on its own."""
 
 from typing import Literal, NamedTuple
 
@@ -6,7 +6,7 @@ Support = Literal["everywhere", "ellipse", "three_sigma_tiles"]
 
 
 class LegacyDeviations(NamedTuple):
-    """What the released CUDA code does to gradients, each switchable by name (all off = the exact derivative)."""
+    """Deviations of the released CUDA code from the exact gradient, each with its own switch (all off = exact)."""
 
     drop_depth_to_z: bool = False  # the depth image sends no gradient to z
     pass_clamped_alpha: bool = False  # the alpha clamp lets the gradient through
@@ -15,7 +15,7 @@ class LegacyDeviations(NamedTuple):
 
 
 class RasterSettings(NamedTuple):
-    """How a Gaussian reaches a pixel. See the table of presets in the specification."""
+    """Support, thresholds and near plane of the rasteriser. The specification has a table of the presets."""
 
     alpha_cutoff: float = 1.0 / 255.0  # a smaller alpha contributes nothing; 0 = no cutoff
     transmittance_stop: float = 1e-4  # stop before T falls below; 0 = never

@@ -12,17 +12,14 @@ from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.fitting.model import scene_at
+from endotsr.kernels.arrays import FloatArray, IntArray
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene, render_forward
 from endotsr.splatting.settings import RasterSettings
 from endotsr.tradeoff.scenes import StudyScene, in_precision
 from endotsr.tradeoff.settings import CLOSE
-
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 
 PIXELS = 20
 DIGITS = 30

@@ -1,40 +1,47 @@
-"""Work-precision diagrams from `tradeoff.json`: logarithmic, labelled on the curves, legible without colour.
+"""Work-precision diagrams from `tradeoff.json`: logarithmic, labelled on the curves, legible without colour."""
 
-Colours are those of Okabe and Ito, which people with any common colour blindness tell apart.
-"""
-
-import io
 import math
 from pathlib import Path
 from typing import Any
 
-from endotsr.report.curves import UNSIGNED
-from endotsr.runs.files import replace_file
+from endotsr.report.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    GREY,
+    INK,
+    NORMAL,
+    ORANGE,
+    SMALL,
+    Sizes,
+    name_axes,
+    new_figure,
+    plain_axes,
+    save,
+)
 from endotsr.tradeoff.labels import Label, place_labels
 from endotsr.tradeoff.measure import LEVELS
 from endotsr.tradeoff.page import small
 from endotsr.tradeoff.study import cost_of
 
-BLUE, ORANGE, GREEN, PINK, INK, GREY, PALE = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#24303a", "#6b7680", "#c9d1d8"
 TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
 FLOOR = 1e-10  # of the error axis, in 1/255: the exact path, with error 0, stands there
 
 
 def main_figure(result: dict[str, Any]) -> Any:
     """Every setting of the joint sweep, the front and the presets: error against time, and against visits."""
-    figure = empty_figure(11.0, 5.0)
+    figure = new_figure(11.0, 5.0)
     left, right = figure.subplots(1, 2, sharey=True)
     labels = []
     for axes, cost in ((left, "forward"), (right, "visits")):
         labels += _sweep(axes, result, cost)
         _levels(axes, result)
-        plain_axes(axes, _cost_name(cost))
+        logarithmic_axes(axes, _cost_name(cost))
         axes.set_ylim(FLOOR / 10, 1000)
         low, high = axes.get_xlim()
         axes.set_xlim(low / 4, high * 2)
-    left.set_ylabel("largest error of the image, 1/255", color=INK)
-    left.set_title("What a frame costs in time", loc="left", color=INK, fontsize=11)
-    right.set_title("and in work that no machine changes", loc="left", color=INK, fontsize=11)
+    name_axes(left, y="largest error of the image, 1/255", title="What a frame costs in time")
+    name_axes(right, title="and in work that no machine changes")
     place_labels(figure, labels)
     return figure
 
@@ -50,7 +57,7 @@ def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
     for precision, marker in (("float64", "s"), ("float32", "o")):
         chosen = [at(n) for n in result["joint"] if by_name[n]["setting"]["precision"] == precision]
         if chosen:
-            axes.scatter(*zip(*chosen, strict=True), s=16, marker=marker, color=PALE, linewidths=0, zorder=2)
+            axes.scatter(*zip(*chosen, strict=True), s=16, marker=marker, color=FAINT, linewidths=0, zorder=2)
     swept = [n for n in result["fronts"][cost] if n in result["joint"]]
     if swept:
         axes.plot(*zip(*map(at, swept), strict=True), color=BLUE, linewidth=1.8, marker="o", markersize=4, zorder=3)
@@ -81,7 +88,7 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
     dials = [d for d in result["dials"] if cost != "visits" or d["name"] not in ("precision", "exponential", "threads")]
     columns = 4
     rows = -(-len(dials) // columns)
-    figure = empty_figure(3.1 * columns, 2.75 * rows)
+    figure = new_figure(3.1 * columns, 2.75 * rows)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
     by_name = {p["name"]: p for p in result["points"]}
     labels = []
@@ -90,13 +97,12 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
         if error == "max":
             _levels(axes, result, named=False)
         counted = "basis terms" if cost == "visits" and dial["cost"] == "terms" else _cost_name(cost)
-        plain_axes(axes, counted, small=True)
+        logarithmic_axes(axes, counted, SMALL, title=dial["title"])
         _room(axes)
-        axes.set_title(dial["title"], loc="left", fontsize=9.5, color=INK)
     for axes in panels[len(dials) :]:
         axes.set_axis_off()
     name = "largest error, 1/255" if error == "max" else "worst gradient block, relative"
-    figure.supylabel(name, fontsize=10, color=INK)
+    figure.supylabel(name, fontsize=NORMAL.text, color=INK)
     place_labels(figure, labels)
     return figure
 
@@ -112,7 +118,7 @@ def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, e
         spreads = [p[cost] for p in points]
         below = [(s["median"] - s["low"]) * factor for s in spreads]
         above = [(s["high"] - s["median"]) * factor for s in spreads]
-        axes.errorbar(xs, ys, xerr=[below, above], fmt="none", ecolor=PALE, elinewidth=2.2, zorder=1)
+        axes.errorbar(xs, ys, xerr=[below, above], fmt="none", ecolor=FAINT, elinewidth=2.2, zorder=1)
     axes.plot(xs, ys, color=GREEN if dial["lossless"] else BLUE, marker="o", markersize=4, linewidth=1.2, zorder=3)
     return [Label(axes, label, x, y, INK) for label, x, y in zip(dial["points"], xs, ys, strict=True)]
 
@@ -157,39 +163,21 @@ def _levels(axes: Any, result: dict[str, Any], named: bool = True) -> None:
             )  # fmt: skip
 
 
-def empty_figure(width: float, height: float) -> Any:
-    """A white figure of so many inches, drawn without a screen."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def plain_axes(axes: Any, name: str, small: bool = False, log_y: bool = True) -> None:
-    """Logarithmic axes with a pale grid and nothing else; `name` stands below."""
+def logarithmic_axes(axes: Any, name: str, sizes: Sizes = NORMAL, title: str = "", log_y: bool = True) -> None:
+    """Logarithmic axes in the common style; `name` stands below."""
     axes.set_xscale("log")
     if log_y:
         axes.set_yscale("log")
-    axes.set_xlabel(name, fontsize=8 if small else 10, color=INK)
-    axes.tick_params(which="both", colors=GREY, labelsize=7.5 if small else 9, length=0)
-    axes.grid(True, color=PALE, linewidth=0.5, alpha=0.6)
-    axes.set_axisbelow(True)
-    for side in axes.spines.values():
-        side.set_visible(False)
+    name_axes(axes, name, title=title, sizes=sizes)
+    plain_axes(axes, sizes=sizes)
 
 
-def save(figure: Any, stem: Path) -> None:
-    """stem.png and stem.svg, the same bytes for the same numbers."""
-    import matplotlib as mpl
-
-    with mpl.rc_context({"svg.hashsalt": "endotsr", "svg.fonttype": "path"}):
-        for ending, about in (("png", UNSIGNED), ("svg", {"Date": None, "Creator": None})):
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=ending, dpi=160, metadata=about)
-            content = buffer.getvalue()
-            replace_file(stem.with_suffix(f".{ending}"), lambda path, data=content: path.write_bytes(data))
+def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
+    """Every figure as STEM.png and STEM.svg; returns the stems."""
+    for stem, figure in pictures.items():
+        for ending in ("png", "svg"):
+            save(figure, folder / f"{stem}.{ending}")
+    return list(pictures)
 
 
 def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[str]:
@@ -201,6 +189,4 @@ def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[s
             f"{name}_dials_visits": dials_figure(result, "visits"),
             f"{name}_dials_gradients": dials_figure(result, "both", "gradient"),
         }
-    for stem, figure in pictures.items():
-        save(figure, folder / stem)
-    return list(pictures)
+    return save_pictures(pictures, folder)

@@ -9,18 +9,16 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import SceneSaved, Spectral, scene_at, scene_reverse
+from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, RenderSaved, render_forward, render_reverse
 from endotsr.tradeoff.kernels import kernels_of
 from endotsr.tradeoff.scenes import StudyScene, in_precision, scaled
 from endotsr.tradeoff.settings import Setting
-
-FloatArray = NDArray[np.floating]
 
 LEVELS = 255.0
 BLOCKS = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual")  # of the deformed scene

@@ -5,6 +5,7 @@ from typing import Any
 
 from endotsr.report import parts as parts
 from endotsr.report.figures import data_uri
+from endotsr.report.tables import html_table
 from endotsr.runs.files import replace_file
 from endotsr.tradeoff.measure import LEVELS
 
@@ -166,15 +167,13 @@ def write_page(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> 
         _pictures(folder, name, [""]),
         "<ol>" + "".join(f"<li>{plain(sentence)}</li>" for sentence in advice(result)) + "</ol>",
         parts.section(
-            "Settings worth having", parts.table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
+            "Settings worth having", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
         ),
         parts.section("Presets", "<ul>" + "".join(f"<li>{plain(x)}</li>" for x in preset_lines(result)) + "</ul>"),
         parts.section("Every dial alone", _pictures(folder, name, [e for e in PICTURES if e])),
         parts.section("Why the reference can be trusted", f"<p>{parts.text(certificate_line(result))}</p>"),
         parts.section("Left out", _omitted(result)),
-        parts.section(
-            "All settings", parts.details("Table", parts.table(COLUMNS, [_row(p) for p in result["points"]]))
-        ),
+        parts.section("All settings", parts.details("Table", html_table(COLUMNS, [_row(p) for p in result["points"]]))),
     ]
     path = folder / f"{name}.html"
     content = parts.page("What accuracy costs in time", "\n".join(body))

@@ -7,14 +7,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import DEMO, ModelConfig, with_iterations
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, scale_camera
-
-FloatArray = NDArray[np.floating]
 
 SIMULATED_WIDTH, SIMULATED_HEIGHT = 128, 96
 ITERATIONS = 150  # of the training that gives the simulated scene its Gaussians
@@ -65,7 +62,8 @@ def simulated_scene(
     step   is called after every iteration
     """
     from endotsr.fitting.model import spectral_from
-    from endotsr.fitting.trainer import new_training, train
+    from endotsr.fitting.state import new_training
+    from endotsr.fitting.trainer import train
     from endotsr.simulator.settings import SimulatorSettings
     from endotsr.simulator.simulate import simulate
 
@@ -73,8 +71,8 @@ def simulated_scene(
     simulator = SimulatorSettings(width=width, height=height, seed=seed)
     sequence = simulate(simulator).sequence
     config = with_iterations(DEMO, iterations)
-    share = (width / SIMULATED_WIDTH) ** 2  # points by the pixel
-    points = {name: max(4, round(count * share)) for name, count in POINTS.items()}
+    fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
+    points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}
     config = msgspec.structs.replace(config, initialisation=msgspec.structs.replace(config.initialisation, **points))
     state = new_training(sequence, config)
     train(state, sequence, config, lambda entry: step(), lambda reached: None)

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from endotsr.config import ModelConfig
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
 from endotsr.tradeoff.scenes import StudyScene
-
-FloatArray = NDArray[np.floating]
 
 SIDE = 320  # pixels of the picture
 FOCAL = 1.2  # image widths

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.runs.machine import machine, now, versions
-from endotsr.tradeoff.certificate import certify
+from endotsr.tradeoff.certificate import Certificate, certify
 from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
 from endotsr.tradeoff.measure import LEVELS, Frame, Prepared, errors, frame, prepare, seconds, terms
 from endotsr.tradeoff.results import FORMAT
@@ -104,23 +104,28 @@ def run_study(
     step(1)
     if images is not None:
         _keep(images, "reference", reference)
-    prepared, points = [], []
-    for number, (setting, name) in enumerate(plan.names.items()):
-        ready = prepare(scene, setting)
+    prepared = [prepare(scene, setting) for setting in plan.names]
+    points = []
+    for number, (ready, (setting, name)) in enumerate(zip(prepared, plan.names.items())):
         found, visits = (reference, reference_visits) if setting == aim else frame(ready)
-        prepared.append(ready)
         points.append(_point(name, number, ready, found, reference, visits))
         if images is not None:
             _keep(images, points[-1]["file"], found)
         step(1)
     for point, times in zip(points, _timed(prepared, repeats, step), strict=True):
         point["forward"], point["both"] = (_spread(column) for column in times.T)
+    return _result(scene, plan, aim, certificate, points) | {"repeats": repeats}
+
+
+def _result(
+    scene: StudyScene, plan: Plan, aim: Setting, certificate: Certificate, points: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """The keys of tradeoff.json."""
     return {
         "format": FORMAT,
         "scene": _about(scene),
         "reference": {"setting": setting_dict(aim), "certificate": certificate.as_dict()},
         "lines": {"eight_bit": 0.5 / LEVELS, "sensor_noise": scene.noise},
-        "repeats": repeats,
         "points": points,
         "dials": plan.dials,
         "joint": plan.joint,

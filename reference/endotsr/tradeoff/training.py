@@ -21,14 +21,15 @@ from endotsr.evaluation.evaluate import evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.fitting.compile_ahead import rehearse
 from endotsr.fitting.model import render_at, spectral_from
-from endotsr.fitting.trainer import TrainingState, new_training, train, training_step, workshop
+from endotsr.fitting.state import TrainingState, new_training, workshop
+from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.sequences.sequence import Sequence
 from endotsr.tradeoff.results import FORMAT, read_result
 
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
-MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # shares of the iterations
+MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations
 LPIPS_FROM = 1 / 2  # it takes as long as all other metrics several times over
 PROBE_WARM, PROBE = 5, 15  # iterations
 GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
@@ -67,7 +68,7 @@ def configurations(base: Config) -> list[Configuration]:
     return [
         Configuration("base", "base", {}, 1.0),
         Configuration("no residuals", "residuals", {"model": {"appearance": False, "spectral_motion": False}}, 0.85),
-        Configuration("no detail loss", "detail loss", {"model": {"laplacian": False}}, 0.9),
+        Configuration("no Laplacian loss", "Laplacian loss", {"model": {"laplacian": False}}, 0.9),
         Configuration("half size", "image scale", {"sequence": {"scale": base.sequence.scale / 2}}, 0.5),
         Configuration("N / 2", "Gaussians", points(1 / 2), 0.75),
         Configuration("cutoff 1/64", "cutoffs", {"raster": {"alpha_cutoff": 1 / 64}}, 0.9),
@@ -102,9 +103,9 @@ def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights
     iteration = (time.monotonic() - began) / PROBE * GROWTH
     chosen = configurations(base)
     left = seconds
-    for share in MILESTONES:
+    for fraction in MILESTONES:
         began = time.monotonic()
-        measured(state, base, sequence, sequence, weights if share >= LPIPS_FROM else None)
+        measured(state, base, sequence, sequence, weights if fraction >= LPIPS_FROM else None)
         left -= (time.monotonic() - began) * len(chosen)
     trainings = sum(c.cost for c in chosen)
     return int(np.clip(left / (iteration * trainings), 16, base.training.iterations))
@@ -121,7 +122,8 @@ def measured(
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
 
     def render(index: int) -> Any:
-        return render_at(state.gaussians, spectral, config, full.cameras[index], float(full.times[index])).colour
+        at = (full.cameras[index], float(full.times[index]))
+        return render_at(state.gaussians, spectral, config, *at, frames=state.frames).colour
 
     found = evaluate_frames(full, full.test_index, render, weights).mean
     return {name: found[name] for name in METRICS}
@@ -141,7 +143,7 @@ def run_configuration(
     """
     rehearse(config)
     total = config.training.iterations
-    stops = {max(1, round(share * total)) for share in MILESTONES}
+    stops = {max(1, round(fraction * total)) for fraction in MILESTONES}
     rows: list[dict[str, Any]] = []
     began, away = time.monotonic(), 0.0
     state = new_training(sequence, config)
@@ -192,15 +194,12 @@ def run_training_study(
     file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a sequence that is refused leaves nothing
     base = with_iterations(base, result["iterations"])
     done = {entry["name"]: entry for entry in result["configurations"]}
-    chosen = configurations(base)
-    left = [c for c in chosen if c.name not in done]
+    left = [c for c in configurations(base) if c.name not in done]
     begin(len(left) * base.training.iterations)
     ends = time.monotonic() + 60 * minutes
     result["left_out"] = {}
     for configuration in left:
-        like = done.get("base", {"seconds": 0.0, "evaluation_seconds": 0.0})
-        expected = configuration.cost * like["seconds"] + like["evaluation_seconds"]
-        if time.monotonic() + expected > ends:
+        if time.monotonic() + _expected_seconds(configuration, done.get("base")) > ends:
             result["left_out"][configuration.name] = "no time left for it"
             continue
         config = changed(base, configuration)
@@ -212,6 +211,11 @@ def run_training_study(
         say(summary_line(entry))
     write_json(file, result)
     return result
+
+
+def _expected_seconds(configuration: Configuration, base: dict[str, Any] | None) -> float:
+    """Training and evaluation of a configuration, from those of the base training; 0 before it was measured."""
+    return configuration.cost * base["seconds"] + base["evaluation_seconds"] if base else 0.0
 
 
 def _begun(

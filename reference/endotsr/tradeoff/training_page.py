@@ -3,21 +3,20 @@
 from pathlib import Path
 from typing import Any
 
-from endotsr.cli.parts.progress import duration
-from endotsr.tradeoff.figures import BLUE, GREEN, GREY, INK, ORANGE, PINK, empty_figure, plain_axes, save
+from endotsr.report.style import GREY, LIGHT, SMALL, name_axes, new_figure
+from endotsr.report.tables import plain
+from endotsr.report.words import duration
+from endotsr.tradeoff.figures import logarithmic_axes, save_pictures
 from endotsr.tradeoff.labels import Label, place_labels
 
 METRICS = {"psnr_full": "PSNR, dB", "ssim_full": "SSIM", "lpips": "LPIPS"}
 ALONG = {"seconds": "minutes of training", "iteration": "iterations"}
-COLOURS = (BLUE, ORANGE, GREEN, PINK)
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
     """For a terminal: every training at its end beside the base, then what each further stretch of time bought."""
     rows = training_rows(result)
-    lines = ["".join(f"{cell:<16}" if i == 0 else f"{cell:>11}" for i, cell in enumerate(row)) for row in rows]
-    head = ("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
-    lines.insert(0, "".join(f"{name:<16}" if i == 0 else f"{name:>11}" for i, name in enumerate(head)))
+    lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
     lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
     return lines + summary(result) + gain_by_minute(best_by_time(result))
 
@@ -106,20 +105,19 @@ def training_figure(result: dict[str, Any], along: str, metrics: dict[str, str])
     by_name = {c["name"]: c for c in result["configurations"]}
     dials = [d for d in dict.fromkeys(c["dial"] for c in result["configurations"]) if d != "base"] or ["base"]
     rows, columns = (len(metrics), len(dials)) if len(metrics) > 1 else (-(-len(dials) // 3), min(3, len(dials)))
-    figure = empty_figure(3.1 * columns, 2.6 * rows)
-    share = "row" if len(metrics) > 1 else True
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=share).ravel()
+    figure = new_figure(3.1 * columns, 2.6 * rows)
+    common_y = "row" if len(metrics) > 1 else True
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=common_y).ravel()
     shown = [(metric, dial) for metric in metrics for dial in dials]
     labels = []
     for axes, (metric, dial) in zip(panels, shown, strict=False):
         same = [c for c in result["configurations"] if c["dial"] == dial and dial != "base"]
-        lines = [(c, COLOURS[i % len(COLOURS)]) for i, c in enumerate(same)]
+        lines = [(c, LIGHT.colours[i % 4]) for i, c in enumerate(same)]
         lines += [(by_name["base"], GREY)] if "base" in by_name else []
         labels += [_line(axes, configuration, colour, along, metric) for configuration, colour in lines]
-        plain_axes(axes, ALONG[along], small=True, log_y=False)
-        axes.set_ylabel(metrics[metric], fontsize=8, color=INK)
+        logarithmic_axes(axes, ALONG[along], SMALL, title=dial, log_y=False)
+        name_axes(axes, y=metrics[metric], sizes=SMALL)
         axes.label_outer()
-        axes.set_title(dial, loc="left", fontsize=9.5, color=INK)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     _room(panels[: len(shown)])
@@ -161,6 +159,4 @@ def draw_training(result: dict[str, Any], folder: Path, name: str) -> list[str]:
         f"{name}_seconds": training_figure(result, "seconds", metrics),
         f"{name}_iterations": training_figure(result, "iteration", metrics),
     }
-    for stem, figure in pictures.items():
-        save(figure, folder / stem)
-    return list(pictures)
+    return save_pictures(pictures, folder)

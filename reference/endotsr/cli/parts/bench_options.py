@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
 from endotsr.bench.case import Precision
+from endotsr.cli.parts.fields import Option
 
-File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+File = Annotated[Path | None, Option("FILE")]
 
 
 @dataclass
@@ -37,7 +36,7 @@ class StagesOptions:
 
     gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
     """numbers of Gaussians of the common workload; none with an empty list, beside --scenes"""
-    scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
+    scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
     """trained scenes (npz) to time as well"""
     precisions: tuple[Precision, ...] = ("float32", "float64")
     """arithmetic"""
@@ -99,21 +98,9 @@ class StartOptions:
 
 @dataclass
 class AllOptions:
-    """Start, stages, peers and scaling in one go, for a quiet machine: JSON, pictures, and the page that shows them."""
+    """Start, stages, peers and scaling in one go, on a machine without other work: JSON files and pictures in --out."""
 
     out: Path
     """folder for the results"""
-    scenes: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")] = ()
+    scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
     """trained scenes (npz) to time as well"""
-    page: File = None
-    """page whose marked parts are then written anew"""
-
-
-@dataclass
-class PageOptions:
-    """Write the marked parts of the performance page anew from results that exist."""
-
-    results: Path = Path("docs/results")
-    """folder of the results"""
-    page: Path = Path("docs/performance.md")
-    """the page"""

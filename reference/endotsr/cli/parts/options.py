@@ -1,18 +1,15 @@
-"""From words on the command line to typed options and settings; a mistake is one line that names what is allowed.
+"""The settings of a run from preset, TOML file and command line.
 
 Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option.
 """
 
-import contextlib
-import io
-import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import msgspec
 
-from endotsr.cli.parts.mistakes import mistake_line, setting_type
+from endotsr.cli.parts.parser import parse, parse_known
 from endotsr.config import (
     MILESTONES,
     Config,
@@ -22,7 +19,7 @@ from endotsr.config import (
 )
 from endotsr.errors import InputError
 
-T = TypeVar("T")
+__all__ = ["asked_settings", "base_settings", "differences", "parse", "with_short_names"]
 
 # Options that are a setting under a shorter name.
 SHORT_NAMES = {
@@ -44,14 +41,9 @@ class Sources:
     schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
 
 
-def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
-    """The options of one command. `--help` prints them and leaves with SystemExit(0); a mistake is an InputError."""
-    return _tyro(options, _plain_booleans(words), command, **({"default": default} if default else {}))
-
-
 def base_settings(words: list[str]) -> tuple[Config, str]:
     """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is)."""
-    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    sources = parse_known(Sources, words)
     data = read_toml(sources.config) if sources.config else {}
     if sources.preset:
         data = data | {"preset": sources.preset}
@@ -66,7 +58,7 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
         note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
         return msgspec.structs.replace(config, training=training), note
     note = (
-        f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its share "
+        f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its fraction "
         "(--schedule absolute leaves them in place)"
     )
     return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
@@ -78,7 +70,7 @@ def asked_settings(words: list[str], kept: Config) -> Config:
     Every other setting stays as the run has it, so that only what was asked for can differ from the run.
     """
     base, _ = base_settings(words)
-    sources, _ = _tyro(Sources, words, "train", return_unknown_args=True, add_help=False)
+    sources = parse_known(Sources, words)
     asked = read_toml(sources.config) if sources.config else {}
     named = {(section, key) for section, values in asked.items() if isinstance(values, dict) for key in values}
     if sources.iterations is not None:
@@ -114,29 +106,3 @@ def differences(config: Config, other: Config, name: str) -> list[str]:
         for key, value in values.items()
         if value != theirs[section][key]
     ]
-
-
-def _tyro(options: Any, words: list[str], command: str, **settings: Any) -> Any:
-    import tyro
-
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            return tyro.cli(options, args=words, prog=f"endotsr {command}", **settings)
-    except SystemExit as leaving:
-        if not leaving.code:
-            raise
-        looked_through = [] if settings.get("return_unknown_args") else words
-        raise InputError(mistake_line(options, looked_through, said.getvalue(), command)) from None
-
-
-def _plain_booleans(words: list[str]) -> list[str]:
-    """`--model.appearance false` as `--model.no-appearance`, so that a switch reads as it does in a TOML file."""
-    out: list[str] = []
-    for word in [part for w in words for part in (w.split("=", 1) if re.match(r"--[\w.-]+\.[\w-]+=", w) else [w])]:
-        if out and word.lower() in ("true", "false") and setting_type(out[-1]) is bool:
-            section, key = out[-1].rsplit(".", 1)
-            out[-1] = f"{section}.{'' if word.lower() == 'true' else 'no-'}{key}"
-        else:
-            out.append(word)
-    return out

@@ -1,9 +1,11 @@
-"""What a person sees while a run trains: a bar on a terminal, a line now and then elsewhere."""
+"""Progress on the standard error: a bar on a terminal, single lines elsewhere."""
 
 import math
 import sys
 import time
 from typing import Any
+
+from endotsr.report.words import duration
 
 QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
@@ -12,15 +14,20 @@ MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 
 class Progress:
     """Loss and PSNR (running means over views), Gaussian count and time left."""
 
-    def __init__(self, total: int, start: int = 0) -> None:
-        self._total, self._start, self._began = total, start, time.monotonic()
-        self._said = self._began
+    def __init__(self, total: int) -> None:
+        self._total, self._start = total, 0
+        self._began = self._said = time.monotonic()
         self._means: dict[str, float] = {}
         self._bar: Any = None
+
+    def begin(self, start: int) -> None:
+        """The training begins after iteration `start`."""
+        self._start = start
+        self._began = self._said = time.monotonic()
         if sys.stderr.isatty():
             from tqdm import tqdm
 
-            self._bar = tqdm(total=total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25)
+            self._bar = tqdm(total=self._total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25)
 
     def update(self, entry: dict[str, Any]) -> None:
         """Take in the log entry of one iteration."""
@@ -60,8 +67,33 @@ class Progress:
         return f"{shown}, {entry.get('gaussians', 0)} Gaussians"
 
 
-def duration(seconds: float) -> str:
-    """1:02:03 or 2:03."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+class StepBar:
+    """A progress bar on a terminal; one line at the beginning elsewhere."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._bar: Any = None
+
+    def __enter__(self) -> "StepBar":
+        return self
+
+    def begin(self, steps: int) -> None:
+        """The number of steps is known."""
+        from tqdm import tqdm
+
+        self._bar = tqdm(total=steps, desc=self._name, disable=None, dynamic_ncols=True)
+        if self._bar.disable:
+            print(f"{self._name}: {steps} steps", flush=True)
+
+    def step(self, count: int = 1) -> None:
+        """So many more are done."""
+        self._bar.update(count)
+
+    def say(self, message: str) -> None:
+        """A line that does not disturb the bar."""
+        self._bar.clear()
+        print(message, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()

@@ -9,14 +9,12 @@ same order: the results are equal bit by bit (tested).
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.deformation import GAUSSIANS_PER_PIECE
 from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, step_factors
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
-
-FloatArray = NDArray[np.floating]
 
 
 def coefficients_adam_step(

@@ -8,14 +8,13 @@ from the numbers just changed: the arrays need not come from memory a second tim
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.equations.deformation import CHANNELS, GAUSSIANS_PER_PIECE, DeformationSaved, add_row, reverse_row
 from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, rate_parts, step_factors
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
-FloatArray = NDArray[np.floating]
 NAMES = ("fdm_weight", "fdm_centre", "fdm_width")
 
 

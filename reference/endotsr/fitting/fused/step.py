@@ -14,6 +14,7 @@ from endotsr.fitting.fused.deformation import NAMES as FDM_FIELDS
 from endotsr.fitting.fused.deformation import deformation_adam_step
 from endotsr.fitting.model import OffsetsAhead, SceneGrads, SceneSaved, Spectral
 from endotsr.kernels.threads import parallel_calls
+from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.render import RenderGrads
 
@@ -28,6 +29,7 @@ def optimise(
     back: SceneGrads,
     rates: dict[str, Rate],
     next_time: float | None = None,
+    timer: Timer = NO_TIMER,
 ) -> OffsetsAhead | None:
     """Change the Gaussians and their moments in place.
 
@@ -36,6 +38,7 @@ def optimise(
     back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
     rates   learning rate of every array
     next_time  normalised time of the next iteration, if it is known
+    timer   told of the stages "FDM" and "Adam"
     returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
     """
     o = config.optimiser
@@ -68,9 +71,9 @@ def optimise(
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
 
     ahead, *_ = parallel_calls(  # arrays of their own; the longest sweep first
-        step_deformation,
-        step_appearance,
-        step_motion,
-        lambda: adam_update(adam, arrays(gaussians), back.by_field, rates, *settings),
+        timed(timer, "FDM", step_deformation),
+        timed(timer, "Adam", step_appearance),
+        timed(timer, "Adam", step_motion),
+        timed(timer, "Adam", lambda: adam_update(adam, arrays(gaussians), back.by_field, rates, *settings)),
     )
     return ahead

@@ -1,30 +1,31 @@
 """The fast path of compositing: the same sums as `compositing`, a block of pixels at a time.
 
-Used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). Reasons, in order of gain:
+It is used where the alpha cutoff bounds each Gaussian and alpha_max < 1 (the `paper` preset). It is fast because, in
+order of gain:
 
 * A Gaussian visits only the blocks that its ellipse alpha >= cutoff touches. A block is 4x4 pixels (4x2 where a vector
   has eight lanes): small Gaussians fill it better than sixteen pixels of one row. The span of each row is widened
-  beyond rounding and every lane tests alpha >= cutoff itself, so no pixel is missed and none too many is drawn.
-* The blocks of a tile that a Gaussian visits are the bits of a word: one loop over all of them. Loops over rows of
-  blocks would end at an unforeseen place once a row.
+  beyond rounding, and every lane tests alpha >= cutoff itself, so no pixel is missed and no superfluous one is blended.
+* The blocks of a tile that a Gaussian visits are the bits of a word, and one loop runs over all of them. Loops over
+  rows of blocks would mispredict a branch at the end of every row.
 * The lane loop is vector code: the pixels of a block stand side by side in flat planes (`compositing_tiles`), never
-  across two cache lines, and what a loop adds up lies in registers of the kernel's own (`vectors`), so that nothing
-  has to be guarded or reloaded.
-* What depends only on the place of a lane and on the row of blocks is formed once a Gaussian (`_lane_tables`).
-* Records are asked for some pairs ahead: depth order is random order in memory, and each would be waited for.
+  across two cache lines, and the sums of a loop are local arrays in registers (`vectors`), which need no guards and no
+  reloads.
+* Terms that depend only on the lane and on the row of blocks are computed once a Gaussian (`_lane_tables`).
+* Records are prefetched some pairs ahead: depth order is random in memory, and each would be a cache miss.
 * log2(opacity) and log2(e) are folded into the exponent: alpha is a bare 2^x.
-* The sign of T, or T = 0, marks a finished pixel; selects, no branches, in the lane loop.
-* The reverse pass replays front to back: what lies behind a pair is <g, image> minus the running sum, one
-  number per pixel, no stored lists. It divides by 1 - alpha >= 1 - alpha_max; the error this
-  costs against the R_i recursion is bounded in tests/splatting.
+* The sign of T, or T = 0, marks a finished pixel: the lane loop has selects and no branches.
+* The reverse pass replays front to back: the contribution behind a pair is <g, image> minus the running sum, one
+  number per pixel, without stored lists. It divides by 1 - alpha >= 1 - alpha_max; tests/splatting bound the error of
+  this division against the R_i recursion.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.exponential import LOG2_E, exp2_nonpositive
 from endotsr.kernels.jit import jit, jit_inline
 from endotsr.kernels.threads import parallel_for
@@ -37,13 +38,17 @@ from endotsr.splatting.fast.tiles import (
     FORWARD_NUMBERS,
     PLANE,
     REVERSE_NUMBERS,
-    TILE_HEIGHT,
-    TILE_WIDTH,
     block_height,
     clear,
     finished,
     read_tile,
     write_tile,
+)
+from endotsr.splatting.fast.tiles import (
+    TILE_HEIGHT as TILE_HEIGHT,
+)
+from endotsr.splatting.fast.tiles import (
+    TILE_WIDTH as TILE_WIDTH,
 )
 from endotsr.splatting.records import (
     BLUE,
@@ -70,14 +75,12 @@ from endotsr.splatting.records import (
 )
 from endotsr.splatting.settings import RasterSettings
 
-FloatArray = NDArray[np.floating]
-
 WORD_ROWS = 64 // BLOCKS_ACROSS  # rows of blocks whose visits are the bits of one word
-E, CENTRE_LINE, DY = 0, 64, 128  # parts of what `_lane_tables` fills, of WORD_ROWS rows of blocks at most
+E, CENTRE_LINE, DY = 0, 64, 128  # offsets of the three tables of `_lane_tables`, for at most WORD_ROWS rows of blocks
 TABLES = 192
-ROUND_UP = 0.999  # to the next column; a little less, so that none is lost to rounding
-BATCH = 32  # pairs between two tests whether the whole tile is finished
-RECORDS_AHEAD = 8  # pairs between asking for a record and using it
+ROUND_UP = 0.999  # to the next column; less than 1, so that no column is lost to rounding
+BATCH = 32  # pairs between two tests of whether the whole tile is finished
+RECORDS_AHEAD = 8  # pairs between the prefetch of a record and its use
 
 _U64 = np.uint64
 
@@ -106,10 +109,10 @@ def _visits(record, top, left, log2_cutoff):
 
     With blocks of four rows the second word stays empty. All rows of the tile at once (vector code).
     The half-width of a row is sqrt(2 ln 2 reach / A), reach = log2(alpha / cutoff) on its centre line, plus a margin
-    beyond rounding, so that no pixel with alpha >= cutoff is missed; a block too many does no harm. Where a huge
+    beyond rounding, so that no pixel with alpha >= cutoff is missed; a superfluous block has no effect. Where a huge
     footprint just reaches a row, the reach is a difference of nearly equal numbers: `faintest` allows for its rounding.
-    A row below the cutoff on its centre line has no pixel above it, rounding included: the rest of the exponent is
-    taken away from that very number.
+    A row below the cutoff on its centre line has no pixel above it, rounding included, because the rest of the exponent
+    is subtracted from the same number.
     """
     real = record.dtype.type
     half, one, zero = real(0.5), real(1), real(0)
@@ -138,9 +141,9 @@ def _visits(record, top, left, log2_cutoff):
 
 
 def _lane_tables(record, top, left, word, tables):
-    """Of each lane of the first block of each row of blocks of a word: e = dx - m dy, log2 alpha at e = 0, dy.
+    """e = dx - m dy, log2 alpha at e = 0, and dy of each lane, for the first block of each row of blocks of a word.
 
-    dy is formed as in `_visits`: where m is large, a rounding of dy is many pixels.
+    dy is computed as in `_visits`: where m is large, a rounding error of dy amounts to many pixels.
     """
     real = record.dtype.type
     half = real(0.5)
@@ -157,7 +160,7 @@ def _lane_tables(record, top, left, word, tables):
 
 
 def _visit(like, word, bit):
-    """Of a visited block: place of its first pixel in a plane, that of its row in the tables, first column."""
+    """For a visited block: offset of its first pixel in a plane, offset of its row in the tables, first column."""
     row, column = bit // _U64(BLOCKS_ACROSS), bit % _U64(BLOCKS_ACROSS)
     many = _U64(lanes(like))
     return (_U64(64 * word) + bit) * many, row * many, like.dtype.type(np.int32(column * _U64(BLOCK_WIDTH)))
@@ -169,7 +172,7 @@ _visit_kernel = jit_inline(_visit)
 
 
 def _record(records, ranks, p, end):
-    """The record of pair p; asks for that of a later pair: depth order is random order in memory."""
+    """The record of pair p, with a prefetch of that of a later pair: depth order is random in memory."""
     if p + RECORDS_AHEAD < end:
         prefetch(records, ranks[p + RECORDS_AHEAD])
     return records[_U64(ranks[p])]
@@ -276,7 +279,7 @@ _blend_block_reverse_kernel = jit_inline(_blend_block_reverse)
 
 
 def _new_sums(like):
-    """One vector for each column of a gradient record; they stay in registers while a Gaussian is replayed."""
+    """One vector for each column of a gradient record. They stay in registers while a Gaussian is replayed."""
     return (
         vector(like), vector(like), vector(like), vector(like), vector(like),
         vector(like), vector(like), vector(like), vector(like), vector(like),
@@ -288,7 +291,7 @@ def _blend_reverse(
     records, starts, ranks, limits, colour, depth, transmittance, d_colour, d_depth, d_opacity,
     pair_gradients,
 ):  # fmt: skip
-    """`d_opacity` has no rows when nothing depends on the opacity image."""
+    """`d_opacity` has no rows when the loss does not depend on the opacity image."""
     real = records.dtype.type
     half, zero = real(0.5), real(0)
     stop, alpha_max = limits[1], limits[2]
@@ -339,8 +342,8 @@ def composite_blocks_forward(
 ) -> tuple[Composite, BlocksSaved]:
     """As `composite_forward`, on tiles of 64x16 pixels; the opacity image is 1 - T (equal to the sum to rounding).
 
-    Edges: within one rounding of the cutoff or the stop the two paths may decide differently; the jump is then
-           at most T alpha |c - behind|, see tests/splatting.
+    Edges: within one rounding of the cutoff or the stop the two paths may decide differently; the difference is
+           then at most T alpha |c - behind|, see tests/splatting.
     """
     dtype = records.dtype
     out = empty_composite(width, height, dtype)
@@ -352,7 +355,7 @@ def composite_blocks_forward(
 def composite_blocks_reverse(
     d_colour: FloatArray, d_depth: FloatArray, d_opacity: FloatArray | None, saved: BlocksSaved
 ) -> FloatArray:
-    """Pair gradients (pairs, 10), as `composite_reverse`; d_opacity None = zero, at no cost."""
+    """Pair gradients (pairs, 10), as `composite_reverse`; d_opacity None = zero, without computation."""
     dtype = saved.records.dtype
     pair_gradients = np.empty((saved.lists.ranks.size, GRADIENT), dtype)
     extra = np.empty((0, 0), dtype) if d_opacity is None else d_opacity

@@ -1,9 +1,9 @@
-"""The tiles of the fast path: a tile of the image as planes of one flat buffer, and the way in and out of it.
+"""The tiles of the fast path: a tile of the image as planes of one flat buffer, and the transfer in and out of it.
 
-The planes of a tile (T, red, ...) stand in one buffer at constant offsets and are indexed with unsigned integers: no
-alias or wrap-around checks, so the loops over pixels become vector code. In a plane the pixels of a block, as many as a
-vector has lanes, stand side by side, row after row of the block; blocks follow one another along a row of blocks.
-A Gaussian across an edge is visited twice, so a tile is wide; a wider one leaves too few tiles to share.
+The planes of a tile (T, red, ...) lie in one buffer at constant offsets. They are indexed with unsigned integers, which
+need no alias or wrap-around checks, so the loops over pixels become vector code. In a plane the pixels of a block, as
+many as a vector has lanes, lie side by side, row after row; blocks follow one another along a row of blocks.
+A Gaussian across an edge is visited twice, so a tile is wide; with wider tiles the threads would have too few of them.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ block_height = jit_inline(_block_height)
 
 
 def _place(like, y, x):
-    """Where the pixel in row y and column x of a tile stands in a plane."""
+    """Offset in a plane of the pixel in row y and column x of a tile."""
     row, column, wide, high = _U64(y), _U64(x), _U64(BLOCK_WIDTH), _U64(block_height(like))
     block = row // high * _U64(BLOCKS_ACROSS) + column // wide
     return block * _U64(lanes(like)) + row % high * wide + column % wide
@@ -54,7 +54,7 @@ finished = jit_inline(_finished)
 
 
 def _clear(buffer, rows, columns):
-    """Every plane 0, and T = 1 in the rows and columns that the image has here."""
+    """Set every plane to 0, and T to 1 in the rows and columns inside the image."""
     zero, one = buffer.dtype.type(0), buffer.dtype.type(1)
     for j in range(buffer.size):
         buffer[_U64(j)] = zero
@@ -67,7 +67,7 @@ clear = jit_inline(_clear)
 
 
 def _write_tile(buffer, top, left, background, colour, depth, opacity, transmittance):
-    """The finished tile to the images, with what shines through: colour + T background."""
+    """Write the finished tile to the images; the background shows through: colour + T background."""
     one = buffer.dtype.type(1)
     red, green, blue = background[0], background[1], background[2]
     for y in range(min(TILE_HEIGHT, depth.shape[0] - top)):
@@ -87,7 +87,7 @@ write_tile = jit(_write_tile, contract=True)
 
 
 def _read_tile(buffer, top, left, colour, depth, transmittance, d_colour, d_depth, d_opacity):
-    """Planes behind = <g, image> and g, in a cleared buffer; `d_opacity` has no rows when nothing depends on it."""
+    """Write behind = <g, image> and g to the planes of a cleared buffer; an unused `d_opacity` has no rows."""
     for y in range(min(TILE_HEIGHT, depth.shape[0] - top)):
         row = _U64(top + y)
         for x in range(min(TILE_WIDTH, depth.shape[1] - left)):

@@ -1,0 +1,41 @@
+"""Generated parts of a page, between marks `<!-- ROOM:NAME:start -->` and `<!-- ROOM:NAME:end -->`.
+
+What lies between two marks is replaced; all words around them are written by hand.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.runs.files import replace_file
+
+
+def write_marked(page: Path, made: Mapping[str, str], room: str) -> None:
+    """Write the page anew with every part between marks of `room` replaced, complete or not at all."""
+    text = replaced(page.read_text(encoding="utf-8"), made, page, room)
+    replace_file(page, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def replaced(text: str, made: Mapping[str, str], page: Path, room: str) -> str:
+    """The text with every part between marks of `room` replaced.
+
+    Raises: InputError naming the page and the mark, if a mark has no end or its name is not among those of `made`.
+    """
+    for name in re.findall(rf"<!-- {room}:(\w+):start -->", text):
+        head, rest = text.split(f"<!-- {room}:{name}:start -->", 1)
+        _, end, tail = rest.partition(f"<!-- {room}:{name}:end -->")
+        if not end or name not in made:
+            raise InputError(f"{page}: mark {room}:{name} has no end or no meaning; allowed: {', '.join(made)}")
+        text = f"{head}<!-- {room}:{name}:start -->\n{made[name]}\n{end}{tail}"
+    return text
+
+
+def read_json(path: Path, made_by: str) -> dict[str, Any]:
+    """A file of results. Raises: InputError naming the file and the command that makes it."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {error}; made by `{made_by}`") from None

@@ -1,0 +1,86 @@
+"""Measure what accuracy costs in time, and write docs/tradeoff.md from it.
+
+    python docs/pages/tradeoff.py render [SPLATS.npz ...]    the simulated scene, then trained scenes
+    python docs/pages/tradeoff.py train SEQUENCE [OPTIONS]   trainings; OPTIONS as of `endotsr tradeoff train`
+    python docs/pages/tradeoff.py                            pictures and page once more from the files
+
+Run it while the machine has nothing else to do. `train` goes on where it was interrupted: its file is kept in
+docs/_build/tradeoff until the study is complete. A SEQUENCE is an EndoNeRF folder or the word `simulated`.
+"""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from marks import read_json, write_marked
+from tradeoff_parts import fragments
+
+from endotsr.cli.main import main as endotsr
+from endotsr.tradeoff.figures import draw
+from endotsr.tradeoff.training_page import draw_training
+
+DOCS = Path(__file__).parents[1]
+PAGE, RESULTS = DOCS / "tradeoff.md", DOCS / "results"
+COMMAND = "python docs/pages/tradeoff.py render"
+WORK = DOCS / "_build" / "tradeoff"
+
+
+def measure(name: str, *words: str) -> None:
+    """One scene to docs/results/NAME.json."""
+    with tempfile.TemporaryDirectory() as folder:
+        if endotsr(["tradeoff", "--out", folder, *words]):
+            sys.exit(1)
+        shutil.copy(Path(folder) / "tradeoff.json", RESULTS / f"{name}.json")
+
+
+def train(sequence: str, words: list[str]) -> None:
+    """One study of training to docs/results/tradeoff_training_NAME.json."""
+    name = Path(sequence).name
+    out = WORK / name
+    if endotsr(["tradeoff", "train", sequence, "--out", str(out), *words]):
+        sys.exit(1)
+    shutil.copy(out / "training.json", RESULTS / f"tradeoff_training_{name}.json")
+    shutil.rmtree(out)
+
+
+def read_scenes() -> dict[str, dict[str, Any]]:
+    """The measurements of trained scenes, by name."""
+    return {name: found for name, found in _read("tradeoff_").items() if not name.startswith("training_")}
+
+
+def read_trainings() -> dict[str, dict[str, Any]]:
+    """The studies of training, by the name of their sequence."""
+    return _read("tradeoff_training_")
+
+
+def _read(start: str) -> dict[str, dict[str, Any]]:
+    """JSON files of docs/results whose names begin so, by the rest of their names."""
+    return {p.stem.removeprefix(start): read_json(p, COMMAND) for p in sorted(RESULTS.glob(f"{start}*.json"))}
+
+
+def write_page() -> None:
+    """The pictures that the page shows, and its generated parts."""
+    result, trainings = read_json(RESULTS / "tradeoff.json", COMMAND), read_trainings()
+    draw(result, RESULTS)
+    for name, study in trainings.items():
+        draw_training(study, RESULTS, f"tradeoff_training_{name}")
+    write_marked(PAGE, fragments(result, read_scenes(), trainings), "tradeoff")
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    if words[:1] == ["render"]:
+        measure("tradeoff")
+        for splats in words[1:]:
+            measure(f"tradeoff_{Path(splats).stem.removesuffix('_splats')}", "--splats", splats)
+    elif words[:1] == ["train"] and len(words) > 1:
+        train(words[1], words[2:])
+    elif words:
+        sys.exit(__doc__)
+    write_page()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

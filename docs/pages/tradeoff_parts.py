@@ -1,0 +1,126 @@
+"""Generated parts of docs/tradeoff.md as Markdown; the input is the JSON of `endotsr tradeoff` and `tradeoff train`."""
+
+from typing import Any
+
+from endotsr.report.tables import markdown
+from endotsr.tradeoff.page import (
+    COLUMNS,
+    advice,
+    certificate_line,
+    eight_bit_setting,
+    error_over_cutoff,
+    float32_floor,
+    front_rows,
+    levels,
+    made,
+    preset_lines,
+)
+from endotsr.tradeoff.settings import OMITTED
+from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_rows
+
+TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
+
+
+def fragments(
+    result: dict[str, Any], others: dict[str, dict[str, Any]], trainings: dict[str, dict[str, Any]]
+) -> dict[str, str]:
+    """Every generated part by name; a part without its measurement says so.
+
+    result      tradeoff.json of the simulated scene
+    others      the same of trained real scenes, by name
+    trainings   training.json by name
+    """
+    omitted = result["omitted"] | OMITTED  # reasons are facts of the present program, not of the measurement
+    return {
+        "advice": _numbered(advice(result)),
+        "made": made(result),
+        "front": markdown(COLUMNS, front_rows(result)),
+        "presets": _bullets(preset_lines(result)),
+        "certificate": certificate_line(result),
+        "omitted": _bullets([f"{what}: {why}." for what, why in omitted.items()]),
+        "scenes": scenes(result, others),
+        "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
+    }
+
+
+def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The advice of the simulated scene, checked on every other."""
+    columns = (
+        "Scene",
+        "Gaussians",
+        "`paper`: RMS",
+        "`paper`: largest",
+        "error over cutoff, at most",
+        "float32 ends at",
+        "8-bit setting: largest",
+        "its visits",
+        "verdict",
+    )
+    rows = [_scene_row(result, result), *(_scene_row(other, result) for other in others.values())]
+    about = [f"`{name}`: {made(other)} {certificate_line(other)}" for name, other in others.items()]
+    return "\n\n".join([markdown(columns, rows), _bullets(about)]) if others else "Not measured yet."
+
+
+def _scene_row(scene: dict[str, Any], simulated: dict[str, Any]) -> list[str]:
+    by_name = {p["name"]: p for p in scene["points"]}
+    paper = by_name[scene["presets"]["paper"]]
+    advised = eight_bit_setting(simulated)
+    here = by_name.get(advised["name"]) if advised else None
+    row = [scene["scene"]["name"], str(scene["scene"]["gaussians"]), levels(paper["error"]["rms"])]
+    row += [levels(paper["error"]["max"]), f"{error_over_cutoff(scene):.1f}", levels(float32_floor(scene))]
+    if here is None:
+        return [*row, "-", "-", "no such setting"]
+    ratio = f"{here['visits'] / paper['visits']:.1f}x"
+    return [*row, levels(here["error"]["max"]), ratio, _verdict(scene, paper, here)]
+
+
+def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any]) -> str:
+    """Whether the first two sentences of advice hold on a scene, and if not, what to do there."""
+    wrong = []
+    if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
+        wrong.append("`paper` errs by more than half a step of 8 bit on average")
+    if here["error"]["max"] > scene["lines"]["eight_bit"]:
+        better = eight_bit_setting(scene)
+        instead = f"take {better['name']}" if better else "no float32 setting keeps it"
+        wrong.append(f"the 8-bit setting misses half a step: {instead}")
+    return "holds" if not wrong else "does not hold: " + "; ".join(wrong)
+
+
+def training(name: str, result: dict[str, Any]) -> str:
+    """One study of training: what was run, its pictures, the table, and what each stretch of time bought."""
+    m = result["machine"]
+    head = (
+        f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
+        f"`{result['preset']}` stretched to {result['iterations']} iterations, measured {result['date'][:10]} on "
+        f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
+    )
+    left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
+    stem = f"results/tradeoff_training_{name}"
+    pictures = [
+        f"![Held-out PSNR against minutes of training]({stem}.svg)",
+        f"![All metrics against minutes of training]({stem}_seconds.svg)",
+        f"![All metrics against iterations]({stem}_iterations.svg)",
+    ]
+    bought = gain_by_minute(best_by_time(result))
+    return "\n\n".join(
+        part
+        for part in (
+            head,
+            pictures[0],
+            markdown(TRAINING_COLUMNS, training_rows(result)),
+            _bullets(summary(result)),
+            "Which minute bought how many decibels, whatever the training:" if bought else "",
+            _bullets(bought),
+            _bullets(left),
+            *pictures[1:],
+        )
+        if part
+    )
+
+
+def _numbered(sentences: list[str]) -> str:
+    return "\n".join(f"{i}. {sentence}" for i, sentence in enumerate(sentences, 1))
+
+
+def _bullets(lines: list[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)

@@ -1,0 +1,385 @@
+"""The Python interface: load a sequence, train, render, measure, save, open.
+
+    import endotsr
+    sequence = endotsr.load_sequence("my_sequence", scale=0.5)
+    run = endotsr.train(sequence, preset="paper", iterations=2000)
+    view = run.render(time=0.37)
+    metrics = run.evaluate()
+    run.save("runs/mine")
+    run = endotsr.open_run("runs/mine")
+
+Every function calls the code that the command of the same purpose calls, so that the numbers are the same, bit for
+bit: `train` those of `endotsr train`, `Run.render` those of `endotsr render`, `Run.evaluate` those of
+`endotsr evaluate`. A run folder that `Run.save` writes is one that the commands read, and the reverse.
+
+Import the names from `endotsr` itself; `endotsr.__all__` lists those that are stable. Input that cannot be used is an
+`InputError` that names the argument and the allowed values.
+"""
+
+import shutil
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from numbers import Integral
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import msgspec
+
+from endotsr.config import (
+    PAPER,
+    Config,
+    SequenceConfig,
+    checked,
+    config_from_dict,
+    read_toml,
+    refuse_unknown_keys,
+    with_iterations,
+)
+from endotsr.errors import InputError
+from endotsr.fitting.model import render_at
+from endotsr.runs import folder as run_folders
+from endotsr.runs import sources
+from endotsr.runs.log import RunLog
+from endotsr.runs.machine import now, peak_memory_bytes
+from endotsr.runs.model import Model, load_model, load_training, save_training
+from endotsr.runs.record import new_record
+from endotsr.sequences.sequence import Sequence
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderOut
+
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
+
+Component = Literal["appearance", "spectral_motion"]
+RENDERING = ("names", "times", "train_index", "cameras", "static_camera")  # keys of sequence.json that it reads
+COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
+OnIteration = Callable[[dict[str, Any]], object]
+OnMessage = Callable[[str], object]
+
+
+class StopTraining(Exception):
+    """Raised by an `on_iteration` callback: the training ends after this iteration, and the run is returned."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedSequence(Sequence):
+    """A sequence of `load_sequence`, with the source and the settings that a run folder records."""
+
+    source: str = sources.IN_MEMORY  # folder, or `simulated`
+    settings: SequenceConfig = PAPER.sequence
+    simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
+
+
+def make_config(
+    preset: str | None = None,
+    *,
+    file: str | Path | None = None,
+    iterations: int | None = None,
+    **sections: Mapping[str, Any],
+) -> Config:
+    """All settings of a run: preset, then TOML file, then `iterations`, then the sections.
+
+    preset       paper (default), sharp or demo
+    file         TOML file, as `endotsr train --config`
+    iterations   length of the run; every milestone keeps its fraction of the run. training={"iterations": n} changes
+                 the length and leaves the milestones where they are
+    sections     changes by section: model={"appearance": False}, training={"seed": 3, "threads": 2}
+
+    Raises: InputError naming the file or the key, the value and what is allowed.
+    """
+    data = read_toml(Path(file)) if file is not None else {}
+    if preset is not None:
+        data = data | {"preset": preset}
+    return _changed(config_from_dict(data, str(file or "configuration")), iterations, sections)
+
+
+def load_sequence(
+    source: str | Path,
+    config: Config | None = None,
+    *,
+    simulator: Mapping[str, Any] | None = None,
+    **settings: Any,
+) -> LoadedSequence:
+    """The whole sequence in memory, fully checked.
+
+    source      EndoNeRF folder, or the word "simulated"
+    config      settings to start from (section `sequence`, and the near plane); default: preset `paper`
+    simulator   settings of "simulated": {"frames": 16, "width": 96, "pull": {"on": False}}
+    settings    keys of the section `sequence`: scale=0.5, frames="0:60", masks="gt_masks", split="blocks"
+
+    returns     images (n, 3, H, W) uint8; masks (n, H, W), True = tissue; depth (n, H, W) in scene units, 0 = none;
+                times (n,) in [0, 1); cameras, split, and notes that state what was assumed
+
+    Raises: InputError naming the file, the frame or the key, and what is allowed.
+    """
+    config = _changed(PAPER if config is None else config, None, {"sequence": settings})
+    wanted = dict(simulator or {})
+    refuse_unknown_keys(wanted, SimulatorSettings, "simulator")
+    shown = checked(wanted, SimulatorSettings, "simulator")
+    sequence = sources.load_sequence(str(source), config, shown)
+    arrays = {entry.name: getattr(sequence, entry.name) for entry in fields(Sequence) if entry.init}
+    return LoadedSequence(**arrays, source=str(source), settings=config.sequence, simulator=shown)
+
+
+def train(
+    sequence: Sequence,
+    config: Config | None = None,
+    *,
+    preset: str | None = None,
+    iterations: int | None = None,
+    on_iteration: OnIteration | None = None,
+    on_message: OnMessage = print,
+    **sections: Mapping[str, Any],
+) -> "Run":
+    """Train on a sequence; returns the trained run. The numbers are those of `endotsr train` with these settings.
+
+    sequence       from `load_sequence`, whose settings apply; or a `Sequence` made of arrays
+    config         from `make_config`; without it, preset, iterations and sections make the settings as there.
+                   With it, iterations and sections change it
+    on_iteration   called after every iteration with its log entry: iteration, frame, loss, the terms of the loss,
+                   gaussians, seconds, and every tenth time psnr. `raise StopTraining` in it ends the training. What it
+                   returns is ignored
+    on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
+
+    The number of kernel threads of the calling thread is set to `training.threads` (0 = all cores).
+    A KeyboardInterrupt ends the training at once, without a run; `StopTraining` keeps it.
+    Raises: InputError for settings or a sequence that cannot be used; FloatingPointError naming iteration, frame and
+            terms if the loss is not finite; CalibrationError if equation (7) has no answer.
+    """
+    from endotsr.fitting.state import new_training
+    from endotsr.kernels.threads import use_threads
+
+    if not isinstance(sequence, Sequence):
+        raise InputError(f"train: sequence is {type(sequence).__name__}; allowed: a Sequence, as from load_sequence")
+    if config is None:
+        config = make_config(preset, file=None, iterations=iterations, **sections)
+    elif preset is not None:
+        raise InputError(f"train: preset = {preset!r} beside a config is not allowed; allowed: one of the two")
+    else:
+        config = _changed(config, iterations, sections)
+    loaded = isinstance(sequence, LoadedSequence)
+    source, simulator = (sequence.source, sequence.simulator) if loaded else (sources.IN_MEMORY, SimulatorSettings())
+    if loaded:
+        config = msgspec.structs.replace(config, sequence=sequence.settings)
+    state = new_training(sequence, config)
+    about = sources.input_record(source, sequence, config, simulator)
+    threads = use_threads(config.training.threads)
+    record = new_record(["endotsr.train"], config, threads, about)
+    run = Run(config, record, sources.sequence_record(sequence), [], _sequence=sequence, _state=state)
+    return run.resume(on_iteration, on_message)
+
+
+def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
+    """The run of a run folder at its latest checkpoint, whether a command or `Run.save` wrote it.
+
+    sequence   where the sequence of the run is now; default: where it was. It is read when it is needed first
+
+    Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
+    """
+    from endotsr.report.curves import read_log
+
+    folder = run_folders.open_run(Path(path))
+    model = load_model(folder)
+    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= model.iteration]
+    opened = Run(model.config, folder.record(), folder.sequence_record(*RENDERING), log)
+    opened._model, opened._folder = model, folder
+    opened._source = None if sequence is None else str(sequence)
+    return opened
+
+
+@dataclass(eq=False, repr=False)
+class Run:
+    """A model with its settings, its log and the sequence it was trained on. Made by `train` and `open_run`."""
+
+    config: Config  # all settings
+    record: dict[str, Any]  # what run.json holds: versions, machine, input hashes, status, seconds
+    sequence_record: dict[str, Any]  # what sequence.json holds: times, names, split, cameras
+    log: list[dict[str, Any]]  # one entry an iteration, as the lines of log.jsonl
+    _sequence: Sequence | None = None
+    _state: "TrainingState | None" = None
+    _model: Model | None = None
+    _folder: run_folders.RunFolder | None = None
+    _source: str | None = None
+
+    def __repr__(self) -> str:
+        planned = self.config.training.iterations
+        return f"Run(iteration {self.model.iteration} of {planned}, {self.model.gaussians.count} Gaussians)"
+
+    @property
+    def model(self) -> Model:
+        """Gaussians, spectral constants, settings and iteration: all that rendering reads."""
+        if self._model is None:
+            self._model = self._model_of(self._training())
+        return self._model
+
+    @property
+    def iteration(self) -> int:
+        """Completed iterations."""
+        return self.model.iteration
+
+    @property
+    def sequence(self) -> Sequence:
+        """The sequence the run was trained on. An opened run reads it at the first access.
+
+        Raises: InputError if it cannot be found or is not the one that the run was trained on.
+        """
+        if self._sequence is None:
+            assert self._folder is not None
+            self._sequence = sources.load_run_sequence(self._folder, self._source)
+        return self._sequence
+
+    def render(
+        self, time: float, camera: Camera | int | None = None, *, without: tuple[Component, ...] = ()
+    ) -> RenderOut:
+        """Colour (3, H, W) in display units, depth (H, W) in scene units and opacity (H, W) in [0, 1].
+
+        time      normalised, in [0, 1]; frame i of n is at i / n
+        camera    a Camera, or the number of the frame whose camera is meant; default: the frame nearest in time
+        without   spectral components to leave out of the picture: "appearance", "spectral_motion"
+
+        Depth is view-space z, not normalised by opacity. Colour is not clipped to [0, 1].
+        Raises: InputError for a time, frame or component that does not exist.
+        """
+        if not 0.0 <= time <= 1.0:
+            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
+        for name in without:
+            if name not in COMPONENTS:
+                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
+        model = self.model
+        return render_at(
+            model.gaussians,
+            model.spectral,
+            model.config,
+            self._camera(time, camera),
+            float(time),
+            frames=model.frames,
+            appearance="appearance" not in without,
+            spectral_motion="spectral_motion" not in without,
+        )
+
+    def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
+        """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
+
+        lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
+        returns   the keys of metrics.json that `evaluate_model` lists. For example
+                  result["held_out"]["mean"]["psnr_tissue"], in dB; a metric without a finite value is None
+
+        Raises: InputError if the sequence or the weights cannot be used.
+        """
+        from endotsr.evaluation.evaluate import evaluate_model
+        from endotsr.evaluation.lpips import load_lpips_weights
+
+        weights = load_lpips_weights(None if lpips is None else Path(lpips))
+        sequence = self.sequence
+
+        def render_frame(index: int):
+            return self.render(float(sequence.times[index]), sequence.cameras[index]).colour
+
+        return evaluate_model(sequence, render_frame, weights)
+
+    def resume(self, on_iteration: OnIteration | None = None, on_message: OnMessage = print) -> "Run":
+        """Train on to the planned number of iterations; returns this run. A finished run stays as it is.
+
+        The result is that of an uninterrupted training, bit for bit. Callbacks and errors are those of `train`.
+        """
+        from endotsr.fitting.compile_ahead import compile_ahead
+        from endotsr.fitting.trainer import train as train_to_the_end
+        from endotsr.kernels.threads import use_threads
+
+        state, sequence = self._training(), self.sequence
+        threads = use_threads(self.config.training.threads)
+        if 0 < state.iteration < self.config.training.iterations:
+            entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
+            self.record["resumed"] = [*self.record.get("resumed", []), entry]
+        self.record["threads"], before = threads, self.record.get("seconds") or 0.0
+        began = last = clock.monotonic()
+
+        def each(entry: dict[str, Any]) -> None:
+            nonlocal last
+            tick = clock.monotonic()
+            self.log.append(entry | {"seconds": round(tick - last, 5)})
+            last = tick
+            if on_iteration is not None:
+                on_iteration(self.log[-1])
+
+        try:
+            compile_ahead(self.config, on_message)
+            train_to_the_end(state, sequence, self.config, each, lambda _: None, on_message=on_message)
+        except StopTraining:
+            pass
+        finally:
+            self._model = None
+            seconds = before + clock.monotonic() - began
+            self.record |= self._reached(state) | {"seconds": round(seconds, 2)}
+        return self
+
+    def save(self, path: str | Path) -> Path:
+        """Write a run folder that `open_run` and the commands read; returns its path.
+
+        The folder holds the settings, the log, the checkpoint and the records. `endotsr evaluate` adds the metrics, the
+        renders and the report to it, and `endotsr train --resume` continues it.
+        Raises: InputError if something exists at `path` or the file system refuses.
+        """
+        state = self._training()
+        folder = run_folders.create_run(Path(path), self.config, self.record, self.sequence_record)
+        try:
+            log = RunLog(folder.log, 0)
+            for entry in self.log:
+                log.append(entry)
+            log.close()
+            save_training(folder, state, self.config)
+        except BaseException:
+            shutil.rmtree(folder.path, ignore_errors=True)
+            raise
+        return folder.path
+
+    def _training(self) -> "TrainingState":
+        state = self._state
+        if state is None:
+            assert self._folder is not None
+            state = self._state = load_training(self._folder, self.config)
+        return state
+
+    def _model_of(self, state: "TrainingState") -> Model:
+        import numpy as np
+
+        from endotsr.fitting.model import spectral_from
+
+        times = np.asarray(self.sequence_record["times"])[self.sequence_record["train_index"]]
+        return Model(state.gaussians, spectral_from(self.config.model, times), self.config, state.iteration)
+
+    def _reached(self, state: "TrainingState") -> dict[str, Any]:
+        finished = state.iteration >= self.config.training.iterations
+        return {
+            "status": "finished" if finished else "interrupted",
+            "finished": (self.record.get("finished") or now()) if finished else None,
+            "iterations_done": state.iteration,
+            "lambda_lap": state.lambda_lap,
+            "peak_memory_bytes": peak_memory_bytes(),
+        }
+
+    def _camera(self, time: float, camera: Camera | int | None) -> Camera:
+        if isinstance(camera, Camera):
+            return camera
+        cameras = sources.remembered_cameras(self.sequence_record)
+        if camera is None:
+            return cameras[sources.nearest_frame(self.sequence_record["times"], time)]
+        if not isinstance(camera, Integral) or not 0 <= int(camera) < len(cameras):
+            allowed = f"a Camera, or a frame from 0 to {len(cameras) - 1}"
+            raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
+        return cameras[int(camera)]
+
+
+def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapping[str, Any]]) -> Config:
+    """The settings with the schedule stretched to `iterations` and the sections changed, all checked."""
+    if iterations is not None:
+        if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
+            raise InputError(f"iterations = {iterations!r} is not allowed; allowed: an integer >= 1")
+        config = with_iterations(config, iterations)
+    data = msgspec.to_builtins(config)
+    for section, values in sections.items():
+        known = data.get(section)
+        data[section] = known | dict(values) if isinstance(known, dict) and isinstance(values, Mapping) else values
+    return config_from_dict(data, "arguments")

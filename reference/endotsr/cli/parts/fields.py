@@ -1,0 +1,166 @@
+"""The options of a command, listed from the typed class that holds them.
+
+In: a dataclass whose fields are options or sections of settings (msgspec structures). Out: one `Field` for each option
+and positional argument, with name, type, default and help. The help of a field is the docstring below it, which is
+read from the source of its module by `ast`. This module does not read a command line; see parser.py.
+"""
+
+import ast
+import dataclasses
+import inspect
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+REQUIRED: Any = dataclasses.MISSING  # the default of an option that must be given
+METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a field appears on the command line, beside its type: `Annotated[Path, Option("RUN", positional=True)]`."""
+
+    metavar: str = ""  # the value in the help; empty = derived from the type
+    positional: bool = False  # given without a name
+    flat: bool = False  # a section of settings whose keys are options without the name of the field in front
+
+
+@dataclass(frozen=True)
+class Field:
+    """One option or positional argument of a command."""
+
+    path: tuple[str, ...]  # attributes from the options class down to the value
+    name: str  # `--model.frequency-max`; the metavar of a positional argument
+    kind: Any  # type of the value, limits of a number included
+    default: Any  # REQUIRED without one
+    help: str
+    section: type | None  # the settings it belongs to; None outside of a section
+    metavar: str
+    positional: bool
+
+    @property
+    def switch(self) -> bool:
+        """Whether the option is true or false and takes no value."""
+        return self.kind is bool
+
+    @property
+    def off(self) -> str:
+        """The option that switches a switch off: `--model.no-appearance`."""
+        section, dot, key = self.name.removeprefix("--").rpartition(".")
+        return f"--{section}{dot}no-{key}"
+
+    @property
+    def key(self) -> str:
+        """The name as a key of a settings file: `model.frequency_max`."""
+        return self.name.removeprefix("--").replace("-", "_")
+
+    @property
+    def count(self) -> int | str:
+        """The number of values: 1, a fixed number n, or "*"."""
+        if get_origin(self.kind) is not tuple:
+            return 1
+        return "*" if get_args(self.kind)[-1] is Ellipsis else len(get_args(self.kind))
+
+    @property
+    def item(self) -> Any:
+        """The type of one value."""
+        return self.kind if self.count == 1 else get_args(self.kind)[0]
+
+
+def fields_of(options: type, default: Any = None) -> list[Field]:
+    """Every option and positional argument of a class of options, with the values of `default` if it is given."""
+    return list(_walk(options, default, (), "", None))
+
+
+def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: type | None) -> Iterator[Field]:
+    texts = _attribute_docstrings(kind)
+    for name, annotated, fallback in _declared(kind):
+        note, plain = _split_note(annotated)
+        value = fallback if values is None else getattr(values, name)
+        if is_section(plain):
+            inner = prefix if note.flat else f"{prefix}{name}."
+            yield from _walk(plain, value, (*path, name), inner, plain)
+        else:
+            yield Field(
+                path=(*path, name),
+                name=note.metavar if note.positional else f"--{prefix}{name}".replace("_", "-"),
+                kind=plain,
+                default=value,
+                help=texts.get(name, ""),
+                section=section,
+                metavar=note.metavar or _metavar(plain),
+                positional=note.positional,
+            )
+
+
+def is_section(kind: Any) -> bool:
+    """Whether a type is a section of settings."""
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+def _declared(kind: type) -> list[tuple[str, Any, Any]]:
+    """Name, annotated type and default of every field, in the order of their declaration."""
+    if is_section(kind):
+        return [(f.name, f.type, f.default) for f in msgspec.structs.fields(kind)]
+    hints = get_type_hints(kind, include_extras=True)
+    return [(f.name, hints[f.name], f.default) for f in dataclasses.fields(kind)]
+
+
+def _split_note(annotated: Any) -> tuple[Option, Any]:
+    """The `Option` of an annotated type (the default one without), and the type without it."""
+    if get_origin(annotated) is not Annotated:
+        return Option(), annotated
+    plain, *notes = get_args(annotated)
+    option = next((note for note in notes if isinstance(note, Option)), Option())
+    others = [note for note in notes if not isinstance(note, Option)]
+    return option, Annotated[(plain, *others)] if others else plain
+
+
+def _metavar(kind: Any) -> str:
+    """What stands for the value in the help: `FLOAT`, `{quartic,gaussian}`, `{FLOAT,auto}`, `INT ...`."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _metavar(arguments[0])
+    if origin is Literal:
+        return "{" + ",".join(map(str, arguments)) + "}"
+    if origin in (Union, UnionType):
+        parts = [_metavar(part).strip("{}") for part in arguments if part is not NoneType]
+        choices = len(parts) > 1 or any(get_origin(part) is Literal for part in arguments)
+        return "{" + ",".join(parts) + "}" if choices else parts[0]
+    if origin is tuple:
+        return f"{_metavar(arguments[0])} ..." if arguments[-1] is Ellipsis else " ".join(map(_metavar, arguments))
+    return METAVARS.get(kind, "PATH")
+
+
+def _attribute_docstrings(kind: type) -> dict[str, str]:
+    """Name of a field -> the docstring below it, those of base classes included."""
+    texts: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if base.__module__.startswith("endotsr."):
+            texts |= _docstrings_of_module(base.__module__).get(base.__name__, {})
+    return texts
+
+
+@cache
+def _docstrings_of_module(name: str) -> dict[str, dict[str, str]]:
+    """Class -> field -> docstring, of all classes of a module."""
+    tree = ast.parse(inspect.getsource(sys.modules[name]))
+    return {
+        node.name: {
+            field.target.id: " ".join(below.value.value.split())
+            for field, below in pairwise(node.body)
+            if isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(below, ast.Expr)
+            and isinstance(below.value, ast.Constant)
+            and isinstance(below.value.value, str)
+        }
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }

@@ -1,0 +1,182 @@
+"""From the words of a command line to the typed options of a command.
+
+argparse splits the words into options, values and positional arguments; the types of the options class convert the
+values, and msgspec checks the sections of settings. A mistake is an InputError of one line that names the option and
+what is allowed; no text of argparse is shown or read.
+"""
+
+import argparse
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+
+import msgspec
+
+from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
+from endotsr.cli.parts.help_page import help_page, terminal_width
+from endotsr.cli.parts.mistakes import unknown_word
+from endotsr.config import allowed_values, checked
+from endotsr.errors import InputError
+
+T = TypeVar("T")
+SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
+
+
+def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
+    """The options of one command, over the values of `default` if it is given.
+
+    `--help` prints them and leaves with SystemExit(0).
+
+    Raises:  InputError for an unknown option, a value of the wrong type or range, and a missing option.
+    """
+    fields = fields_of(options, default)
+    if {"-h", "--help"} & set(words):
+        print(help_page(options, fields, command, terminal_width()), end="")
+        raise SystemExit(0)
+    given, unknown = _given(fields, words)
+    if unknown:
+        raise unknown_word(fields, unknown, command)
+    missing = [f for f in fields if f.default is REQUIRED and f.path not in given]
+    if missing:
+        names = ", ".join(f.name if f.positional else f"{f.name} {f.metavar}" for f in missing)
+        raise InputError(f"{command}: missing: {names}; `endotsr {command} --help` lists the options")
+    return _built(options, fields, given, default)
+
+
+def parse_known(options: type[T], words: list[str]) -> T:
+    """These options alone, out of words that hold others too. Raises InputError for a value that is not allowed."""
+    fields = fields_of(options)
+    return _built(options, fields, _given(fields, words)[0], None)
+
+
+def _given(fields: list[Field], words: list[str]) -> tuple[dict[tuple[str, ...], Any], list[str]]:
+    """Path -> converted value of every option that was given, and the words that belong to none."""
+    by_path = {".".join(field.path): field for field in fields}
+    parser = _parser(fields)
+    try:
+        found, unknown = parser.parse_known_intermixed_args(_plain_words(fields, words))
+    except argparse.ArgumentError as error:  # the only one that remains: too few values
+        field = next(f for f in fields if f.name == error.argument_name)
+        raise InputError(f"{field.name}: missing value {field.metavar}") from None
+    given = {field.path: _value(field, vars(found)[path]) for path, field in by_path.items() if path in vars(found)}
+    return given, unknown
+
+
+def _parser(fields: list[Field]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        add_help=False, allow_abbrev=False, exit_on_error=False, argument_default=argparse.SUPPRESS
+    )
+    for field in fields:
+        path = ".".join(field.path)
+        if field.positional:
+            parser.add_argument(path, nargs="?" if field.count == 1 else "*")
+        elif field.switch:
+            parser.add_argument(field.name, dest=path, action="store_true")
+            parser.add_argument(field.off, dest=path, action="store_false")
+        else:
+            parser.add_argument(field.name, dest=path, nargs=None if field.count == 1 else field.count)
+    return parser
+
+
+def _plain_words(fields: list[Field], words: list[str]) -> list[str]:
+    """The words as argparse takes them: names with `-` for `_`, and every switch as `--name` or `--no-name`.
+
+    `--model.appearance false` becomes `--model.no-appearance`, as a settings file would say it, and `--x -1e-3`
+    becomes `--x=-1e-3`, because argparse would read the number as an option. Raises InputError for `--switch=other`.
+    """
+    by_name = {field.name: field for field in fields if not field.positional}
+    out: list[str] = []
+    for word in words:
+        name, equals, value = word.partition("=")
+        name = name.replace("_", "-") if name.startswith("--") else name
+        before = by_name.get(out[-1]) if out else None
+        if equals and name in by_name and by_name[name].switch:
+            out.append(_switched(by_name[name], value))
+        elif before and before.switch and word.lower() in SWITCH_WORDS:
+            out[-1] = _switched(before, word)
+        elif before and not before.switch and before.count == 1 and _is_negative(word):
+            out[-1] += f"={word}"
+        else:
+            out.append(name + equals + value)
+    return out
+
+
+def _switched(switch: Field, value: str) -> str:
+    if value.lower() not in SWITCH_WORDS:
+        raise _refused(switch, value)
+    return switch.name if SWITCH_WORDS[value.lower()] else switch.off
+
+
+def _is_negative(word: str) -> bool:
+    try:
+        return word.startswith("-") and isinstance(float(word), float)
+    except ValueError:
+        return False
+
+
+def _value(field: Field, found: Any) -> Any:
+    """What argparse found for an option (words, or True or False for a switch), in the type of the option."""
+    if field.switch:
+        return found
+    words = [found] if field.count == 1 else found
+    values = []
+    for word in words:
+        try:
+            values.append(converted(field.item, word))
+        except ValueError:
+            raise _refused(field, word) from None
+    return values[0] if field.count == 1 else tuple(values)
+
+
+def converted(kind: Any, word: str) -> Any:
+    """A word as a value of a type, limits not checked. Raises ValueError if it is none."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return converted(arguments[0], word)
+    if origin is Literal:
+        if word not in map(str, arguments):
+            raise ValueError(word)
+        return next(choice for choice in arguments if str(choice) == word)
+    if origin in (Union, UnionType):
+        for part in arguments:
+            try:
+                return converted(part, word)
+            except ValueError:
+                continue
+        raise ValueError(word)
+    if kind is NoneType:
+        raise ValueError(word)
+    return kind(word)
+
+
+def _refused(field: Field, word: str) -> InputError:
+    allowed = allowed_values(field.item)
+    if "." in field.name:
+        return InputError(f"command line: {field.key} = {word!r} is not allowed; allowed: {allowed}")
+    return InputError(f"{field.name} {word!r} is not allowed; allowed: {allowed}")
+
+
+def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:
+    """The options with the given values over the defaults; sections that changed are checked."""
+    values: dict[str, Any] = {} if default is None else dict(vars(default))
+    sections: dict[str, dict[str, Any]] = {}
+    for path, value in given.items():
+        if len(path) == 1:
+            values[path[0]] = value
+        else:
+            _put(sections.setdefault(path[0], {}), path[1:], value)
+    for name, changes in sections.items():
+        start = values.get(name, getattr(options, name))
+        flat = any(field.path[0] == name and not field.key.startswith(f"{name}.") for field in fields)
+        data = _merged(msgspec.to_builtins(start), changes)
+        values[name] = checked(data, type(start), "command line", "" if flat else f"{name}.")
+    return options(**values)
+
+
+def _put(tree: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
+    for name in path[:-1]:
+        tree = tree.setdefault(name, {})
+    tree[path[-1]] = value
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    return base | {k: _merged(base[k], v) if isinstance(v, dict) else v for k, v in changes.items()}

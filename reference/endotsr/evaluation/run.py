@@ -1,0 +1,83 @@
+"""The evaluation of a trained run: its renders against every frame, beside the baselines, as metrics.json.
+
+In: a model, the sequence that it was trained on, and run.json. Out: the dictionary of metrics.json (metrics of the
+frames, components taken out, published figures, what the numbers belong to) and the renders of the held-out frames.
+Writes nothing.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
+from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.fitting.model import render_at, without
+from endotsr.runs.model import Model
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.render import RenderOut
+
+PUBLISHED = {
+    "pulling": {
+        "label": "Endo-TSR as published, EndoNeRF pulling",
+        "psnr_full": 39.34,
+        "ssim_full": 0.967,
+        "lpips": 0.035,
+    }
+}
+COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, translation residual"}
+KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
+
+Render = Callable[..., RenderOut]
+
+
+def measure_run(
+    model: Model,
+    sequence: Sequence,
+    record: dict[str, Any],
+    weights: LpipsWeights | None = None,
+    published: tuple[dict[str, Any], ...] = (),
+) -> tuple[dict[str, Any], dict[int, RenderOut]]:
+    """metrics.json of a model, and the renders of the held-out frames by frame number.
+
+    record       run.json of the run
+    weights      None: the LPIPS values are None
+    published    rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
+    """
+
+    def render(index: int, taken_out: str = "") -> RenderOut:
+        shown = without(model.gaussians, **({taken_out: False} if taken_out else {}))
+        camera, time = sequence.cameras[index], float(sequence.times[index])
+        return render_at(shown, model.spectral, model.config, camera, time, frames=model.frames)
+
+    held_out = {int(i): render(int(i)) for i in sequence.test_index}
+    metrics = evaluate_model(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
+    metrics["components"] = _components(model, sequence, render, metrics["held_out"]["mean"])
+    metrics["published"] = list(published)
+    metrics["run"] = _about_run(record, model)
+    return metrics, held_out
+
+
+def _components(model: Model, sequence: Sequence, render: Render, full: dict[str, Any]) -> list[dict[str, Any]]:
+    """Held-out means with one spectral component taken out of the trained model, for those it has."""
+    rows = [{"label": "the whole model", **full}]
+    arrays = {
+        "appearance": model.gaussians.appearance_coefficients,
+        "spectral_motion": model.gaussians.motion_coefficients,
+    }
+    for name, label in COMPONENTS.items():
+        if arrays[name] is not None:
+            partial = evaluate_frames(sequence, sequence.test_index, lambda i, n=name: render(i, n).colour)
+            rows.append({"label": f"rendered without {label}", **partial.mean})
+    return rows
+
+
+def _about_run(record: dict[str, Any], model: Model) -> dict[str, Any]:
+    """What the numbers belong to: enough for metrics.json to stand alone."""
+    about = {
+        "iteration": model.iteration,
+        "iterations_planned": model.config.training.iterations,
+        "status": record.get("status"),
+        "gaussians": model.gaussians.count,
+    }
+    return about | {key: record.get(key) for key in (*KEPT, "input")} | {"settings": msgspec.to_builtins(model.config)}

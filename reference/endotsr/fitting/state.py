@@ -1,0 +1,135 @@
+"""What a training is made of: the state that it carries along, and the workshop of constants around it.
+
+`TrainingState` is all that a run carries from one iteration to the next and, but for `ahead`, which is then computed
+anew, all that a checkpoint holds. Everything else (targets, atoms, rates) is a function of the state, the sequence and
+the configuration. So a resumed run equals an uninterrupted one bit by bit. This module computes no gradient.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from endotsr.config import Config
+from endotsr.fitting.adam import AdamState, adam_state
+from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
+from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
+from endotsr.fitting.objective import Targets, frame_targets
+from endotsr.kernels.memory import keep_freed_memory
+from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.initialisation import initialise
+from endotsr.scene.parameters import FrameParameters, frame_parameters, trained
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.render import check_finite
+
+
+@dataclass
+class TrainingState:
+    """Everything that a run carries from one iteration to the next."""
+
+    gaussians: Gaussians
+    adam: AdamState  # moments of the Gaussians' arrays and of the trained arrays of `frames`
+    iteration: int  # completed iterations
+    rng: np.random.Generator
+    statistics: DensityStatistics
+    lambda_lap: float | None  # full detail weight; None until an `auto` weight is calibrated
+    frames: FrameParameters | None = None  # parameters that are not per Gaussian; None if the model has none
+    ahead: OffsetsAhead | None = None  # taken while the FDM was changed; not part of a checkpoint
+
+
+@dataclass
+class Workshop:
+    """What an iteration needs beside the state: functions of the sequence and the configuration."""
+
+    sequence: Sequence
+    config: Config
+    spectral: Spectral
+    extent: float
+    targets: dict[int, Targets]  # by frame, filled at first use
+
+    def targets_of(self, index: int) -> Targets:
+        """The loss targets of a frame, made once."""
+        if index not in self.targets:
+            self.targets[index] = frame_targets(self.sequence.frame(index, self.config.training.precision), self.config)
+        return self.targets[index]
+
+
+def workshop(sequence: Sequence, config: Config) -> Workshop:
+    """Spectral constants and scene extent of a sequence."""
+    keep_freed_memory()
+    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+    extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
+    return Workshop(sequence, config, spectral, extent, {})
+
+
+def new_training(sequence: Sequence, config: Config) -> TrainingState:
+    """Initialise from the training frames, seeded. Raises InputError when the frames hold no usable pixel."""
+    rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
+    gaussians = initialise(sequence, config.initialisation, config.model, rng, dtype)
+    frames = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)
+    return fresh_state(gaussians, frames, rng, lambda_lap=_given_weight(config))
+
+
+def bench_state(gaussians: Gaussians, config: Config, iteration: int) -> TrainingState:
+    """A state at a given iteration for benchmarks and tests, with fresh moments and no frame parameters."""
+    weight = _given_weight(config)
+    rng = np.random.default_rng(config.training.seed)
+    return fresh_state(gaussians, None, rng, iteration=iteration, lambda_lap=0.83 if weight is None else weight)
+
+
+def fresh_state(
+    gaussians: Gaussians,
+    frames: FrameParameters | None,
+    rng: np.random.Generator,
+    *,
+    iteration: int = 0,
+    lambda_lap: float | None,
+) -> TrainingState:
+    """A state around given parameters, with zero moments and empty statistics."""
+    adam = adam_state(arrays(gaussians) | trained(frames))
+    return TrainingState(gaussians, adam, iteration, rng, empty_statistics(gaussians.count), lambda_lap, frames)
+
+
+def _given_weight(config: Config) -> float | None:
+    """lambda_lap of the settings; None if it is to be calibrated."""
+    weight = config.loss.lambda_lap
+    return None if weight == "auto" else float(weight)
+
+
+def check_state(state: TrainingState) -> None:
+    """Raise ValueError naming array and index if a parameter is not finite."""
+    check_finite(arrays(state.gaussians))
+    check_finite(trained(state.frames))
+
+
+def save_state(path: Path, state: TrainingState, config: Config) -> None:
+    """Write a checkpoint, atomically.
+
+    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (its Gaussian would
+            only vanish from the picture). The previous checkpoint is then intact.
+    """
+    try:
+        check_state(state)
+    except ValueError as error:
+        raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
+    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap}
+    generator = dict(state.rng.bit_generator.state)
+    save_checkpoint(
+        path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header, state.frames
+    )
+
+
+def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
+    """The state as it was saved."""
+    weight = checkpoint.header.get("lambda_lap")
+    return TrainingState(
+        checkpoint.gaussians,
+        checkpoint.adam,
+        checkpoint.iteration,
+        restore_rng(checkpoint.rng_state),
+        checkpoint.statistics,
+        _given_weight(config) if weight is None else weight,
+        checkpoint.frames,
+    )

@@ -1,0 +1,83 @@
+"""One training view, equation (6), made of the documented pairs only: the page that says what an iteration computes.
+
+    Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
+
+In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and its gradient by every array. This
+is what the gradient check checks and the golden objective judges. Training takes the same steps with the same
+functions (`training_step`), but joins the largest reverse passes with the Adam step that follows (`fused/`); one such
+step equals `view_gradients` followed by `adam_update` bit by bit (tested).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config
+from endotsr.equations.deformation import deformation_reverse
+from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
+from endotsr.fitting.model import Spectral, exposed, exposed_reverse, raster_settings, scene_at, scene_reverse
+from endotsr.fitting.objective import LossWeights, Targets, image_loss
+from endotsr.kernels.arrays import FloatArray
+from endotsr.scene.gaussians import Gaussians
+from endotsr.scene.parameters import Exposure
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import Compositor, RenderOut, render_forward, render_reverse
+from endotsr.splatting.settings import RasterSettings
+
+
+class ViewGradients(NamedTuple):
+    """Equation (6) of one view and its derivatives."""
+
+    loss: float  # the Matern penalty included
+    terms: dict[str, float]  # unweighted; only those evaluated
+    gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
+    exposure: Exposure | None  # gradients by the exposure of this frame
+    rendered: RenderOut  # the images that were compared
+
+
+def view_gradients(
+    gaussians: Gaussians,
+    spectral: Spectral,
+    targets: Targets,
+    weights: LossWeights,
+    config: Config,
+    camera: Camera,
+    t: float,
+    edges: NDArray[np.bool_] | None = None,
+    *,
+    exposure: Exposure | None = None,
+    raster: RasterSettings | None = None,
+    degree: int | None = None,
+    compositor: Compositor = "auto",
+) -> ViewGradients:
+    """Loss and gradients of one view, equation (6), with all components that `gaussians` has.
+
+    targets   of the observed frame, see `frame_targets`; `weights` are those in force at this iteration
+    t         normalised time, in [0, 1] meant
+    edges     (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth
+    exposure  of this frame, equation (B13); None = none
+    raster    None = that of `config`;  degree   active harmonic degree, None = the model's
+
+    Edges:  a term of weight 0 is not evaluated; a component without arrays gets no gradient.
+    Oracle: central differences (`endotsr gradcheck objective`), golden family `objective`.
+    """
+    raster = raster_settings(config) if raster is None else raster
+    degree = config.model.harmonics_degree if degree is None else degree
+
+    scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
+    rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor)
+    rendered, exposure_saved = exposed(rendered, exposure)
+    loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
+
+    d_colour, d_exposure = exposed_reverse(d_colour, exposure_saved)
+    d_scene = render_reverse(d_colour, d_depth, None, render_saved)
+    gradients, d_offsets = scene_reverse(d_scene, scene_saved)
+    if scene_saved.deformation is not None and d_offsets is not None:
+        fdm = deformation_reverse(d_offsets, scene_saved.deformation)
+        gradients |= {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
+    if gaussians.motion_coefficients is not None:
+        penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
+        loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
+        gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)
+    return ViewGradients(loss, terms, gradients, d_exposure, rendered)

@@ -1,0 +1,89 @@
+"""The door of a command: requests that a port answers, the call of its command, and the folders of one call."""
+
+import os
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import msgspec
+
+from endotsr.errors import InputError
+from endotsr.golden.judge.format import Precision, Request, RequestOutput, Requests, read_struct, to_json
+from endotsr.golden.judge.npy import write_npy
+from endotsr.golden.judge.store import Golden
+
+KEPT = ("requests", "outputs", "outputs_again")  # folders of one call of `golden run`
+
+
+def clear_kept(root: Path) -> None:
+    """Remove what an earlier `golden run --keep` left in this folder, so that old outputs are never judged.
+
+    The folders named in KEPT are removed if the requests among them are of the form that `write_requests` gives.
+    Raises: InputError if one of the names is taken by anything else; nothing is removed then.
+    """
+    taken = [path for path in (root / name for name in KEPT) if os.path.lexists(path)]
+    if not taken:
+        return
+    try:
+        read_struct(root / KEPT[0] / "requests.json", Requests)
+        foreign = [path for path in taken if path.is_symlink() or not path.is_dir()]
+    except (OSError, msgspec.DecodeError):
+        foreign = taken
+    if foreign:
+        raise InputError(
+            f"--keep: {foreign[0]} was not made by `endotsr golden run` and is left alone; "
+            f"allowed: a folder without {', '.join(KEPT)}, or one of an earlier run"
+        )
+    for path in taken:
+        shutil.rmtree(path)
+
+
+def write_requests(golden: Golden, folder: Path, precision: Precision, level: int) -> None:
+    """The cases without their answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
+    wanted = [case for case in golden.cases if case.level <= level]
+    for case in wanted:
+        root = folder / case.family / case.case
+        for array in case.inputs.values():
+            write_npy(root / array.file, golden.array(case, array.file))
+        outputs = {
+            name: RequestOutput(level=o.level, unit=o.unit, dtype=o.dtype, shape=o.shape)
+            for name, o in case.outputs.items()
+            if o.level <= level
+        }
+        request = Request(
+            family=case.family, case=case.case, operation=case.operation, settings=case.settings,
+            inputs={name: array.file for name, array in case.inputs.items()}, outputs=outputs,
+        )  # fmt: skip
+        root.mkdir(parents=True, exist_ok=True)
+        (root / "request.json").write_text(to_json(request), encoding="utf-8")
+    head = Requests(
+        version=golden.manifest.version, precision=precision, level=level,  # type: ignore[arg-type]
+        cases=tuple(case.name for case in wanted),
+    )  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "requests.json").write_text(to_json(head), encoding="utf-8")
+
+
+def refuse_command(command: str) -> None:
+    """Raises InputError if a port's command does not say where {requests} and {outputs} go."""
+    if "{requests}" not in command or "{outputs}" not in command:
+        raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+
+
+def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
+    """Call the port's command once; returns a note when it failed. No shell is involved.
+
+    Raises: InputError if the command names no {requests} or {outputs}, or cannot be started.
+    """
+    refuse_command(command)
+    outputs.mkdir(parents=True, exist_ok=True)
+    try:
+        split = shlex.split(command)
+        words = [w.replace("{requests}", str(requests)).replace("{outputs}", str(outputs)) for w in split]
+        done = subprocess.run(words, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        return f"the port was stopped after {seconds:g} s"
+    except (OSError, ValueError) as error:
+        raise InputError(f"--port: cannot be started: {error}") from None
+    return "" if done.returncode == 0 else f"the port ended with code {done.returncode}"

@@ -1,0 +1,96 @@
+"""Distances between arrays in units of a scale, and whether a rule allows them; the maker of the vectors asks too."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.judge.format import FLIP_BUDGET, LEVELS, Rule
+from endotsr.golden.judge.words import signs
+
+COLUMN_FLOOR = 1e-3  # of the largest magnitude: the least scale of a slice under "last"
+
+
+class Verdict(NamedTuple):
+    """Outcome for one output."""
+
+    passed: bool
+    reason: str
+    distance: float | None = None  # largest, in units of the scale; None = not a number
+    worst: tuple[int, ...] = ()
+    got: float = 0.0
+    expected: float = 0.0
+
+
+def scale_of(expected: NDArray, kind: str) -> NDArray | float:
+    """The unit in which a difference is measured; 1 where everything expected is 0."""
+    size = np.abs(expected.astype(np.float64))
+    largest = float(size.max()) if size.size else 0.0
+    if largest == 0.0:
+        return 1.0
+    if kind == "last" and expected.ndim > 1:
+        columns = size.reshape(-1, size.shape[-1]).max(axis=0)
+        return np.maximum(columns, COLUMN_FLOOR * largest)
+    return largest
+
+
+def distances(got: NDArray, expected: NDArray, kind: str) -> NDArray:
+    """|got - expected| / scale, infinite where `got` is not finite or the shape differs."""
+    if got.shape != expected.shape:
+        return np.array([np.inf])
+    with np.errstate(all="ignore"):
+        off = np.abs(got.astype(np.float64) - expected.astype(np.float64)) / scale_of(expected, kind)
+    return np.where(np.isfinite(off), off, np.inf)
+
+
+def largest(got: NDArray, expected: NDArray, kind: str) -> float:
+    """The largest distance; 0 for empty arrays of one shape."""
+    off = distances(got, expected, kind)
+    return float(off.max()) if off.size else 0.0
+
+
+def fingerprint(name: str, array: NDArray) -> float:
+    """Sum of the entries in C order with the signs of the seed `name`."""
+    return float((signs(name, array.size) * array.reshape(-1).astype(np.float64)).sum())
+
+
+def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdict:
+    """Whether an output of the right shape and kind is allowed."""
+    if rule.kind == "exact":
+        unequal = np.argwhere(got != expected)
+        if len(unequal):
+            return _refusal(f"{len(unequal)} of {expected.size} entries differ", got, expected, unequal[0], 1.0)
+        return Verdict(True, "equal", 0.0)
+    tolerance = rule.float64 if precision == "float64" else rule.float32
+    off = distances(got, expected, rule.scale)
+    if not off.size:
+        return Verdict(True, "empty", 0.0)
+    worst = np.unravel_index(int(off.argmax()), off.shape)
+    found = float(off.max())
+    beyond = int((off > tolerance).sum())
+    if beyond == 0:
+        return Verdict(True, f"{found:.1e} <= {tolerance:.0e}", found)
+    if not np.isfinite(found):
+        return _refusal("not finite", got, expected, worst, None)
+    if rule.kind == FLIP_BUDGET:
+        if beyond <= rule.flips and found <= rule.flip_size:
+            return Verdict(True, f"{beyond} of {rule.flips} flips", found)
+        return _refusal(f"{beyond} entries beyond {tolerance:.0e}, {rule.flips} may flip by {rule.flip_size:.0e}",
+                        got, expected, worst, found)  # fmt: skip
+    times = f", {found / tolerance:.2g} times what is allowed" if tolerance > 0 else ""
+    return _refusal(f"{found:.1e} > {tolerance:.0e} of scale{times}, {beyond} entries", got, expected, worst, found)
+
+
+def misses(verdicts: Iterable[tuple[int, bool]]) -> tuple[int, ...]:
+    """Outputs that did not pass, counted by level, from (level, passed): the least is the answer that a port meant."""
+    counts = [0] * len(LEVELS)
+    for level, passed in verdicts:
+        counts[level] += not passed
+    return tuple(counts)
+
+
+def _refusal(reason: str, got: NDArray, expected: NDArray, worst, distance: float | None) -> Verdict:
+    index = tuple(int(k) for k in worst)
+    at = tuple(index)
+    return Verdict(False, reason, distance, index, float(got[at]), float(expected[at]))

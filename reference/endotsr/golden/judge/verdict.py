@@ -1,0 +1,247 @@
+"""The judge: a folder of outputs against the golden cases. Every state of the folder leads to a verdict."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.judge.compare import Verdict, judged, misses
+from endotsr.golden.judge.format import LEVELS, Case, Output, Precision
+from endotsr.golden.judge.npy import Refused, read_plain, read_text
+from endotsr.golden.judge.recognise import Suspect, recognise, suspects_of
+from endotsr.golden.judge.store import Golden
+
+NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
+
+Status = Literal["passed", "refused", "missing", "not ported"]
+
+
+class OutputReport(msgspec.Struct, kw_only=True):
+    """Verdict on one output."""
+
+    name: str
+    level: int
+    status: Status
+    reason: str
+    distance: float | None = None
+    index: tuple[int, ...] = ()
+    got: float | None = None
+    expected: float | None = None
+
+
+class CaseReport(msgspec.Struct, kw_only=True):
+    """Verdict on one case."""
+
+    name: str
+    title: str
+    level: int
+    status: Status
+    outputs: list[OutputReport]
+    looks_like: list[str]
+    """mistakes whose fingerprint the output has, best first"""
+    made_for: list[str]
+    answer: int = 0
+    """which of several legal answers it was held against"""
+
+
+class Report(msgspec.Struct, kw_only=True):
+    """Everything the judge says."""
+
+    version: str
+    precision: str
+    asked_level: int
+    level: int
+    """highest level that is complete, -1 = none; also of a port that fails"""
+    without: tuple[str, ...]
+    """operations that the port declares not to do"""
+    claim: str
+    levels: dict[int, tuple[int, int]]
+    """passed and asked outputs by level"""
+    cases: list[CaseReport]
+    suspects: list[Suspect]
+    notes: list[str]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the asked level is complete."""
+        return self.level >= self.asked_level
+
+
+def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None) -> Report:
+    """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
+
+    again   a second folder of the same port: level 5 then also asks for the same bits everywhere
+    """
+    without, notes = declared(golden, outputs)
+    reports = [
+        _left_out(case) if case.operation in without else judge_case(golden, case, outputs, precision, level)
+        for case in golden.cases
+        if case.level <= level
+    ]
+    if again is not None and level >= 5:
+        reports.append(_repeated(golden, outputs, again, without))
+    elif level >= 5:
+        notes.append("level 5: only the determinism cases; a second run (--again) compares all outputs bit by bit")
+    return conclude(golden, reports, precision, level, notes, without)
+
+
+def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]:
+    """Operations named in the port's file of what it leaves out, and notes on what could not be understood there."""
+    try:
+        lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
+    except Refused as refusal:
+        return (), [] if str(refusal) == "missing" else [f"{NOT_PORTED}: {refusal}; every operation is asked for"]
+    named = {line.split("#")[0].strip() for line in lines} - {""}
+    known = dict.fromkeys(case.operation for case in golden.cases)
+    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - set(known))]
+    return tuple(name for name in known if name in named), unknown[:5]
+
+
+def _left_out(case: Case) -> CaseReport:
+    return CaseReport(
+        name=case.name, title=case.title, level=case.level, status="not ported", outputs=[], looks_like=[], made_for=[]
+    )
+
+
+def conclude(
+    golden: Golden, reports: list[CaseReport], precision: Precision, level: int, notes: list[str],
+    without: tuple[str, ...] = (),
+) -> Report:  # fmt: skip
+    """Levels, claim and suspects from the verdicts on all cases. A level of which nothing is left is not complete."""
+    counts = {k: _count(reports, k) for k in LEVELS if k <= level}
+    reached = -1
+    for k, (good, asked) in counts.items():
+        if good < asked or not asked:
+            break
+        reached = k
+    return Report(
+        version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
+        claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
+        suspects=suspects_of(golden, {r.name: (r.status, r.looks_like) for r in reports}), notes=notes,
+    )  # fmt: skip
+
+
+def without_claim(report: Report, reasons: list[str]) -> None:
+    """Take the claim away: a port that fails has none, whatever it wrote before it failed."""
+    report.notes += reasons
+    report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
+
+
+def _claim(golden: Golden, reached: int, precision: Precision, without: tuple[str, ...]) -> str:
+    """What the port may print; names what it leaves out of the levels that it claims."""
+    if reached < 0:
+        return "no level is complete"
+    claim = f"golden {golden.short_version}, level {reached}, {precision}"
+    asked = {case.operation for case in golden.cases if case.level <= reached}
+    missing = [name for name in without if name in asked]
+    return f"{claim}, without {', '.join(missing)}" if missing else claim
+
+
+def _count(reports: list[CaseReport], level: int) -> tuple[int, int]:
+    all_of = [o for r in reports for o in r.outputs if o.level == level]
+    return sum(o.status == "passed" for o in all_of), len(all_of)
+
+
+def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, level: int = 5) -> CaseReport:
+    """The verdict on one case; nothing in `outputs` can make this raise."""
+    folder = outputs / case.family / case.case
+    taken: dict[str, NDArray | Refused] = {}
+    for name, asked in case.outputs.items():
+        if asked.level <= level:
+            try:
+                taken[name] = _taken(folder / f"{name}.npy", outputs, asked, precision)
+            except Refused as refusal:
+                taken[name] = refusal
+    tries = [_held_against(golden, case, taken, precision, answer) for answer in range(case.answers)]
+    best = min(range(case.answers), key=lambda k: misses((o.level, o.status == "passed") for o in tries[k][0]))
+    found, looks = tries[best]
+    return CaseReport(
+        name=case.name, title=case.title, level=case.level, status=_together(found), outputs=found,
+        looks_like=sorted(looks, key=lambda flag: looks[flag]), made_for=list(case.flags), answer=best,
+    )  # fmt: skip
+
+
+def _held_against(
+    golden: Golden, case: Case, taken: dict[str, NDArray | Refused], precision: Precision, answer: int
+) -> tuple[list[OutputReport], dict[str, float]]:
+    """Verdicts on all outputs against one of the legal answers, and the mistakes that they look like."""
+    found: list[OutputReport] = []
+    looks: dict[str, float] = {}
+    for name, got in taken.items():
+        asked = case.outputs[name]
+        if isinstance(got, Refused):
+            status: Status = "missing" if str(got) == "missing" else "refused"
+            found.append(OutputReport(name=name, level=asked.level, status=status, reason=str(got)))
+            continue
+        expected = golden.array(case, asked.answer(answer))
+        verdict = judged(got, expected, asked.compare, precision)
+        if verdict.passed and asked.compare.kind == "identical":
+            verdict = _identical(got, taken.get(asked.compare.to), asked.compare.to)
+        found.append(_report(name, asked, verdict))
+        if not verdict.passed:
+            recognise(case, name, got, expected, looks)
+    return found, looks
+
+
+def _together(found: list[OutputReport]) -> Status:
+    kinds = {o.status for o in found}
+    return "refused" if "refused" in kinds else "missing" if "missing" in kinds else "passed"
+
+
+def _taken(path: Path, root: Path, asked: Output, precision: Precision) -> NDArray:
+    """The output as an array of the asked shape and kind. Raises Refused."""
+    count = int(np.prod(asked.shape))
+    got = read_plain(path, root, largest=8 * max(count, 1))
+    if got.shape != asked.shape:
+        raise Refused(f"shape {got.shape}; expected {asked.shape}")
+    kinds = {"real": "f", "integer": "iu", "boolean": "bu"}[asked.dtype]
+    if got.dtype.kind not in kinds:
+        raise Refused(f"dtype {got.dtype}; expected {asked.dtype}")
+    if asked.dtype == "real" and precision == "float64" and got.dtype.itemsize < 8:
+        raise Refused(f"dtype {got.dtype}; expected float64")
+    return got
+
+
+def _identical(got: NDArray, other: NDArray | Refused | None, name: str) -> Verdict:
+    if isinstance(other, np.ndarray) and other.dtype == got.dtype and other.tobytes() == got.tobytes():
+        return Verdict(True, "same bits", 0.0)
+    return Verdict(False, f"bits differ from {name}", 0.0)
+
+
+def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
+    shown = {} if verdict.passed or not verdict.reason else {
+        "index": verdict.worst, "got": _plain(verdict.got), "expected": _plain(verdict.expected)
+    }  # fmt: skip
+    status: Status = "passed" if verdict.passed else "refused"
+    return OutputReport(
+        name=name, level=asked.level, status=status, reason=verdict.reason, distance=verdict.distance, **shown
+    )
+
+
+def _plain(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
+    """All outputs of two runs, bit by bit."""
+    found = []
+    for case in golden.cases:
+        if case.operation in without:
+            continue
+        for name, asked in case.outputs.items():
+            files = [folder / case.family / case.case / f"{name}.npy" for folder in (first, second)]
+            limit = 8 * max(int(np.prod(asked.shape)), 1)
+            try:
+                a, b = (read_plain(path, root, limit) for path, root in zip(files, (first, second)))
+                same = a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+                status, reason = ("passed", "same bits") if same else ("refused", "other bits in the second run")
+            except Refused as refusal:
+                status, reason = "missing", str(refusal)
+            report = OutputReport(name=f"{case.name}/{name}", level=5, status=status, reason=reason)  # type: ignore[arg-type]
+            found.append(report)
+    return CaseReport(
+        name="determinism/again", title="A second run gives the same bits", level=5, status=_together(found),
+        outputs=found, looks_like=[], made_for=["sums_in_any_order"],
+    )  # fmt: skip

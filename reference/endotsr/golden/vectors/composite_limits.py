@@ -1,0 +1,173 @@
+"""Family `composite`, its thresholds: the cutoff and the clamp of alpha, and the stop at small transmittance (B5).
+
+Most cases are flat over the image, so that every pixel takes the same decision. The values lie just below, at and above
+a threshold. Two cases are exactly on the cutoff, where rounding may decide either way: in one, some pixels may flip; in
+the other, image and gradient have to take the same decision.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
+from endotsr.golden.vectors.screens import flat_covariance, raster_settings, screen_inputs
+from endotsr.golden.vectors.views import logit_of
+from endotsr.golden.vectors.wrong import Request, WrongPort, setting, within
+from endotsr.golden.vectors.wrong_raster import deviating, opacity_of
+from endotsr.splatting.settings import LEGACY, PAPER
+
+OPERATIONS = ("composite",)
+CUTOFF = 1 / 255
+
+
+def _flat(case: str, opacity: list[float], depth: list[float]) -> dict[str, Made]:
+    inputs = screen_inputs(Seeds("composite", case), 5, 4.0, 90.0)
+    inputs |= {"covariance2d": flat_covariance(5), "opacity_logit": logit_of(opacity)}
+    return inputs | {"depth": given(depth, ", ".join(map(str, depth)), "scene unit")}
+
+
+def _around_thresholds() -> list[Spec]:
+    near, cut, paper = [3.0, 4.0, 5.0, 6.0, 7.0], CUTOFF, raster_settings(PAPER)
+    return [
+        Spec("composite", "alpha_cutoff", "composite", "Alpha a thousandth below and above 1/255",
+             ("cutoff_missing", "cutoff_1_over_256"), paper,
+             _flat("alpha_cutoff", [cut * 0.999, cut * 1.001, cut * 0.998, cut * 1.002, 0.3], near)),
+        Spec("composite", "alpha_clamp", "composite", "Alpha below, at and above 0.99: gradient 0 where clamped",
+             ("alpha_clamp_999", "alpha_clamp_missing", "clamped_alpha_gradient"), paper,
+             _flat("alpha_clamp", [0.9895, 0.99002, 0.9985, 0.5, 0.9999], [7.0, 6.0, 5.0, 3.0, 4.0])),
+        Spec("composite", "transmittance_stop", "composite", "Stop before T falls below 1e-4, not after",
+             ("stop_missing", "stop_after", "stop_at_1e-3"), paper,
+             _flat("transmittance_stop", [0.98, 0.98, 0.7, 0.1, 0.9], near),
+             without=("d_mean2d", "d_covariance2d")),
+        _stop_ends_pixel(),
+        _legacy_clamp(),
+    ]  # fmt: skip
+
+
+def _stop_ends_pixel() -> Spec:
+    """Five Gaussians in the order of the index; the third stops every pixel."""
+    inputs = _flat("stop_ends_pixel", [0.98, 0.98, 0.9, 0.5, 0.1], [3.0, 4.0, 5.0, 6.0, 7.0])
+    inputs["depth"] = given([3.0, 4.0, 5.0, 6.0, 7.0], "3, 4, 5, 6, 7", "scene unit")
+    title = "A weak Gaussian behind the one that stops is not drawn"
+    return Spec("composite", "stop_ends_pixel", "composite", title, ("stop_skips",), raster_settings(PAPER), inputs,
+                without=("d_mean2d", "d_covariance2d"))  # fmt: skip
+
+
+def _legacy_clamp() -> Spec:
+    inputs = screen_inputs(Seeds("composite", "legacy_clamp"), 5, 60.0, 400.0)
+    inputs["opacity_logit"] = logit_of([0.9999, 0.995, 0.9, 0.999, 0.5])
+    return Spec("composite", "legacy_clamp", "composite", "Preset legacy: the gradient passes the clamp of alpha",
+                ("clamp_blocks_legacy",), raster_settings(LEGACY), inputs)  # fmt: skip
+
+
+def _on_the_cutoff() -> Spec:
+    """Peaks at 1/255, each at a pixel centre."""
+    inputs = screen_inputs(Seeds("composite", "on_the_cutoff"), 5, 4.0, 6.0)
+    middles = [[2.5, 6.5, 9.5, 13.5, 16.5], [3.5, 9.5, 5.5, 10.5, 2.5]]
+    inputs |= {"mean2d": given(middles, "pixel centres", "px"), "opacity_logit": logit_of([CUTOFF] * 5)}
+    names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "background")
+    return Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha at 1/255: each may be drawn or not",
+                ("cutoff_missing",), raster_settings(PAPER), inputs, ("opacity_logit", "mean2d", "covariance2d"),
+                without=tuple(f"d_{name}" for name in names), flip_budget=5)  # fmt: skip
+
+
+def _one_on_the_cutoff() -> Spec:
+    """One decision that rounding may take either way, and with it the whole answer, gradients included."""
+    inputs, settings = screen_inputs(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0), raster_settings(PAPER)
+    one = (slice(None), 1)
+    inputs["mean2d"] = changed(inputs["mean2d"], one, [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")
+    inputs["covariance2d"] = changed(inputs["covariance2d"], one, [1.5, 0.25, 2.0], "[:, 1] is 1.5, 0.25, 2")
+    inputs["opacity_logit"] = changed(
+        inputs["opacity_logit"], 1, -math.log(254.0), "[1] is -log 254, rounded: opacity 1/255 - 7e-10"
+    )
+    drawn = settings | {"raster": settings["raster"] | {"alpha_cutoff": (1 - 1e-5) / 255}}
+    title = "One peak of alpha at 1/255: drawn or not, but the same in image and gradient"
+    return Spec("composite", "one_on_the_cutoff", "composite", title, ("cutoff_decided_twice",), settings, inputs,
+                ("opacity_logit", "mean2d", "covariance2d"), either=(drawn,))  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """Values around each threshold, then on the cutoff."""
+    return [*_around_thresholds(), _on_the_cutoff(), _one_on_the_cutoff()]
+
+
+# ---- mistakes ----
+
+
+def _decided_twice(request: Request) -> dict[str, NDArray] | None:
+    """A Gaussian on the cutoff is in the image, but has no gradient."""
+    image, gradient = (setting(raster__alpha_cutoff=lambda v, s=s: v * s)(request)
+                       for s in (1 - 1e-5, 1 + 1e-5))  # fmt: skip
+    if image is None or gradient is None:
+        return None
+    return {**image, **{name: a for name, a in gradient.items() if name.startswith("d_")}}
+
+
+def _stop_after(request: Request) -> dict[str, NDArray] | None:
+    """The Gaussian that brings T below the limit is still blended: flat images only."""
+    if request.inputs["covariance2d"].min(axis=1)[0] < 1e5:
+        return None
+    alpha = np.minimum(opacity_of(request.inputs["opacity_logit"]), request.settings["raster"]["alpha_max"])
+    stop, t, total, depth = request.settings["raster"]["transmittance_stop"], 1.0, 0.0, 0.0
+    colour = np.zeros(3)
+    for i in np.argsort(request.inputs["depth"], kind="stable"):
+        if alpha[i] < request.settings["raster"]["alpha_cutoff"]:
+            continue
+        colour += alpha[i] * t * request.inputs["colour"][:, i]
+        total, depth, t = total + alpha[i] * t, depth + alpha[i] * t * request.inputs["depth"][i], t * (1 - alpha[i])
+        if t < stop:
+            break
+    plane = np.ones_like(request.right["depth_image"])
+    colour = colour + t * request.inputs["background"]
+    return {"colour_image": colour[:, None, None] * plane, "depth_image": depth * plane, "opacity_image": total * plane}
+
+
+def _skips(request: Request) -> dict[str, NDArray] | None:
+    """Leaves out the Gaussian that would stop the pixel and goes on; flat images only."""
+    raster, i = request.settings["raster"], request.inputs
+    if i["covariance2d"].min(axis=1)[0] < 1e5:
+        return None
+    alpha, left, logit = np.minimum(opacity_of(i["opacity_logit"]), raster["alpha_max"]), 1.0, i["opacity_logit"].copy()
+    for n in np.argsort(i["depth"], kind="stable"):
+        if alpha[n] < raster["alpha_cutoff"] or left * (1 - alpha[n]) < raster["transmittance_stop"]:
+            logit[n] = -40.0
+        else:
+            left *= 1 - alpha[n]
+    return request.run(dict(i) | {"opacity_logit": logit}, request.settings)
+
+
+def _blocked(request: Request) -> Any:
+    """The exact derivative of the clamp where the released code passes the gradient."""
+    if not request.settings["raster"]["deviations"]["pass_clamped_alpha"]:
+        return None
+    return setting(raster__deviations__pass_clamped_alpha=False)(request)
+
+
+WRONG_PORTS = [
+    WrongPort("clamped_alpha_gradient", "Gradient passes the clamp of alpha", "passed; right: 0 where clamped",
+              {"composite": deviating("pass_clamped_alpha"), "render": deviating("pass_clamped_alpha")}),
+    WrongPort("cutoff_missing", "No alpha cutoff", "every alpha; right: from 1/255 on",
+              within("raster", ("composite", "render", "objective"), alpha_cutoff=lambda v: 1e-9 if v > 0 else v)),
+    WrongPort("cutoff_1_over_256", "Alpha cutoff of 1/256", "1/256; right: 1/255",
+              within("raster", ("composite",), alpha_cutoff=lambda v: 1 / 256 if v > 0 else v)),
+    WrongPort("cutoff_decided_twice", "Cutoff decided anew in the reverse pass", "in the image, but without gradient; "
+              "right: one decision", {"composite": _decided_twice}),
+    WrongPort("cutoff_added", "Alpha cutoff in preset exact", "1/255; right: none",
+              within("raster", ("composite", "render", "objective"), alpha_cutoff=lambda v: v if v > 0 else 1 / 255)),
+    WrongPort("alpha_clamp_999", "Alpha clamped at 0.999", "0.999; right: 0.99",
+              within("raster", ("composite", "render"), alpha_max=lambda v: 0.999 if v < 1 else v)),
+    WrongPort("alpha_clamp_missing", "Alpha not clamped", "up to 1; right: 0.99",
+              within("raster", ("composite", "render"), alpha_max=lambda v: 1.0)),
+    WrongPort("stop_missing", "No stop at small transmittance", "all Gaussians; right: stop before T < 1e-4",
+              within("raster", ("composite", "render"), transmittance_stop=0.0)),
+    WrongPort("stop_at_1e-3", "Stop at a transmittance of 1e-3", "1e-3; right: 1e-4",
+              within("raster", ("composite",), transmittance_stop=lambda v: 1e-3 if v > 0 else v)),
+    WrongPort("stop_after", "Stop after T fell below 1e-4", "one Gaussian too many; right: stop before",
+              {"composite": _stop_after}),
+    WrongPort("stop_skips", "The Gaussian that stops a pixel skipped", "goes on behind it; right: the pixel ends",
+              {"composite": _skips}),
+    WrongPort("clamp_blocks_legacy", "Clamp of alpha blocks the gradient in preset legacy", "0; right: passed",
+              {"composite": _blocked, "render": _blocked, "objective": _blocked}),
+]  # fmt: skip

@@ -1,0 +1,76 @@
+"""Family `deformation`: the offsets of the flexible deformation model (B1) at one time, in both time bases.
+
+Weights, centres, widths, a time and a gradient by the offsets come in. The cases fix the two bases, that the sign of a
+width matters to its gradient only, and the floor of a squared width.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.vectors.making import Seeds, Spec, changed, given, scalar
+from endotsr.golden.vectors.wrong import Request, WrongPort, output, setting
+
+OPERATIONS = ("deformation",)
+
+
+def cases() -> list[Spec]:
+    """Both time bases, and widths of 0."""
+    out = []
+    shape, t = (10, 3, 5), 0.453125
+    for basis in ("quartic", "gaussian"):
+        seeds = Seeds("deformation", basis)
+        centre = seeds.uniform("fdm_centre", 0.25, 0.65, *shape)
+        inputs = {
+            "fdm_weight": seeds.uniform("fdm_weight", -1.0, 1.0, *shape, unit="raw parameter"),
+            "fdm_centre": centre,
+            "fdm_width": changed(seeds.uniform("fdm_width", 0.08, 0.3, *shape), (slice(None), 1),
+                                 -seeds.uniform("fdm_width", 0.08, 0.3, *shape).array[:, 1], "basis 1 negated"),
+            "t": scalar(t),
+            "d_offsets": seeds.uniform("d_offsets", -1.0, 1.0, 10, 5),
+        }  # fmt: skip
+        flags = ("basis_swapped", "width_without_floor", "width_gradient_of_size", "time_gradient_sign")
+        title = f"The {basis} time basis; the sign of a width does not matter, its gradient has it"
+        out.append(Spec("deformation", basis, "deformation", title, flags, {"basis": basis}, inputs))
+    seeds = Seeds("deformation", "width_zero")
+    inputs = {
+        "fdm_weight": seeds.uniform("fdm_weight", -1.0, 1.0, 10, 2, 3),
+        "fdm_centre": given(np.full((10, 2, 3), 0.4921875), "63/128"),
+        "fdm_width": given(np.zeros((10, 2, 3)), "0"),
+        "t": scalar(0.5),
+        "d_offsets": seeds.uniform("d_offsets", -1.0, 1.0, 10, 3),
+    }
+    out.append(Spec("deformation", "width_zero", "deformation", "A width of 0 is finite: its square has a floor",
+                    ("width_without_floor",), {"basis": "quartic"}, inputs))  # fmt: skip
+    return out
+
+
+# ---- mistakes ----
+
+
+def _without_floor(request: Request) -> dict[str, NDArray]:
+    weight, centre, width = (request.inputs[f"fdm_{name}"] for name in ("weight", "centre", "width"))
+    u = (float(request.inputs["t"]) - centre) ** 2
+    quartic = request.settings["basis"] == "quartic"
+    value = np.exp(-((u / width**2) ** 2)) if quartic else np.exp(-u / (2 * width**2))
+    return {"offsets": (weight * value).sum(axis=1), "d_fdm_weight": request.inputs["d_offsets"][:, None] * value}
+
+
+def _other_basis(old: str) -> str:
+    return "gaussian" if old == "quartic" else "quartic"
+
+
+def _of_size(request: Request) -> dict[str, NDArray]:
+    sign = np.where(request.inputs["fdm_width"] < 0, -1.0, 1.0)
+    return {"d_fdm_width": request.right["d_fdm_width"] * sign}
+
+
+WRONG_PORTS = [
+    WrongPort("basis_swapped", "The other time basis", "Gaussian for quartic or back",
+              {"deformation": setting(basis=_other_basis), "scene": setting(model__basis=_other_basis)}),
+    WrongPort("width_without_floor", "Squared width without its floor", "s^2; right: s^2 + 1e-4",
+              {"deformation": _without_floor}),
+    WrongPort("width_gradient_of_size", "Gradient by the size of the width", "sign lost; right: that of the width",
+              {"deformation": _of_size}),
+    WrongPort("time_gradient_sign", "Gradient by time with the sign of the centre", "+; right: minus the sum",
+              {"deformation": output(d_t=lambda a: -a)}),
+]  # fmt: skip

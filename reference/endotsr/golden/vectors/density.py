@@ -1,0 +1,231 @@
+"""Family `density`: density control (B11), the statistics of some views and one densification.
+
+Raw parameters, screen gradients and visibility by view, the noise of splits and camera poses come in. The cases fix who
+is pruned, cloned and split and in which order the new Gaussians follow, who wins when there is no room for all, the
+extent of moving cameras, and which side of a threshold its own value is on.
+"""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import DensityConfig
+from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given, permutation
+from endotsr.golden.vectors.views import pose
+from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, output, setting, within
+
+OPERATIONS = ("density",)
+VIEWS, COUNT = 3, 12
+
+
+def _screen_gradients(seeds: Seeds) -> dict[str, Made]:
+    """Two thirds of the Gaussians are steep; 0 is never visible, 1 is exactly on the threshold of 1/4."""
+    d_mean = seeds.uniform("d_mean2d", -1.0, 1.0, VIEWS, 2, COUNT, unit="loss per px")
+    steep = np.where(permutation(seeds.seed("steep"), COUNT) % 3 > 0, 2.0**-3, 2.0**-8)
+    d_mean = changed(d_mean, ..., d_mean.array * steep, "times 2^-3, or 2^-8 where rank % 3 = 0 of the words of " +
+                     seeds.seed("steep"))  # fmt: skip
+    visible = (np.add.outer(np.arange(VIEWS), np.arange(COUNT)) % 4) != 1
+    visible[:, 0], visible[:, 1] = False, [True, False, True]
+    on = np.zeros((VIEWS, 2))
+    on[:, 0] = [2.0**-5, 1.0, -(2.0**-5)]
+    d_mean = changed(d_mean, (slice(None), slice(None), 1), on, "[:, :, 1] is (1/32, 0), (1, 0), (-1/32, 0)")
+    recipe = "(v + n) % 4 != 1; Gaussian 0 never, Gaussian 1 in views 0 and 2"
+    return {"d_mean2d": d_mean, "visible": given(visible, recipe)}
+
+
+def _inputs(seeds: Seeds, moving: bool) -> dict[str, Made]:
+    """An image of 16 x 8 pixels; a Gaussian of log-scale 0 is larger than a hundredth of the extent."""
+    large = np.where(permutation(seeds.seed("large"), COUNT) % 2 > 0, 0.0, -4.0)
+    scale = seeds.uniform("log_scale", -0.5, 0.5, 3, COUNT)
+    logit = seeds.uniform("opacity_logit", -1.0, 2.0, COUNT)
+    shift = np.stack([np.array([0.5 * k, -0.25 * k, 0.125]) for k in range(VIEWS)]) * moving
+    turned = pose()["rotation_matrix"]
+    return {
+        "position": seeds.uniform("position", -2.0, 2.0, 3, COUNT, unit="scene unit"),
+        "quaternion": changed(seeds.uniform("quaternion", -1.0, 1.0, 4, COUNT), (slice(None), 5), 0.0,
+                              "quaternion 5 is 0"),
+        "log_scale": changed(scale, ..., scale.array + large, "minus 4 where rank % 2 = 0 of the words of " +
+                             seeds.seed("large")),
+        "opacity_logit": changed(logit, slice(2, None, 5), -6.0, "[2::5] is -6: pruned"),
+        **_screen_gradients(seeds),
+        "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, COUNT),
+        "rotation_matrices": given(np.stack([turned.array] * VIEWS), f"{turned.recipe} for all"),
+        "translations": given(shift, "(k / 2, -k / 4, 1 / 8)" if moving else "0", "scene unit"),
+    }  # fmt: skip
+
+
+def _decisions() -> list[Spec]:
+    def spec(case: str, title: str, flags: tuple[str, ...], moving=False, change=None, **config: Any) -> Spec:
+        inputs = _inputs(Seeds("density", case), moving)
+        if change:
+            change(inputs)
+        density = msgspec.to_builtins(DensityConfig(gradient_threshold=0.25, extent=30.0, **config))
+        settings = {"width": 16, "height": 8, "density": density | ({"extent": "cameras"} if moving else {})}
+        return Spec("density", case, "density", title, flags, settings, inputs, ("d_mean2d",))
+
+    def tie(inputs: dict[str, Made]) -> None:
+        d = inputs["d_mean2d"]
+        d = changed(d, ..., d.array[:, :, :1] * 0 + 2.0**-3, "1/8 everywhere: all equally steep")
+        inputs["d_mean2d"] = changed(d, (slice(None), slice(None), [8, 10]), 0.25, "Gaussians 8, 10: 1/4, the steepest")
+
+    def faint(inputs: dict[str, Made]) -> None:
+        inputs["opacity_logit"] = changed(inputs["opacity_logit"], ..., -7.0, "all -7")
+
+    flags = ("densify_threshold_in_pixels", "density_over_all_views", "density_sum_of_views", "clone_and_split_swapped",
+             "faint_ones_densified", "split_parent_kept", "children_not_smaller", "children_interleaved",
+             "children_inherit_moments")  # fmt: skip
+    return [
+        spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand", flags),
+        spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",), change=tie,
+             maximum=14),
+        spec("extent_of_cameras", "The extent that divides clones from splits, from moving cameras",
+             ("extent_without_margin",), moving=True, dense_fraction=0.5),
+        spec("all_pruned", "Nothing is left", ("faint_ones_densified",), change=faint),
+    ]  # fmt: skip
+
+
+def _on_the_thresholds() -> Spec:
+    """Opacity 1/2 at a prune threshold of 1/2, largest axis 1 at a limit of 1: neither is beyond."""
+    seeds, count = Seeds("density", "on_the_thresholds"), 6
+    noise, turned = seeds.uniform("split_noise", -1.5, 1.5, 2, 3, count), pose()["rotation_matrix"]
+    logit = seeds.uniform("opacity_logit", 0.5, 2.0, count)
+    scale = seeds.uniform("log_scale", -2.0, -0.5, 3, count)
+    inputs = {
+        "position": seeds.uniform("position", -2.0, 2.0, 3, count, unit="scene unit"),
+        "quaternion": seeds.uniform("quaternion", -1.0, 1.0, 4, count),
+        "log_scale": changed(scale, (0, slice(1, 4)), [0.0, 0.0, 0.25], "[0, 1:4] is 0, 0, 1/4"),
+        "opacity_logit": changed(logit, slice(0, 2), 0.0, "[0:2] is 0: opacity 1/2, the prune threshold"),
+        "d_mean2d": given(np.stack([np.full((2, count), 2.0**-4), np.full((2, count), 2.0**-5)]),
+                          "1/16 in view 0, 1/32 in view 1", "loss per px"),
+        "visible": given(np.ones((2, count), bool), "all True"),
+        "split_noise": noise,
+        "rotation_matrices": given(np.stack([turned.array] * 2), f"{turned.recipe} for all"),
+        "translations": given(np.zeros((2, 3)), "0"),
+    }  # fmt: skip
+    config = DensityConfig(gradient_threshold=0.25, extent=4.0, dense_fraction=0.25, prune_opacity=0.5)
+    settings = {"width": 24, "height": 10, "density": msgspec.to_builtins(config)}
+    flags = ("prune_at_the_threshold", "split_at_the_limit", "density_width_for_height")
+    return Spec("density", "on_the_thresholds", "density", "On the prune threshold it stays, on the size limit it is "
+                "cloned; W of x and H of y", flags, settings, inputs, ("log_scale", "opacity_logit"))  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """Decisions, their order, and values on the thresholds."""
+    return [*_decisions(), _on_the_thresholds()]
+
+
+# ---- mistakes ----
+
+
+def _statistics(divide) -> Wrong:
+    """Another mean of the screen gradients, with the decisions that were made from the right one."""
+
+    def wrong(request: Request) -> dict[str, NDArray]:
+        seen = request.inputs["visible"].sum(axis=0)
+        return {"mean_gradient": request.right["mean_gradient"] * np.maximum(seen, 1) / divide(seen)}
+
+    return wrong
+
+
+def _swapped_masks(request: Request) -> dict[str, NDArray]:
+    return {"cloned": request.right["split"], "split": request.right["cloned"]}
+
+
+def _faint_kept(request: Request) -> dict[str, NDArray]:
+    """Gaussians that are to be densified are not pruned."""
+    pruned = request.right["pruned"]
+    steep = request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"]
+    kept = pruned & steep
+    return {"pruned": pruned & ~steep, "cloned": request.right["cloned"] | kept,
+            "count": request.right["count"] + 2 * kept.sum()}  # fmt: skip
+
+
+def _parents_kept(request: Request) -> dict[str, NDArray]:
+    return {"count": request.right["count"] + request.right["split"].sum()}
+
+
+def _children(request: Request) -> slice:
+    """Columns of the children of splits."""
+    return slice(request.right["count"] - 2 * int(request.right["split"].sum()), None)
+
+
+def _large_children(request: Request) -> dict[str, NDArray]:
+    scale = request.right["log_scale_after"].copy()
+    scale[:, _children(request)] += np.log(1.6)
+    return {"log_scale_after": scale}
+
+
+def _interleaved(request: Request) -> dict[str, NDArray]:
+    """First and second child of a parent side by side."""
+    found = {}
+    for name in ("parent", "position_after", "log_scale_after"):
+        a = request.right[name].copy()
+        two = a[..., _children(request)]
+        a[..., _children(request)] = np.swapaxes(two.reshape(*two.shape[:-1], 2, -1), -1, -2).reshape(two.shape)
+        found[name] = a
+    return found
+
+
+def _first_candidates(request: Request) -> dict[str, NDArray] | None:
+    """The first candidates are densified, whatever their gradient."""
+    alive = ~request.right["pruned"]
+    candidates = alive & (request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"])
+    room = request.settings["density"]["maximum"] - alive.sum()
+    if candidates.sum() <= room:
+        return None
+    won = candidates & (np.cumsum(candidates) <= room)
+    limit = request.right["extent"] * request.settings["density"]["dense_fraction"]
+    large = np.exp(request.inputs["log_scale"].max(axis=0)) > limit
+    return {"cloned": won & ~large, "split": won & large}
+
+
+def _no_margin(request: Request) -> dict[str, NDArray] | None:
+    return {"extent": request.right["extent"] / 1.1} if request.settings["density"]["extent"] == "cameras" else None
+
+
+def _width_for_height(request: Request) -> dict[str, Any] | None:
+    s, visible = request.settings, request.inputs["visible"]
+    if s["width"] == s["height"]:
+        return None
+    norm = s["width"] / 2 * np.sqrt((request.inputs["d_mean2d"] ** 2).sum(axis=1))
+    return {"mean_gradient": (norm * visible).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)}
+
+
+def _nudged(name: str, factor: float) -> Wrong:
+    """A threshold moved by so little that only values exactly on it change sides."""
+    return setting(**{f"density__{name}": lambda v: v * factor})
+
+
+WRONG_PORTS = [
+    WrongPort("densify_threshold_in_pixels", "Screen gradient in pixels", "per px; right: times half the image size",
+              within("config", ("training", "schedule"), density__gradient_threshold=lambda v: v * 12.0)
+              | {"density": setting(width=2, height=2)}),
+    WrongPort("density_over_all_views", "Screen gradient averaged over all views", "over views; right: visible ones",
+              {"density": lambda r: _statistics(lambda seen: len(r.inputs["visible"]))(r)}),
+    WrongPort("density_sum_of_views", "Screen gradients added, not averaged", "sum; right: mean over visible views",
+              {"density": _statistics(lambda seen: 1)}),
+    WrongPort("density_width_for_height", "Screen gradient scaled by W / 2 on both axes", "W; right: W of x, H of y",
+              {"density": _width_for_height}),
+    WrongPort("clone_and_split_swapped", "Large ones cloned, small ones split", "swapped; right: small ones cloned",
+              {"density": _swapped_masks}),
+    WrongPort("faint_ones_densified", "Faint Gaussians densified, not pruned", "gradient first; right: pruned first",
+              {"density": _faint_kept}),
+    WrongPort("split_parent_kept", "Parent of a split kept", "three Gaussians; right: two children",
+              {"density": _parents_kept}),
+    WrongPort("children_not_smaller", "Children as large as their parent", "s; right: s - ln 1.6",
+              {"density": _large_children}),
+    WrongPort("children_interleaved", "Children of one parent side by side",
+              "first, second, first, ...; right: all first children, then all second", {"density": _interleaved}),
+    WrongPort("children_inherit_moments", "Children keep the moments of their parent", "copied; right: zero",
+              {"density": output(moments_kept=lambda a: np.ones_like(a))}),
+    WrongPort("first_candidates_win", "First candidates take the room", "by index; right: steepest first",
+              {"density": _first_candidates}),
+    WrongPort("extent_without_margin", "Extent of the cameras without its margin", "radius; right: 1.1 times",
+              {"density": _no_margin}),
+    WrongPort("prune_at_the_threshold", "Pruned on the threshold", "<=; right: <",
+              {"density": _nudged("prune_opacity", 1 + 1e-9)}),
+    WrongPort("split_at_the_limit", "Split on the size limit", ">=; right: >",
+              {"density": _nudged("dense_fraction", 1 - 1e-9)}),
+]  # fmt: skip

@@ -1,0 +1,199 @@
+"""Family `render`: one view of deformed Gaussians, (B2) to (B5) together, with every gradient.
+
+Raw parameters, a pose, a background and gradients by the three images come in. The cases are the presets and degrees,
+then scenes that break a port: the near plane, needles, a zero quaternion, equal depths, centres beside the image, no
+Gaussian at all, and which Gaussians count as visible.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
+from endotsr.golden.vectors.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
+from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, within
+from endotsr.golden.vectors.wrong_raster import Screen, composited, opacity_of, sum_of_squares
+from endotsr.splatting.covariance import covariance_forward
+from endotsr.splatting.harmonics import harmonics_forward
+from endotsr.splatting.projection import projection_forward
+from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
+from endotsr.stages.requests import camera_of, raster_of
+
+OPERATIONS = ("render",)
+
+
+def _view(case: str, count: int, degree: int, static: bool) -> dict[str, Made]:
+    seeds = Seeds("render", case)
+    inputs = scene_inputs(seeds, count, degree, pose(static)) | cotangents(seeds)
+    return inputs | {"residual": seeds.uniform("residual", -0.2, 0.2, 3, count)}
+
+
+def _presets() -> list[Spec]:
+    shared = ("pixel_corner_camera", "low_pass_missing", "quaternion_xyzw")
+    moving = (*shared, "pose_inverted")
+    rows: list[tuple[str, RasterSettings, int, bool, str, tuple[str, ...]]] = [
+        ("exact", EXACT, 3, False, "The definition: every Gaussian at every pixel", (*moving, "cutoff_added")),
+        ("paper", PAPER, 3, False, "The shared semantics, moving camera",
+         (*moving, "cutoff_missing", "depth_gradient_dropped", "screen_gradient_in_ndc")),
+        ("legacy", LEGACY, 3, False, "The released code's support and gradients", (*moving, "deviations_off")),
+        *((f"paper_degree_{d}", PAPER, d, True, f"Degree {d}, static camera at the origin", shared) for d in range(3)),
+    ]  # fmt: skip
+    return [
+        Spec("render", case, "render", title, flags, lens_settings(preset, degree=degree),
+             _view(case, 12, degree, static), without=("visible",))
+        for case, preset, degree, static, title, flags in rows
+    ]  # fmt: skip
+
+
+def _hard(case: str, title: str, flags: tuple[str, ...], change: Callable[[dict[str, Made]], None], **more) -> Spec:
+    """Eight Gaussians of degree 1 before a static camera, with a change."""
+    inputs = _view(case, 8, 1, True)
+    change(inputs)
+    return Spec("render", case, "render", title, flags, lens_settings(PAPER, degree=1), inputs,
+                without=("visible",), **more)  # fmt: skip
+
+
+def _near(inputs: dict[str, Made]) -> None:
+    four = slice(0, 4)
+    z = [0.1984375, 0.2015625, -2.0, 0.0]
+    position = changed(inputs["position"], (2, four), z, "z of 0..3 is 0.198, 0.202, -2, 0")
+    inputs["position"] = changed(position, (slice(0, 2), four), 0.015625, "x, y of 0..3 are 1/64")
+    inputs["log_scale"] = changed(inputs["log_scale"], (slice(None), four), [[-4.0], [-4.5], [-5.0]],
+                                  "0..3 are -4, -4.5, -5")  # fmt: skip
+
+
+def _thin(inputs: dict[str, Made]) -> None:
+    inputs["log_scale"] = changed(inputs["log_scale"], (slice(None), slice(0, 3)), [[1.5], [-7.0], [-6.0]],
+                                  "0..2 are 1.5, -7, -6")  # fmt: skip
+
+
+def _no_turn(inputs: dict[str, Made]) -> None:
+    inputs["quaternion"] = changed(inputs["quaternion"], (slice(None), 4), 0.0, "quaternion 4 is 0")
+
+
+def _ties(inputs: dict[str, Made]) -> None:
+    inputs["position"] = changed(inputs["position"], 2, 4.0, "z is 4 for all")
+
+
+def _far(inputs: dict[str, Made]) -> None:
+    inputs["position"] = changed(inputs["position"], 0, inputs["position"].array[2] * 1.5, "x = 1.5 z")
+    inputs["log_scale"] = changed(inputs["log_scale"], ..., inputs["log_scale"].array + 1.25, "log-scale plus 1.25")
+
+
+def _empty(inputs: dict[str, Made]) -> None:
+    for name in ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual"):
+        inputs[name] = given(inputs[name].array[..., :0], "no Gaussian", inputs[name].unit)
+
+
+def _long_needles() -> Spec:
+    """A needle of three thousand pixels across the image, and two whose centres lie a thousand pixels outside."""
+    angle, along = np.array([0.7, 2.2, -0.4]), np.array([0.0, 260.0, -300.0])
+    axis = np.stack([np.cos(angle), np.sin(angle), 0 * angle])
+    middle = np.array([[0.1, -0.3, 0.2], [-0.2, 0.1, 0.4], [4.0, 4.5, 5.0]])
+    turn = np.stack([np.cos(angle / 2), 0 * angle, 0 * angle, np.sin(angle / 2)])
+    inputs = _view("long_needle", 3, 0, True) | {
+        "position": given(middle + along * axis, "(0.1, -0.2, 4), (-0.3, 0.1, 4.5), (0.2, 0.4, 5) plus (0, 260, -300) "
+                          "(cos a, sin a, 0), a = 0.7, 2.2, -0.4", "scene unit"),
+        "quaternion": given(turn, "(cos a/2, 0, 0, sin a/2)"),
+        "log_scale": given([[6.5] * 3, [-7.0] * 3, [-7.0] * 3], "6.5, -7, -7"),
+        "opacity_logit": given([2.0, 1.0, 0.5], "2, 1, 1/2"),
+    }  # fmt: skip
+    flags = ("determinant_cancels", "distance_cancels")
+    shape = ("d_position", "d_quaternion", "d_log_scale", "d_mean2d", "d_rotation_matrix", "d_translation")
+    return Spec("render", "long_needle", "render", "Needles of 3000 px keep their digits in float32", flags,
+                lens_settings(PAPER, degree=0), inputs,
+                without=("visible", *shape))  # fmt: skip
+
+
+def _out_of_view() -> Spec:
+    """In view; beside the image, near and far; behind; too faint; between the pixel centres."""
+    u = np.array([8.25, -2.0, -30.0, 10.0, 23.5, 9.0, 7.0, 12.0])
+    v = np.array([9.5, 6.0, 8.0, 40.0, 4.0, 9.0, 8.0, 7.0])
+    z = np.array([4.0, 5.0, 3.0, 6.0, 3.5, -2.0, 4.5, 5.5])
+    place = [(u - LENS["cx"]) / LENS["fx"] * z, (v - LENS["cy"]) / LENS["fy"] * z, z]
+    text = "; ".join(f"{name} = {', '.join(map(str, values.tolist()))}" for name, values in zip("uvz", (u, v, z)))
+    inputs = _view("visits", 8, 0, True) | {
+        "position": given(np.stack(place), f"seen at {text}", "scene unit"),
+        "log_scale": given([[-1.0] * 6 + [-7.0, -1.0]] * 3, "-1, that of 6 is -7"),
+        "opacity_logit": logit_of([0.8, 0.7, 0.9, 0.9, 0.8, 0.9, 0.0045, 0.003]),
+    }
+    return Spec("render", "visits", "render", "Which Gaussians the statistic of density control counts as visible",
+                ("visible_if_in_front",), lens_settings(PAPER, degree=0), inputs)  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """Presets and degrees, then hard scenes."""
+    return [
+        *_presets(),
+        _hard("near_plane", "z just below and above the near plane, behind, and 0", ("near_plane_zero",), _near),
+        _hard("needle", "Needles of forty pixels and a thousandth of one", ("low_pass_missing",), _thin),
+        _hard("zero_quaternion", "A zero quaternion renders as the identity", ("zero_quaternion",), _no_turn,
+              still=("quaternion",), own=("colour_image", "depth_image", "opacity_image")),
+        _hard("equal_depths", "All at one depth: index order", ("ties_reversed",), _ties,
+              still=("position", "rotation_matrix", "translation")),
+        _hard("off_axis", "Every centre beyond the limit of the Jacobian",
+              ("jacobian_clamp_missing", "clamp_term_twice"), _far),
+        _hard("no_gaussian", "No Gaussian: the background", ("background_missing",), _empty),
+        _long_needles(),
+        _out_of_view(),
+    ]  # fmt: skip
+
+
+# ---- mistakes ----
+
+
+def _inverse_matrix(screen: Screen, n: int, dx: NDArray, dy: NDArray) -> NDArray:
+    """The same distance as a quadratic form, whose terms cancel."""
+    (a, b, c), det = screen.covariance2d[:, n], screen.determinant[n]
+    return (c * dx * dx - 2 * b * dx * dy + a * dy * dy) / det
+
+
+def _single_precision(textbook_determinant: bool) -> Wrong:
+    """Composites in float32 and loses digits; its inputs are rounded, so that all machines lose the same."""
+
+    def wrong(request: Request) -> dict[str, NDArray] | None:
+        raster, i = raster_of(request.settings), request.inputs
+        if raster.support != "ellipse" or not i["position"].size:
+            return None
+        camera, degree = camera_of(i, request.settings), request.settings["degree"]
+        shape = covariance_forward(i["quaternion"], i["log_scale"])[0]
+        projected = projection_forward(i["position"], shape, camera, raster)[0]
+        centre = -(i["rotation_matrix"].T @ i["translation"])
+        colour = harmonics_forward(i["harmonics"], i["residual"], i["position"], centre, degree)[0]
+        rounded = (projected.mean2d, projected.covariance2d, projected.determinant, projected.depth,
+                   opacity_of(i["opacity_logit"]), colour)  # fmt: skip
+        arrays = [array[..., projected.visible].astype(np.float32) for array in rounded]
+        if textbook_determinant:
+            a, b, c = arrays[1]
+            arrays[2] = a * c - b * b
+        mean, cover, det, depth, opacity, colour = arrays
+        background = i["background"].astype(np.float32)
+        screen = Screen(mean, cover, det, depth, opacity, colour, background, camera.width, camera.height)
+        return composited(screen, raster, sum_of_squares if textbook_determinant else _inverse_matrix)
+
+    return wrong
+
+
+def _in_front(request: Request) -> dict[str, NDArray] | None:
+    if "visible" not in request.right:
+        return None
+    i = request.inputs
+    z = (i["rotation_matrix"] @ i["position"] + i["translation"][:, None])[2]
+    return {"visible": z > request.settings["raster"]["near"]}
+
+
+WRONG_PORTS = [
+    WrongPort("pixel_corner_camera", "Render half a pixel off", "at i; right: at i + 1/2",
+              within("camera", ("render", "objective"), cx=lambda v: v + 0.5, cy=lambda v: v + 0.5)),
+    WrongPort("screen_gradient_in_ndc", "Screen gradient per NDC unit", "times half the image size; right: per px",
+              {"render": lambda r: {"d_mean2d": r.right["d_mean2d"] * np.array(
+                  [[r.settings["camera"]["width"] / 2], [r.settings["camera"]["height"] / 2]])}
+               if "d_mean2d" in r.right else None}),
+    WrongPort("determinant_cancels", "Determinant as a c - b^2", "in float32; right: sum of non-negative terms",
+              {"render": _single_precision(textbook_determinant=True)}),
+    WrongPort("distance_cancels", "Distance by the inverse matrix", "in float32; right: a sum of two squares",
+              {"render": _single_precision(textbook_determinant=False)}),
+    WrongPort("visible_if_in_front", "All in front of the camera counted as visible", "z > near; right: with its box",
+              {"render": _in_front}),
+]  # fmt: skip

@@ -1,0 +1,50 @@
+"""Family `smoothness`: the smoothness loss (B9), with the edges of the image given.
+
+A rendered depth and image, a tissue mask and a mask of edges come in, so that no port needs an edge detector. The cases
+separate the squared steps inside tissue from the total variation outside.
+"""
+
+import numpy as np
+
+from endotsr.golden.vectors.images import HEIGHT, WIDTH, nothing, tool_mask
+from endotsr.golden.vectors.making import Seeds, Spec, given, scalar
+from endotsr.golden.vectors.wrong import WrongPort, only, swapped
+
+OPERATIONS = ("smoothness",)
+
+
+def cases() -> list[Spec]:
+    """Some, only and no tissue."""
+    edges = np.zeros((HEIGHT, WIDTH), bool)
+    edges[1:8, 4] = True
+    rows = [
+        ("generic", tool_mask(), "Squared steps of smooth tissue, total variation outside",
+         ("edges_ignored", "variation_of_tissue", "smoothness_on_all_pixels")),
+        ("all_tissue", given(np.ones((HEIGHT, WIDTH), bool), "all True"), "All tissue: no total variation",
+         ("variation_of_tissue", "edges_ignored")),
+        ("no_tissue", nothing(), "No tissue: total variation alone", ("variation_of_tissue",)),
+    ]  # fmt: skip
+    out = []
+    for case, mask, title, flags in rows:
+        seeds = Seeds("smoothness", case)
+        inputs = {
+            "rendered_depth": seeds.uniform("rendered_depth", 1.0, 3.0, HEIGHT, WIDTH, unit="scene unit"),
+            "rendered": seeds.uniform("rendered", 0.1, 0.9, 3, HEIGHT, WIDTH, unit="display"),
+            "mask": mask,
+            "edges": given(edges, "True in column 4, rows 1..7"),
+            "d_loss": scalar(0.5),
+        }
+        out.append(Spec("smoothness", case, "smoothness", title, flags, {"total_variation_factor": 3.0}, inputs))
+    return out
+
+
+# ---- mistakes ----
+
+WRONG_PORTS = [
+    WrongPort("edges_ignored", "Smoothing across edges", "all neighbours; right: not across an edge",
+              {"smoothness": swapped(lambda i: {"edges": np.zeros_like(i["edges"])})}),
+    WrongPort("variation_of_tissue", "Total variation of the tissue", "inside; right: of the excluded region",
+              {"smoothness": only(swapped(lambda i: {"mask": ~i["mask"]}), "d_rendered")}),
+    WrongPort("smoothness_on_all_pixels", "Squared steps on all pixels", "mask ignored; right: tissue only",
+              {"smoothness": only(swapped(lambda i: {"mask": np.ones_like(i["mask"])}), "d_rendered_depth")}),
+]  # fmt: skip

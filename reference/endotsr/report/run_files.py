@@ -1,0 +1,102 @@
+"""The files of an evaluation in a run folder: metrics.json, renders/, test/, curves.png and report.html.
+
+In: the metrics of a run and the renders of its held-out frames. Each file and folder is replaced whole.
+"""
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+from endotsr.config import config_to_toml
+from endotsr.opencv import write_png
+from endotsr.report.curves import curves_png, read_log
+from endotsr.report.data import FramePictures, ReportData
+from endotsr.report.figures import triptych, triptych_picture
+from endotsr.report.page import write_report
+from endotsr.report.pictures import rgb_bytes
+from endotsr.report.run_text import component_table, facts
+from endotsr.runs.files import replace_file, replacing_folder, write_json
+from endotsr.runs.folder import RunFolder
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.render import RenderOut
+
+
+def write_evaluation(
+    folder: RunFolder, sequence: Sequence, metrics: dict[str, Any], held_out: dict[int, RenderOut]
+) -> None:
+    """Write everything that `endotsr evaluate` leaves in a run folder.
+
+    metrics     of `evaluation.run.measure_run`
+    held_out    frame number -> render
+    """
+    _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
+    write_json(folder.path / "metrics.json", metrics)
+    reached = metrics["run"]["iteration"]
+    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= reached]  # what the checkpoint has seen
+    picture = curves_png(log, metrics)
+    if picture:
+        replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
+    write_report(folder.path / "report.html", _report_data(folder, sequence, metrics, held_out, log))
+
+
+def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: dict[int, RenderOut]) -> None:
+    """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
+    peers = folder.path / "test" / f"ours_{iteration}"
+    peers.parent.mkdir(exist_ok=True)
+    with replacing_folder(folder.path / "renders") as renders, replacing_folder(peers) as test:
+        for name in ("renders", "gt", "masks"):
+            (test / name).mkdir()
+        for number, (index, out) in enumerate(held_out.items()):
+            name = sequence.names[index]
+            truth, mask = sequence.frame(index).image, sequence.masks[index]
+            write_png(renders / f"{name}.png", rgb_bytes(out.colour))
+            write_png(renders / f"{name}_comparison.png", triptych_picture(triptych(out.colour, truth, mask)))
+            _link(renders / f"{name}.png", test / "renders" / f"{number:05d}.png")
+            write_png(test / "gt" / f"{number:05d}.png", rgb_bytes(truth))
+            write_png(test / "masks" / f"{number:05d}.png", (mask * 255).astype("uint8"))  # white = tissue
+
+
+def _link(source: Path, target: Path) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # a file system without hard links
+        shutil.copyfile(source, target)
+
+
+def _report_data(
+    folder: RunFolder,
+    sequence: Sequence,
+    metrics: dict[str, Any],
+    held_out: dict[int, RenderOut],
+    log: list[dict[str, Any]],
+) -> ReportData:
+    record = folder.record()
+    rows = {row["frame"]: row for row in metrics["held_out"]["per_frame"]}
+    frames = tuple(
+        FramePictures(
+            index=i,
+            name=sequence.names[i],
+            time=float(sequence.times[i]),
+            render=out.colour,
+            truth=sequence.frame(i).image,
+            mask=sequence.masks[i],
+            depth=out.depth,
+            metrics=rows[i],
+        )
+        for i, out in held_out.items()
+    )
+    return ReportData(
+        title=f"{Path(record['input']['source']).name}: {folder.path.absolute().name}",
+        evaluation=metrics,
+        log=log,
+        frames=frames,
+        reference_rows=tuple(metrics["published"]),
+        components=(component_table(metrics),),
+        facts=facts(metrics),
+        configuration=config_to_toml(folder.config()),
+        versions=record["versions"],
+        input_hashes=record["input"].get("files_sha256") or record["input"]["arrays_sha256"],
+        notes=tuple(record["input"]["notes"]),
+        depth_unit=sequence.unit,
+    )

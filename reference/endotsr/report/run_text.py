@@ -1,0 +1,90 @@
+"""The numbers of an evaluated run in words: facts, the table of components, the table on the terminal.
+
+In: the dictionary of metrics.json. Out: text and plain tables; no file, no HTML.
+"""
+
+from typing import Any
+
+from endotsr.evaluation.evaluate import left_out
+from endotsr.report.data import FreeTable
+from endotsr.report.words import duration
+
+SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
+TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
+
+
+def iterations(run: dict[str, Any]) -> str:
+    """How far the measured checkpoint is: "6000", or "2000 of 6000, the run is not finished"."""
+    done, planned = run["iteration"], run["iterations_planned"]
+    return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
+
+
+def facts(metrics: dict[str, Any]) -> dict[str, Any]:
+    """What a reader of the report wants to know about the run."""
+    run = metrics["run"]
+    about, machine = run["input"], run["machine"]
+    peak, memory = run["peak_memory_bytes"], machine["memory_bytes"]
+    return {
+        "Sequence": f"{about['source']}, {about['frames']} frames of {about['width']}x{about['height']}",
+        "Frames": f"{about['training_frames']} for training, {about['held_out_frames']} held out",
+        "Tissue": f"{about['tissue_fraction']:.1%} of the pixels",
+        "Iterations": iterations(run),
+        "Gaussians": run["gaussians"],
+        "Laplacian weight": run["lambda_lap"],
+        "Seed": run["seed"],
+        "Threads": run["threads"],
+        "Training time": duration(run["seconds"]),
+        "Peak memory": f"{peak / 1e9:.2f} GB" if peak else "not known",
+        "Machine": f"{machine['processor']}, {machine['cores']} cores, "
+        + (f"{memory / 1e9:.0f} GB" if memory else "memory not known"),
+        "System": machine["system"],
+    }
+
+
+def held_out_table(metrics: dict[str, Any]) -> str:
+    """The held-out means of model, baselines and published figures as text."""
+    rows = [("this model", metrics["held_out"]["mean"])]
+    rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
+    rows += [(entry["label"], entry) for entry in metrics["published"]]
+    columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
+    width = max(len(label) for label, _ in rows)
+    frames = len(metrics["held_out"]["per_frame"])
+    lines = [" ".join([f"{f'{frames} held-out frames':<{width}}", *(f"{label:>12}" for _, label, _ in columns)])]
+    for label, mean in rows:
+        cells = (f"{_number(mean.get(key), digits):>12}" for key, _, digits in columns)
+        lines.append(" ".join([f"{label:<{width}}", *cells]))
+    inside = metrics["training"]["mean"].get("psnr_tissue")
+    lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
+    if frames := left_out(metrics):
+        lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
+    if metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
+        lines.append(f"checkpoint of iteration {iterations(metrics['run'])}")
+    if metrics["lpips_reason"]:
+        lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")
+    return "\n".join(lines)
+
+
+def component_table(metrics: dict[str, Any]) -> FreeTable:
+    """Held-out means of the model rendered without one component at a time."""
+    whole = metrics["components"][0]
+    rows = []
+    for row in metrics["components"]:
+        cells = [_number(row.get(key), digits) for key, _, digits in SHOWN]
+        change = None if row is whole else _gain(row, whole)
+        rows.append((row["label"], *cells, "" if change is None else f"{change:+.2f} dB"))
+    return FreeTable(
+        "Held-out means with one component taken out",
+        ("Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"),
+        tuple(rows),
+        "The trained model, rendered with the named residual set to zero. Component L, the Laplacian loss, acts in "
+        "training only; to see it, train with --model.no-laplacian.",
+    )
+
+
+def _gain(row: dict[str, Any], whole: dict[str, Any]) -> float | None:
+    a, b = row.get("psnr_tissue"), whole.get("psnr_tissue")
+    return None if a is None or b is None else a - b
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

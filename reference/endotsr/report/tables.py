@@ -1,0 +1,53 @@
+"""Tables from rows of text, in the three forms that are written anywhere: aligned text, Markdown, HTML.
+
+Comes in: column heads and rows whose cells are text already; for HTML, whose cells are HTML already. Goes out: one
+string. Knows nothing of what a cell means: numbers are formatted by the caller.
+"""
+
+import html
+from collections.abc import Iterable, Sequence
+
+
+def plain(columns: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = (0,), rule: bool = False) -> str:
+    """Columns aligned by spaces, two between them, for a terminal.
+
+    left   positions of the columns whose text begins at the left; the others end at the right
+    rule   a line of dashes below the heads
+    """
+    lines = [tuple(columns), *(tuple(row) for row in rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(columns))]
+    if rule:
+        lines.insert(1, tuple("-" * width for width in widths))
+    return "\n".join(_aligned(line, widths, left) for line in lines)
+
+
+def _aligned(line: Sequence[str], widths: Sequence[int], left: Sequence[int]) -> str:
+    cells = [text.ljust(w) if i in left else text.rjust(w) for i, (text, w) in enumerate(zip(line, widths))]
+    return "  ".join(cells).rstrip()
+
+
+def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table; cells may hold Markdown without line breaks and bars."""
+    body = ["| " + " | ".join(line) + " |" for line in (columns, *rows)]
+    return "\n".join([body[0], "|" + "---|" * len(columns), *body[1:]])
+
+
+def html_table(
+    columns: Iterable[str], rows: Iterable[Iterable[str]], classes: Iterable[str] = (), caption: str = ""
+) -> str:
+    """A table that scrolls sideways on a narrow page; the first column stays in sight (see `report.parts.STYLE`).
+
+    columns, caption   text, which is escaped
+    rows               cells, which are HTML already
+    classes            class of each row; "" or no entry = none
+    """
+    head = "".join(f'<th scope="col">{html.escape(column)}</th>' for column in columns)
+    kinds = list(classes)
+    body = []
+    for position, (first, *rest) in enumerate(rows):
+        kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
+        body.append(f'<tr{kind}><th scope="row">{first}</th>' + "".join(f"<td>{c}</td>" for c in rest) + "</tr>")
+    title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
+    return (
+        f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div>'
+    )

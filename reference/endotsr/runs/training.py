@@ -1,0 +1,191 @@
+"""A training that fills a run folder: started, resumed, logged, saved and stopped without loss.
+
+In: a sequence, settings, and an observer that is told of every iteration. Out: the run folder with log, checkpoints and
+run.json. A signal finishes the current iteration and writes a checkpoint; the errors say how to continue the run.
+Prints nothing itself.
+"""
+
+import contextlib
+import shutil
+import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.runs.files import os_error_line
+from endotsr.runs.folder import RunFolder, create_run
+from endotsr.runs.log import RunLog
+from endotsr.runs.machine import now, peak_memory_bytes
+from endotsr.runs.record import new_record
+from endotsr.runs.stopping import finishing, stop_asked
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from endotsr.fitting.state import TrainingState
+    from endotsr.sequences.sequence import Sequence
+    from endotsr.simulator.settings import SimulatorSettings
+
+
+class RunStopped(InputError):
+    """The file system refused in the middle of a run."""
+
+
+class Observer(Protocol):
+    """What is told of a training while it runs."""
+
+    def begin(self, start: int) -> None:
+        """The training begins after iteration `start`."""
+
+    def update(self, entry: dict[str, Any]) -> None:
+        """The log entry of one iteration."""
+
+    def say(self, message: str) -> None:
+        """One line for a person."""
+
+    def close(self) -> None:
+        """The training has ended."""
+
+
+def start_record(
+    command: list[str], source: str, sequence: "Sequence", config: Config, simulator: "SimulatorSettings", threads: int
+) -> dict[str, Any]:
+    """run.json at the start of a run."""
+    from endotsr.runs.sources import input_record
+
+    about = input_record(source, sequence, config, simulator)
+    return new_record(command, config, threads, about)
+
+
+def train_new_run(
+    out: "Path", record: dict[str, Any], sequence: "Sequence", config: Config, observer: Observer
+) -> RunFolder:
+    """A new run folder, trained to the end. A folder that got no checkpoint is removed; errors as in `train_run`."""
+    from endotsr.fitting.state import new_training
+    from endotsr.runs.sources import sequence_record
+
+    state = new_training(sequence, config)
+    folder = create_run(out, config, record, sequence_record(sequence))
+    try:
+        with folder.locked():
+            train_run(folder, state, sequence, config, observer)
+    except RunStopped as stopped:
+        if folder.checkpoint.exists():
+            raise
+        shutil.rmtree(folder.path, ignore_errors=True)  # nothing of use was written
+        raise InputError(str(stopped).split(";")[0]) from None
+    return folder
+
+
+def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: Observer) -> None:
+    """Train a run from its last checkpoint to the end, with the settings of its config.toml."""
+    from endotsr.fitting.state import new_training
+    from endotsr.runs.model import load_training
+
+    config = folder.config()
+    with folder.locked():
+        folder.remove_leftovers()
+        state = load_training(folder, config) if folder.checkpoint.exists() else new_training(sequence, config)
+        planned = config.training.iterations
+        observer.say(f"resuming {folder.path} after iteration {state.iteration} of {planned}")
+        if state.iteration < planned:
+            entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
+            folder.update(status="running", resumed=[*folder.record().get("resumed", []), entry])
+            train_run(folder, state, sequence, config, observer)
+
+
+def train_run(
+    folder: RunFolder, state: "TrainingState", sequence: "Sequence", config: Config, observer: Observer
+) -> "TrainingState":
+    """Train from `state` to the end, with log, checkpoints and observer; returns the last state.
+
+    A signal finishes the current iteration and writes a checkpoint, so that nothing is lost. After a second signal, or
+    an iteration that takes too long, the last checkpoint remains.
+
+    Raises:  KeyboardInterrupt or RunStopped (a full disk) with a line that says how to continue; the last checkpoint
+             and the log up to it are whole in both cases. FloatingPointError if the loss is not finite.
+    """
+    from endotsr.fitting.compile_ahead import compile_ahead
+    from endotsr.fitting.trainer import train
+
+    recorder = _Recorder(folder, state, config, observer)
+    observer.begin(state.iteration)
+    try:
+        with finishing():
+            compile_ahead(config, observer.say)
+            last = train(
+                state, sequence, config, recorder.on_iteration, recorder.on_checkpoint, on_message=observer.say
+            )
+        recorder.finish(last)
+    except (KeyboardInterrupt, Exception) as error:
+        reason = recorder.stop(error, state)
+        if reason is error:
+            raise
+        raise reason from None
+    finally:
+        observer.close()
+        recorder.log.close()
+    return last
+
+
+class _Recorder:
+    """Writes log, checkpoints and run.json of one training while it runs."""
+
+    def __init__(self, folder: RunFolder, state: "TrainingState", config: Config, observer: Observer) -> None:
+        self.log = RunLog(folder.log, state.iteration)
+        self._folder, self._config, self._observer = folder, config, observer
+        self._seconds_before, self._began = self.log.seconds, time.monotonic()
+        self._last_tick = self._began
+        self._saved = state.iteration if folder.checkpoint.exists() else None
+        self._between_iterations = False  # whether the run was stopped after a whole iteration
+
+    def on_iteration(self, entry: dict[str, Any]) -> None:
+        """Log one iteration. Raises KeyboardInterrupt after a signal."""
+        tick = time.monotonic()
+        self.log.append(entry | {"seconds": round(tick - self._last_tick, 5)})
+        self._last_tick = tick
+        self._observer.update(entry)
+        if stop_asked():
+            self._between_iterations = True
+            raise KeyboardInterrupt
+
+    def on_checkpoint(self, state: "TrainingState") -> None:
+        """Replace the checkpoint."""
+        from endotsr.runs.model import save_training
+
+        save_training(self._folder, state, self._config)
+        self._saved = state.iteration
+        self._folder.update(iterations_done=self._saved, lambda_lap=state.lambda_lap, **self._costs())
+
+    def finish(self, last: "TrainingState") -> None:
+        """Save the last state and mark the run as finished."""
+        if self._saved != last.iteration:
+            self.on_checkpoint(last)
+        self._folder.update(status="finished", finished=now(), iterations_done=last.iteration, **self._costs())
+
+    def stop(self, error: BaseException, state: "TrainingState") -> BaseException:
+        """Save what can be saved and mark the run; returns the error that says how to continue it."""
+        if isinstance(error, KeyboardInterrupt) or stop_asked():
+            if self._between_iterations:
+                with contextlib.suppress(OSError, KeyboardInterrupt):  # the checkpoint before is still there
+                    self._observer.say(f"stopping after iteration {state.iteration}, writing a checkpoint")
+                    self.on_checkpoint(state)
+            self._mark("interrupted")
+            return KeyboardInterrupt(self._advice())
+        self._mark("failed")
+        if isinstance(error, OSError):
+            return RunStopped(f"{os_error_line(error, self._folder.path)}; {self._advice()}")
+        return error
+
+    def _advice(self) -> str:
+        saved = self._saved
+        kept = f"the checkpoint of iteration {saved} is kept" if saved else "no checkpoint yet, it starts again"
+        return f"{kept}; continue with `endotsr train --out {self._folder.path} --resume`"
+
+    def _mark(self, status: str) -> None:
+        with contextlib.suppress(OSError):  # a full disk cannot take the note either
+            self._folder.update(status=status)
+
+    def _costs(self) -> dict[str, Any]:
+        seconds = self._seconds_before + time.monotonic() - self._began
+        return {"seconds": round(seconds, 2), "peak_memory_bytes": peak_memory_bytes()}

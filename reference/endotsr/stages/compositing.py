@@ -1,0 +1,248 @@
+"""Stages that make images: compositing of screen Gaussians (B5), and the whole render (B2) to (B5)."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.splatting import compositing
+from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
+from endotsr.splatting.fast import blocks as compositing_blocks
+from endotsr.splatting.projection import Projected
+from endotsr.splatting.records import (
+    INVERSE_C,
+    OPACITY,
+    PRECISION,
+    SLOPE,
+    U,
+    V,
+    gather_gradients,
+    log_opacity,
+    pack_records,
+)
+from endotsr.splatting.render import CONIC_EPSILON, RenderSaved, Scene, render_forward, render_reverse
+from endotsr.splatting.settings import EXACT, RasterSettings
+from endotsr.stages.made_up import AXES, COUNT, HEIGHT, LENS, WIDE, WIDTH, is_near, pose, raw_gaussians
+from endotsr.stages.requests import camera_of, compositor_of, raster_dict, raster_of, scene_of
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+
+Random = np.random.Generator
+IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
+
+
+# ---- compositing (B5) ----
+
+
+class CompositeSaved(NamedTuple):
+    """What the reverse pass of a compositor needs, and the gather behind it."""
+
+    compositor: Any  # saved tuple of either compositor
+    transmittance: NDArray  # (H, W)
+    projected: Projected
+    order: NDArray
+    opacity_logit: NDArray
+    raster: RasterSettings
+
+
+def _composite(inputs: Inputs, settings: Settings) -> tuple[Found, CompositeSaved]:
+    raster, (width, height) = raster_of(settings), (settings["width"], settings["height"])
+    a, b, c = inputs["covariance2d"]
+    seen = np.ones(a.size, bool)
+    projected = Projected(inputs["mean2d"], inputs["covariance2d"], a * c - b * b, inputs["depth"], seen)
+    log_alpha = log_opacity(inputs["opacity_logit"])
+    box, visible = screen_boxes(projected, log_alpha, raster, width, height)
+    order = depth_order(inputs["depth"], visible)
+    records = pack_records(order, projected, log_alpha, inputs["colour"])
+    blocks = compositor_of(settings) == "blocks"
+    module = compositing_blocks if blocks else compositing
+    lists = tile_lists(box, order, module.TILE_WIDTH, module.TILE_HEIGHT, width, height)
+    forward = compositing_blocks.composite_blocks_forward if blocks else compositing.composite_forward
+    out, saved = forward(records, lists, raster, inputs["background"], width, height)
+    images = dict(zip(IMAGES, (out.colour, out.depth, out.opacity)))
+    return images, CompositeSaved(saved, out.transmittance, projected, order, inputs["opacity_logit"], raster)
+
+
+def _composite_reverse(cotangents: Inputs, saved: CompositeSaved) -> Found:
+    colour, depth, opacity = (cotangents[name] for name in IMAGES)
+    if isinstance(saved.compositor, compositing_blocks.BlocksSaved):
+        pairs = compositing_blocks.composite_blocks_reverse(colour, depth, opacity, saved.compositor)
+    else:
+        pairs = compositing.composite_reverse(colour, depth, opacity, saved.compositor)
+    deviations, (records, lists) = saved.raster.deviations, (saved.compositor.records, saved.compositor.lists)
+    grads = gather_gradients(
+        saved.order, records, lists, pairs, saved.projected.determinant, saved.opacity_logit,
+        conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
+        keep_depth=not deviations.drop_depth_to_z,
+    )  # fmt: skip
+    names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth")
+    background = compositing.background_gradient(colour, saved.transmittance)
+    return dict(zip(names, grads)) | {"background": background}
+
+
+def _composite_trace(inputs: Inputs, settings: Settings, saved: CompositeSaved) -> dict[str, NDArray]:
+    size = settings["width"], settings["height"]
+    return {"order": saved.order, **decisions(saved.compositor.records, saved.raster, *size)}
+
+
+def decisions(records: NDArray, raster: RasterSettings, width: int, height: int) -> dict[str, NDArray]:
+    """Which pairs contribute and which are clamped, (n, H, W), nearest first; plain NumPy."""
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    transmittance, live = np.ones((height, width)), np.ones((height, width), bool)
+    contributes, clamped = [], []
+    for record in records:
+        dy = y - record[V]
+        eta = x - record[U] - record[SLOPE] * dy
+        value = record[OPACITY] * np.exp(-0.5 * (record[INVERSE_C] * dy * dy + record[PRECISION] * eta * eta))
+        alpha = np.minimum(value, raster.alpha_max)
+        wanted = live & (alpha >= raster.alpha_cutoff)
+        behind = np.where(wanted, transmittance * (1 - alpha), transmittance)
+        live &= ~(wanted & (behind < raster.transmittance_stop))
+        taken = wanted & live
+        transmittance = np.where(taken, behind, transmittance)
+        contributes.append(taken)
+        clamped.append(value > raster.alpha_max)
+    return {"contributes": np.array(contributes, int), "clamped": np.array(clamped, int)}
+
+
+def _composite_inputs(rng: Random) -> dict[str, NDArray]:
+    """Screen Gaussians wide enough to cover the image; one nearly opaque (beyond the alpha clamp at its centre)."""
+    n = COUNT
+    a, c = rng.uniform(60, 150, n), rng.uniform(60, 150, n)
+    logit = rng.uniform(-2.0, 1.0, n)
+    logit[2] = 6.5
+    return {
+        "mean2d": np.stack([rng.uniform(0, WIDTH, n), rng.uniform(0, HEIGHT, n)]),
+        "covariance2d": np.stack([a, rng.uniform(-0.6, 0.6, n) * np.sqrt(a * c), c]),
+        "opacity_logit": logit,
+        "colour": rng.uniform(0.1, 1.0, (3, n)),
+        "depth": 3.0 + 0.4 * rng.permutation(n) + rng.uniform(-0.05, 0.05, n),
+        "background": rng.uniform(0.1, 0.9, 3),
+    }
+
+
+# ---- the whole render ----
+
+
+def _render(inputs: Inputs, settings: Settings) -> tuple[Found, RenderSaved]:
+    out, saved = render_forward(
+        scene_of(inputs), camera_of(inputs, settings), raster_of(settings),
+        degree=settings["degree"], background=inputs["background"], compositor=compositor_of(settings),
+    )  # fmt: skip
+    return dict(zip(IMAGES, (out.colour, out.depth, out.opacity))), saved
+
+
+def _render_reverse(cotangents: Inputs, saved: RenderSaved) -> Found:
+    colour, depth, opacity = (cotangents[name] for name in IMAGES)
+    grads = render_reverse(colour, depth, opacity, saved, background_gradient=True, pose_gradient=True)
+    assert grads.camera is not None and grads.background is not None
+    found = {name: getattr(grads, name) for name in (*Scene._fields, "mean2d", "background")}
+    dtype = saved.scene.position.dtype
+    pose_gradient = {"rotation_matrix": grads.camera.rotation, "translation": grads.camera.translation}
+    return found | {name: value.astype(dtype) for name, value in pose_gradient.items()}
+
+
+def _render_trace(inputs: Inputs, settings: Settings, saved: RenderSaved) -> dict[str, NDArray]:
+    return render_decisions(saved)
+
+
+def render_decisions(saved: RenderSaved) -> dict[str, NDArray]:
+    """Order, colours clamped at zero, contributors and clamped alphas of a render."""
+    found = decisions(saved.composite.records, saved.settings, saved.camera.width, saved.camera.height)
+    return {"order": saved.order, "dark": saved.harmonics.clamped.astype(int), **found}
+
+
+def _render_inputs(rng: Random) -> dict[str, NDArray]:
+    background = rng.uniform(0.1, 0.9, 3)
+    return raw_gaussians(rng) | {"background": background} | pose()
+
+
+HARMONICS = {f"harmonics degree {d}": slice(d * d, (d + 1) ** 2) for d in range(4)}
+
+
+def _variants(stage: str) -> tuple[Variant, ...]:
+    """The definition with both presets, and the fast compositor where it answers too."""
+    made = []
+    for name, raster in (("exact", EXACT), ("paper", WIDE), ("blocks", WIDE)):
+        common = {"raster": raster_dict(raster), "_compositor": "blocks" if name == "blocks" else "definition"}
+        covers = _blocks_answer if name == "blocks" else is_near(name)
+        if stage == "composite":
+            function = "endotsr.splatting.fast.blocks.composite_blocks_forward" if name == "blocks" else ""
+            settings = common | {"width": WIDTH, "height": HEIGHT}
+            made.append(Variant(f"composite_{name}", _composite_inputs, settings, covers=covers, function=function))
+        else:
+            blocks = split_blocks({"position": AXES, "harmonics": HARMONICS})
+            settings = common | {"camera": LENS, "degree": 3}
+            made.append(Variant(f"render_{name}", _render_inputs, settings, blocks=blocks, covers=covers))
+    return tuple(made)
+
+
+def _blocks_answer(settings: Settings) -> bool:
+    return compositing_blocks.supports(raster_of(settings))
+
+
+DRAWN, REVERSED = "splatting_oracle.render", "splatting_oracle.composite_reverse"
+UNITS = dict(zip(IMAGES, ("display", "scene unit", "1")))
+RAW_UNITS = {
+    "position": "scene unit",
+    "quaternion": "1",
+    "log_scale": "1",
+    "opacity_logit": "1",
+    "harmonics": "display / Y00",
+}
+POSE_UNITS = {"rotation_matrix": "1", "translation": "scene unit"}
+
+STAGES = [
+    Stage(
+        name="composite",
+        equation="B5",
+        text="blend screen Gaussians",
+        function="endotsr.splatting.compositing.composite_forward",
+        inputs={
+            "mean2d": "px",
+            "covariance2d": "px^2",
+            "opacity_logit": "1",
+            "colour": "display",
+            "depth": "scene unit",
+            "background": "display",
+        },
+        forward=_composite,
+        asked={
+            **{name: Asked(1, unit, oracle="splatting_oracle.composite") for name, unit in UNITS.items()},
+            "d_mean2d": Asked(2, "loss per px", "last", REVERSED),
+            "d_covariance2d": Asked(2, "loss per px^2", "last", REVERSED),
+            "d_opacity_logit": Asked(2, "loss", "last", REVERSED),
+            "d_colour": Asked(2, "loss per display unit", "last", REVERSED),
+            "d_depth": Asked(2, "loss per scene unit", "last", REVERSED),
+            "d_background": Asked(2, "loss per display unit", oracle=REVERSED),
+        },
+        reverse=_composite_reverse,
+        trace=_composite_trace,
+        variants=_variants("composite"),
+    ),
+    Stage(
+        name="render",
+        equation="B5",
+        text="one view of deformed Gaussians",
+        function="endotsr.splatting.render.render_forward",
+        inputs={**RAW_UNITS, "residual": "display / Y00", "background": "display", **POSE_UNITS},
+        forward=_render,
+        asked={
+            **{name: Asked(3, unit, oracle=DRAWN) for name, unit in UNITS.items()},
+            "visible": Asked(3, scale="exact"),
+            "d_position": Asked(3, "loss per scene unit", "last"),
+            "d_quaternion": Asked(3, "loss", "last"),
+            "d_log_scale": Asked(3, "loss", "last"),
+            "d_opacity_logit": Asked(3, "loss", "last"),
+            "d_harmonics": Asked(3, "loss", "last"),
+            "d_residual": Asked(3, "loss", "last"),
+            "d_mean2d": Asked(3, "loss per px", "last"),
+            "d_background": Asked(3, "loss per display unit"),
+            "d_rotation_matrix": Asked(3, "loss"),
+            "d_translation": Asked(3, "loss per scene unit"),
+        },
+        reverse=_render_reverse,
+        extra=lambda inputs, settings, saved: {"visible": saved.visible},
+        trace=_render_trace,
+        variants=_variants("render"),
+    ),
+]

@@ -1,0 +1,138 @@
+"""Stages of the Laplacian loss (5) and the calibration of its weight (7)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.equations.calibration import calibrate, rms
+from endotsr.equations.laplacian import (
+    LaplacianSaved,
+    SupportMasks,
+    laplacian_levels,
+    laplacian_loss_forward,
+    laplacian_loss_reverse,
+    support_masks,
+)
+from endotsr.equations.pyramid import Upsampling
+from endotsr.errors import CalibrationError
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+
+LEVELS = 3
+IMAGE_SHAPE = (3, 19, 22)  # odd and even; sizes 19x22, 10x11, 5x6, 3x3
+
+
+# ---- equation (5) ----
+
+
+def _laplacian(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[LaplacianSaved, SupportMasks]]:
+    rule = settings["upsampling"]
+    masks = support_masks(inputs["mask"], settings["levels"], rule)
+    loss, saved = laplacian_loss_forward(inputs["rendered"], inputs["observed"], masks, rule)
+    return {"loss": loss}, (saved, masks)
+
+
+def _laplacian_reverse(cotangents: Inputs, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
+    return {"rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
+
+
+def _bands(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
+    """Bands of the observed image and their valid pixels."""
+    pyramid = laplacian_levels(inputs["observed"], settings["levels"], settings["upsampling"])
+    bands = {f"band_{j}": band for j, band in enumerate(pyramid.bands, start=1)}
+    return bands | {f"valid_{j}": valid for j, valid in enumerate(saved[1].bands, start=1)}
+
+
+def _laplacian_trace(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]):
+    return {f"signs_{j}": sign for j, sign in enumerate(saved[0].signs, start=1)}
+
+
+def observed_image(shape: tuple[int, int, int] = IMAGE_SHAPE) -> NDArray[np.float64]:
+    """The constant observed image of the gradient checks, from a closed formula."""
+    c, y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
+    return 0.5 + 0.3 * np.sin(0.9 * x + 0.4 * c) * np.cos(0.7 * y)
+
+
+def tissue_mask(shape: tuple[int, int] = IMAGE_SHAPE[1:]) -> NDArray[np.bool_]:
+    """Its mask: an instrument in the lower right corner, small enough that every level keeps valid pixels."""
+    y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
+    return (y < shape[0] - 2) | (x < shape[1] - 3)
+
+
+def _kink_distance(rendered: NDArray, masks: SupportMasks) -> float:
+    bands = laplacian_levels(rendered - observed_image(), len(masks.bands), masks.upsampling).bands
+    return min(float(np.abs(band[:, valid]).min()) for band, valid in zip(bands, masks.bands))
+
+
+def _variant(rule: Upsampling) -> Variant:
+    def inputs(rng: np.random.Generator) -> dict[str, NDArray]:
+        """Of 16 draws the one whose valid band differences stay furthest from the kink of |.|."""
+        masks = support_masks(tissue_mask(), LEVELS, rule)
+        draws = [observed_image() + rng.normal(0.0, 0.3, IMAGE_SHAPE) for _ in range(16)]
+        return {"rendered": max(draws, key=lambda rendered: _kink_distance(rendered, masks))}
+
+    return Variant(
+        f"laplacian_loss_{rule}",
+        inputs,
+        settings={"upsampling": rule, "levels": LEVELS},
+        fixed=lambda dtype: {"observed": observed_image(), "mask": tissue_mask()},
+        blocks=split_blocks({"rendered": {f"rendered[{c}]": np.s_[c : c + 1] for c in range(IMAGE_SHAPE[0])}}),
+        covers=lambda settings: settings["upsampling"] == rule,
+    )
+
+
+# ---- equation (7) ----
+
+
+def _calibration(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """One row a view; the gradients come as images, so that the RMS is part of the case."""
+    g_rgb = [rms(view) for view in inputs["d_photometric"]]
+    g_lap = [rms(view) for view in inputs["d_laplacian"]]
+    views = [(str(k), a, b) for k, (a, b) in enumerate(zip(g_rgb, g_lap))]
+    try:
+        weight, refused = calibrate(views, settings["gradient_ratio"]).lambda_lap, False
+    except CalibrationError:
+        weight, refused = 0.0, True
+    return {
+        "g_rgb": np.array(g_rgb),
+        "g_lap": np.array(g_lap),
+        "lambda_lap": weight,
+        "refused": np.array(refused),
+    }, None
+
+
+PER_DISPLAY = "loss per display unit"
+MASKS = "laplacian_oracle.masks_by_impulse_response"
+
+STAGES = [
+    Stage(
+        name="laplacian",
+        equation="5",
+        text="pyramid of the observed image, valid pixels, loss",
+        function="endotsr.equations.laplacian.laplacian_loss_forward",
+        inputs={"rendered": "display", "observed": "display", "mask": "1"},
+        forward=_laplacian,
+        asked={
+            **{f"band_{j}": Asked(1, "display", oracle="laplacian_oracle.pyramid") for j in range(1, LEVELS + 1)},
+            **{f"valid_{j}": Asked(1, scale="exact", oracle=MASKS) for j in range(1, LEVELS + 1)},
+            "loss": Asked(1, "display", oracle="laplacian_oracle.loss"),
+            "d_rendered": Asked(2, PER_DISPLAY, oracle="laplacian_oracle.loss_gradient"),
+        },
+        reverse=_laplacian_reverse,
+        extra=_bands,
+        trace=_laplacian_trace,
+        variants=(_variant("co_sited"), _variant("half_pixel")),
+    ),
+    Stage(
+        name="calibration",
+        equation="7",
+        text="detail weight from gradient images",
+        function="endotsr.equations.calibration.calibrate",
+        inputs={"d_photometric": PER_DISPLAY, "d_laplacian": PER_DISPLAY},
+        forward=_calibration,
+        asked={
+            "g_rgb": Asked(1, PER_DISPLAY),
+            "g_lap": Asked(1, PER_DISPLAY),
+            "lambda_lap": Asked(1, oracle="calibration_oracle.view_median_weight"),
+            "refused": Asked(1, scale="exact"),
+        },
+    ),
+]

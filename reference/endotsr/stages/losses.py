@@ -1,0 +1,211 @@
+"""Stages of the base losses (B6) to (B9). In a gradient check the observed frame, its mask and the prior are fixed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.losses.depth import (
+    DepthSaved,
+    DepthTarget,
+    depth_target,
+    normalised_depth_forward,
+    normalised_depth_reverse,
+)
+from endotsr.losses.masked_l1 import MaskedL1Saved, masked_l1_forward, masked_l1_reverse
+from endotsr.losses.masked_ssim import SsimSaved, masked_ssim_forward, masked_ssim_reverse, ssim_target
+from endotsr.losses.smoothness import SmoothnessSaved, smoothness_forward, smoothness_reverse
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
+
+Random = np.random.Generator
+
+CHANNELS, HEIGHT, WIDTH = 3, 9, 14
+FACTOR = 3.0  # total variation against squared steps: both parts of the gradient must show
+PEAK = (5, 3)  # the pixel that holds the largest rendered depth
+TEXTBOOK = 2e-4  # E[x^2] - E[x]^2 in float32 over C2 = 9e-4: the usual form of SSIM loses this much
+PER_DISPLAY, PER_LENGTH = "loss per display unit", "loss per scene unit"
+
+
+def _mask() -> NDArray[np.bool_]:
+    """A tool that reaches in from the right and one excluded pixel alone."""
+    mask = np.ones((HEIGHT, WIDTH), bool)
+    mask[2:5, 8:] = False
+    mask[7, 2] = False
+    return mask
+
+
+def _observed() -> NDArray[np.float64]:
+    return np.random.default_rng(61).uniform(0.2, 0.8, (CHANNELS, HEIGHT, WIDTH))
+
+
+def _frame(dtype: np.dtype) -> dict[str, NDArray]:
+    return {"observed": _observed().astype(dtype), "mask": _mask()}
+
+
+# ---- masked L1 ----
+
+
+def _l1(inputs: Inputs, settings: Settings) -> tuple[Found, MaskedL1Saved]:
+    loss, saved = masked_l1_forward(inputs["rendered"], inputs["observed"], inputs["mask"])
+    return {"loss": loss}, saved
+
+
+def _l1_reverse(cotangents: Inputs, saved: MaskedL1Saved) -> Found:
+    return {"rendered": masked_l1_reverse(float(cotangents["loss"]), saved)}
+
+
+def _l1_trace(inputs: Inputs, settings: Settings, saved: MaskedL1Saved) -> dict[str, NDArray]:
+    return {"sign": np.sign(inputs["rendered"] - inputs["observed"]).astype(int)}
+
+
+def _l1_inputs(rng: Random) -> dict[str, NDArray]:
+    """Differences of 0.1 to 0.3 in both directions: far from the kink at equality."""
+    shape = (CHANNELS, HEIGHT, WIDTH)
+    difference = rng.uniform(0.1, 0.3, shape) * rng.choice([-1.0, 1.0], shape)
+    return {"rendered": _observed() + difference}
+
+
+# ---- masked SSIM ----
+
+
+def _ssim(inputs: Inputs, settings: Settings) -> tuple[Found, SsimSaved]:
+    ssim, saved = masked_ssim_forward(inputs["rendered"], ssim_target(inputs["observed"], inputs["mask"]))
+    return {"ssim": ssim}, saved
+
+
+def _ssim_reverse(cotangents: Inputs, saved: SsimSaved) -> Found:
+    return {"rendered": masked_ssim_reverse(float(cotangents["ssim"]), saved)}
+
+
+def _ssim_inputs(rng: Random) -> dict[str, NDArray]:
+    return {"rendered": _observed() + 0.15 * rng.standard_normal((CHANNELS, HEIGHT, WIDTH))}
+
+
+# ---- normalised depth ----
+
+
+def _depth(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[DepthSaved, DepthTarget]]:
+    target = depth_target(inputs["prior_depth"], inputs["mask"])
+    loss, saved = normalised_depth_forward(inputs["rendered_depth"], target)
+    return {"loss": loss}, (saved, target)
+
+
+def _depth_reverse(cotangents: Inputs, saved: tuple[DepthSaved, DepthTarget]) -> Found:
+    return {"rendered_depth": normalised_depth_reverse(float(cotangents["loss"]), saved[0])}
+
+
+def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[DepthSaved, DepthTarget]) -> dict[str, NDArray]:
+    depth = inputs["rendered_depth"]
+    residual = depth / depth.max() - saved[1].normalised
+    return {"peak": np.array(int(depth.argmax())), "sign": np.sign(residual).astype(int)}
+
+
+def _priors(dtype: np.dtype) -> dict[str, NDArray]:
+    """Priors of 40 to 60 with three holes; the largest one is not where the render has its largest."""
+    prior = np.random.default_rng(67).uniform(40.0, 55.0, (HEIGHT, WIDTH))
+    prior[0, 0], prior[3, 1], prior[6, 6] = 0.0, -1.0, np.nan
+    prior[8, 13], prior[PEAK] = 60.0, 48.0
+    return {"prior_depth": prior.astype(dtype), "mask": _mask()}
+
+
+def _depth_inputs(rng: Random) -> dict[str, NDArray]:
+    """Residuals of 0.04 to 0.1 in both directions, and a largest depth well above the second largest."""
+    residual = rng.uniform(0.04, 0.1, (HEIGHT, WIDTH)) * rng.choice([-1.0, 1.0], (HEIGHT, WIDTH))
+    target = depth_target(*_priors(np.dtype(np.float64)).values())
+    fraction = np.minimum(target.normalised, 0.85) + residual
+    fraction[PEAK] = 1.0
+    return {"rendered_depth": fraction * rng.uniform(60.0, 80.0)}
+
+
+# ---- smoothness ----
+
+
+def _smoothness(inputs: Inputs, settings: Settings) -> tuple[Found, SmoothnessSaved]:
+    images = (inputs["rendered_depth"], inputs["rendered"], inputs["mask"], inputs["edges"])
+    loss, saved = smoothness_forward(*images, settings["total_variation_factor"])
+    return {"loss": loss}, saved
+
+
+def _smoothness_reverse(cotangents: Inputs, saved: SmoothnessSaved) -> Found:
+    return smoothness_reverse(float(cotangents["loss"]), saved)._asdict()
+
+
+def _smoothness_trace(inputs: Inputs, settings: Settings, saved: SmoothnessSaved) -> dict[str, NDArray]:
+    outside = [np.where(inputs["mask"], 0, inputs[name]) for name in ("rendered_depth", "rendered")]
+    steps = [np.diff(value, axis=axis) for value in outside for axis in (-1, -2)]
+    return {f"sign {k}": np.sign(step).astype(int) for k, step in enumerate(steps)}
+
+
+def _edges(dtype: np.dtype) -> dict[str, NDArray]:
+    edges = np.zeros((HEIGHT, WIDTH), bool)
+    edges[1:8, 4] = True
+    return {"mask": _mask(), "edges": edges}
+
+
+def _smoothness_inputs(rng: Random) -> dict[str, NDArray]:
+    """A checkerboard of 0.4 and 0.8 with noise of 0.1: no neighbours are equal, nothing is near the 0 of tissue."""
+    parity = np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) % 2
+    board = 0.4 + 0.4 * parity
+    return {
+        "rendered_depth": 3.0 * (board + rng.uniform(0.0, 0.1, (HEIGHT, WIDTH))),
+        "rendered": board + rng.uniform(0.0, 0.1, (CHANNELS, HEIGHT, WIDTH)),
+    }
+
+
+STAGES = [
+    Stage(
+        name="masked_l1",
+        equation="B6",
+        text="masked L1",
+        function="endotsr.losses.masked_l1.masked_l1_forward",
+        inputs={"rendered": "display", "observed": "display", "mask": "1"},
+        forward=_l1,
+        asked={"loss": Asked(1, "display", oracle="losses.masked_l1"), "d_rendered": Asked(2, PER_DISPLAY)},
+        reverse=_l1_reverse,
+        trace=_l1_trace,
+        variants=(Variant("masked_l1", _l1_inputs, fixed=_frame),),
+    ),
+    Stage(
+        name="masked_ssim",
+        equation="B7",
+        text="masked SSIM",
+        function="endotsr.losses.masked_ssim.masked_ssim_forward",
+        inputs={"rendered": "display", "observed": "display", "mask": "1"},
+        forward=_ssim,
+        asked={
+            "ssim": Asked(1, oracle="losses.masked_ssim", least32=TEXTBOOK),
+            "d_rendered": Asked(2, PER_DISPLAY, oracle="losses.masked_ssim_gradient", least32=TEXTBOOK),
+        },
+        reverse=_ssim_reverse,
+        variants=(Variant("masked_ssim", _ssim_inputs, fixed=_frame),),
+    ),
+    Stage(
+        name="normalised_depth",
+        equation="B8",
+        text="normalised depth",
+        function="endotsr.losses.depth.normalised_depth_forward",
+        inputs={"rendered_depth": "scene unit", "prior_depth": "scene unit", "mask": "1"},
+        forward=_depth,
+        asked={
+            "loss": Asked(1, oracle="losses.normalised_depth"),
+            "d_rendered_depth": Asked(2, PER_LENGTH, oracle="losses.normalised_depth"),
+        },
+        reverse=_depth_reverse,
+        trace=_depth_trace,
+        variants=(Variant("normalised_depth", _depth_inputs, fixed=_priors),),
+    ),
+    Stage(
+        name="smoothness",
+        equation="B9",
+        text="smoothness with given edges",
+        function="endotsr.losses.smoothness.smoothness_forward",
+        inputs={"rendered": "display", "rendered_depth": "scene unit", "mask": "1", "edges": "1"},
+        forward=_smoothness,
+        asked={
+            "loss": Asked(1, "scene unit^2", oracle="losses.smoothness"),
+            "d_rendered": Asked(2, PER_DISPLAY, oracle="losses.smoothness"),
+            "d_rendered_depth": Asked(2, PER_LENGTH, oracle="losses.smoothness"),
+        },
+        reverse=_smoothness_reverse,
+        trace=_smoothness_trace,
+        variants=(Variant("smoothness", _smoothness_inputs, {"total_variation_factor": FACTOR}, _edges),),
+    ),
+]

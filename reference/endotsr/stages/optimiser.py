@@ -1,0 +1,227 @@
+"""Stages around the objective: schedules (6), Adam (B10), density control (B11), initialisation (B12), training.
+
+None of them has a gradient.
+"""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from endotsr.config import Config, DensityConfig, InitialisationConfig
+from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
+from endotsr.fitting.objective import calibrate_on
+from endotsr.fitting.schedules import (
+    active_degree,
+    densify_now,
+    laplacian_ramp,
+    learning_rates,
+    residuals_active,
+    smoothness_active,
+    statistics_active,
+)
+from endotsr.fitting.state import TrainingState, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.scene.density_control import densify, empty_statistics, gather_statistics, scene_extent
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.initialisation import initialise
+from endotsr.splatting.camera import Camera
+from endotsr.stages.requests import Tape, config_of, gaussians_of, model_of, sequence_of
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, real_of
+
+RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
+CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent asks for poses only
+
+
+def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """Steps with the gradients of the leading axis, one after the other."""
+    parameter = inputs["parameter"].copy()
+    state = AdamState({"p": np.zeros_like(parameter)}, {"p": np.zeros_like(parameter)}, {"p": 0})
+    numbers = [settings[name] for name in ("beta1", "beta2", "epsilon")]
+    for gradient in inputs["gradients"]:
+        adam_update(state, {"p": parameter}, {"p": np.ascontiguousarray(gradient)}, {"p": settings["rate"]}, *numbers)
+    return {"parameter_after": parameter, "first": state.first["p"], "second": state.second["p"]}, None
+
+
+def _rates(iteration: int, config: Config) -> dict[str, float]:
+    """Rates by group; those of the residuals are 0 while there are none."""
+    rates: dict[str, Any] = dict.fromkeys(RESIDUAL_RATES, 0.0) | learning_rates(iteration, config)
+    for name, parts in (("harmonics", ("base", "rest")), ("fdm_weight", ("position", "other"))):
+        for part, (_, rate) in zip(parts, rates.pop(name)):
+            rates[f"{name}_{part}"] = rate
+    return rates
+
+
+def _schedule(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    config, iterations = config_of(settings, np.dtype(np.float64)), [int(i) for i in inputs["iteration"]]
+    rows = [_rates(i, config) for i in iterations]
+    found: dict[str, Any] = {f"rate_{name}": np.array([row[name] for row in rows]) for name in rows[0]}
+    assert isinstance(config.loss.lambda_lap, float)
+    return found | {
+        "laplacian_weight": np.array([config.loss.lambda_lap * laplacian_ramp(i, config) for i in iterations]),
+        "degree": np.array([active_degree(i, config) for i in iterations], np.int64),
+        "residuals": np.array([residuals_active(i, config) for i in iterations]),
+        "smoothness": np.array([smoothness_active(i, config) for i in iterations]),
+        "gathers": np.array([statistics_active(i, config) for i in iterations]),
+        "densifies": np.array([densify_now(i, config) for i in iterations]),
+    }, None
+
+
+def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """Statistics of some views, then one densification. Indices travel in the harmonics, ones in the first moments."""
+    config, count = msgspec.convert(settings["density"], DensityConfig), inputs["opacity_logit"].size
+    names = ("position", "quaternion", "log_scale", "opacity_logit")
+    index = np.arange(float(count))[None, None]
+    gaussians = Gaussians(*(inputs[name] for name in names), harmonics=np.repeat(index, 3, axis=1))
+    statistics = empty_statistics(count)
+    for d_mean, visible in zip(inputs["d_mean2d"], inputs["visible"]):
+        gather_statistics(statistics, d_mean, visible, settings["width"], settings["height"])
+    poses = zip(inputs["rotation_matrices"], inputs["translations"])
+    extent = scene_extent(config, [Camera(*pose, **CONSTANT_LENS) for pose in poses])  # type: ignore[arg-type]
+    moments = adam_state(arrays(gaussians))
+    moments.first["opacity_logit"][:] = 1.0
+    tape: Any = Tape(np.zeros(0), inputs["split_noise"])
+    made = densify(gaussians, statistics, config, tape, extent)
+    regather(moments, arrays(gaussians), made.plan.source, made.plan.survivors)
+    parent = made.gaussians.harmonics[0, 0].astype(np.int64)
+    rows, survivors = np.arange(count), parent.size - made.cloned - 2 * made.split
+    cloned, split = np.split(parent[survivors : survivors + made.cloned + made.split], [made.cloned])
+    return {
+        "extent": extent,
+        "mean_gradient": statistics.gradient_sum / np.maximum(statistics.visits, 1),
+        "pruned": ~np.isin(rows, parent),
+        "cloned": np.isin(rows, cloned),
+        "split": np.isin(rows, split),
+        "count": np.array(parent.size),
+        "parent": parent,
+        "moments_kept": moments.first["opacity_logit"] == 1.0,
+        "position_after": made.gaussians.position,
+        "log_scale_after": made.gaussians.log_scale,
+    }, None
+
+
+def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """Every candidate is taken, so that no random number is drawn."""
+    config = msgspec.convert(settings["initialisation"], InitialisationConfig)
+    sequence, no_draw = sequence_of(inputs, settings["camera"]), None
+    found = initialise(sequence, config, model_of(settings), no_draw, real_of(inputs))  # type: ignore[arg-type]
+    return {"count": np.array(found.count), **arrays(found)}, None
+
+
+def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    """Calibrate on the first Gaussians, then train; components A and S are activated, densification happens."""
+    dtype = real_of({"position": inputs["position"]})
+    config = config_of(settings, dtype)
+    sequence = sequence_of(inputs, settings["camera"])
+    gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
+    shop = workshop(sequence, config)
+    weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap
+    tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
+    state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
+    log = [training_step(state, shop) for _ in range(config.training.iterations)]
+    found: dict[str, Any] = {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
+    return found | {
+        "lambda_lap": weight,
+        "loss": np.array([entry["loss"] for entry in log]),
+        "count": np.array([entry["gaussians"] for entry in log] + [state.gaussians.count], np.int64),
+    }, None
+
+
+EXACT = "exact"
+RATES = [
+    "position", "quaternion", "log_scale", "opacity_logit", "harmonics_base", "harmonics_rest", "fdm_weight_position",
+    "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
+]  # fmt: skip
+DENSITY = "fitting_oracle.density"
+FRAMES = {"images": "display / 255", "masks": "1", "prior_depths": "scene unit", "times": "1", "train_index": "frame"}
+POSES = {"rotation_matrices": "1", "translations": "scene unit"}
+RAW = {"position": "scene unit", "quaternion": "1", "log_scale": "1", "opacity_logit": "1"}
+
+STAGES = [
+    Stage(
+        name="adam",
+        equation="B10",
+        text="optimiser steps with given gradients",
+        function="endotsr.fitting.adam.adam_update",
+        inputs={"parameter": "raw parameter", "gradients": "loss per raw parameter"},
+        forward=_adam,
+        asked={
+            "parameter_after": Asked(1, oracle="adam.adam_scalar"),
+            "first": Asked(1),
+            "second": Asked(1),
+        },
+    ),
+    Stage(
+        name="schedule",
+        equation="B10",
+        text="rates, weights and switches of some iterations",
+        function="endotsr.fitting.schedules.learning_rates",
+        inputs={"iteration": "1"},
+        forward=_schedule,
+        asked={
+            **{f"rate_{name}": Asked(1, "per step", oracle="fitting_oracle.schedule") for name in RATES},
+            "laplacian_weight": Asked(1, oracle="fitting_oracle.schedule"),
+            **{
+                name: Asked(1, scale=EXACT, oracle="fitting_oracle.schedule")
+                for name in ("degree", "residuals", "smoothness", "gathers", "densifies")
+            },
+        },
+    ),
+    Stage(
+        name="density",
+        equation="B11",
+        text="statistics of some views, one densification",
+        function="endotsr.scene.density_control.densify",
+        inputs={**RAW, "d_mean2d": "loss per px", "visible": "1", "split_noise": "1", **POSES},
+        forward=_density,
+        asked={
+            "extent": Asked(1, "scene unit", oracle=DENSITY),
+            "mean_gradient": Asked(1, "loss per NDC unit", oracle=DENSITY),
+            **{
+                name: Asked(1, scale=EXACT, oracle=DENSITY)
+                for name in ("pruned", "cloned", "split", "count", "parent", "moments_kept")
+            },
+            "position_after": Asked(1, "scene unit", oracle=DENSITY),
+            "log_scale_after": Asked(1, oracle=DENSITY),
+        },
+    ),
+    Stage(
+        name="initialisation",
+        equation="B12",
+        text="Gaussians from depth maps",
+        function="endotsr.scene.initialisation.initialise",
+        inputs={**FRAMES, **POSES},
+        forward=_initialisation,
+        asked={
+            "count": Asked(1, scale=EXACT, oracle="fitting_oracle.initialisation"),
+            "position": Asked(1, "scene unit", "last", "fitting_oracle.initialisation"),
+            "log_scale": Asked(1, oracle="fitting_oracle.initialisation"),
+            "harmonics": Asked(1, "display / Y00", oracle="fitting_oracle.initialisation"),
+            **{name: Asked(1) for name in ("quaternion", "opacity_logit", "fdm_weight", "fdm_centre", "fdm_width")},
+        },
+    ),
+    Stage(
+        name="training",
+        equation="6",
+        text="calibration and twenty iterations",
+        function="endotsr.fitting.trainer.training_step",
+        inputs={
+            **RAW,
+            "harmonics": "display / Y00",
+            "fdm_weight": "raw parameter",
+            "fdm_centre": "1",
+            "fdm_width": "1",
+            **FRAMES,
+            **POSES,
+            "frame_order": "frame",
+            "split_noise": "1",
+        },
+        forward=_training,
+        asked={
+            "lambda_lap": Asked(4),
+            "loss": Asked(4, "loss"),
+            "count": Asked(4, scale=EXACT),
+            **{f"final_{name}": Asked(4, "raw parameter", "max") for name in Gaussians._fields},
+        },
+    ),
+]

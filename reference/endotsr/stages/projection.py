@@ -1,0 +1,186 @@
+"""Stages from raw Gaussians to the screen: covariance (B2), projection (B3), colour from harmonics (B4)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
+from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
+from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse
+from endotsr.splatting.settings import EXACT, PAPER, RasterSettings
+from endotsr.stages.made_up import AXES, COUNT, LENS, is_near, pose, positions
+from endotsr.stages.requests import camera_of, raster_dict, raster_of
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+
+Random = np.random.Generator
+
+
+# ---- covariance (B2) ----
+
+
+def _covariance(inputs: Inputs, settings: Settings) -> tuple[Found, CovarianceSaved]:
+    shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
+    return shape._asdict(), saved
+
+
+def _covariance_reverse(cotangents: Inputs, saved: CovarianceSaved) -> Found:
+    return covariance_reverse(Shape(**cotangents), saved)._asdict()
+
+
+def _covariance_inputs(rng: Random) -> dict[str, NDArray]:
+    return {"quaternion": rng.normal(0, 1, (4, COUNT)) * 3.0, "log_scale": rng.normal(0, 0.7, (3, COUNT))}
+
+
+# ---- projection (B3) ----
+
+
+def _projection(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Projected, ProjectionSaved]]:
+    shape = Shape(inputs["rotation"], inputs["scale"])
+    out, saved = projection_forward(inputs["position"], shape, camera_of(inputs, settings), raster_of(settings))
+    return {"mean2d": out.mean2d, "covariance2d": out.covariance2d, "depth": out.depth}, (out, saved)
+
+
+def _projection_reverse(cotangents: Inputs, saved: tuple[Projected, ProjectionSaved]) -> Found:
+    d_mean, d_covariance, d_depth = (cotangents[name] for name in ("mean2d", "covariance2d", "depth"))
+    grads = projection_reverse(d_mean, d_covariance, d_depth, saved[1], pose_gradient=True)
+    assert grads.camera is not None
+    return {
+        "position": grads.position,
+        "rotation": grads.rotation,
+        "scale": grads.scale,
+        "rotation_matrix": grads.camera.rotation,
+        "translation": grads.camera.translation,
+    }
+
+
+def _projection_inputs(rng: Random) -> dict[str, NDArray]:
+    """Includes centres beyond the off-axis limit on all four sides and one behind the camera."""
+    position = positions(rng, 12)
+    shape, _ = covariance_forward(rng.normal(0, 1, (4, 12)), rng.normal(-0.5, 0.4, (3, 12)))
+    camera = pose()
+    seen = [(2.5, 0.1, 3.0), (-2.5, 0.1, 3.0), (0.1, 2.5, 3.0), (0.1, -2.5, 3.0), (2.5, 2.5, 3.0)]
+    for k, (x, y, z) in enumerate(seen):
+        position[:, k] = camera["rotation_matrix"].T @ (np.array([z * x, z * y, z]) - camera["translation"])
+    position[:, 5] = camera["rotation_matrix"].T @ (np.array([0.1, 0.1, -3.0]) - camera["translation"])
+    return {"position": position, "rotation": shape.rotation, "scale": shape.scale, **camera}
+
+
+def _projection_variant(name: str, raster: RasterSettings) -> Variant:
+    return Variant(
+        f"projection_{name}",
+        _projection_inputs,
+        settings={"raster": raster_dict(raster), "camera": LENS},
+        blocks=split_blocks({"position": AXES}),
+        covers=is_near(name),
+    )
+
+
+# ---- harmonics (B4) ----
+
+
+def _harmonics(inputs: Inputs, settings: Settings) -> tuple[Found, HarmonicsSaved]:
+    position, centre, degree = inputs["position"], inputs["centre"], settings["degree"]
+    colour, saved = harmonics_forward(inputs["harmonics"], inputs["residual"], position, centre, degree)
+    return {"colour": colour}, saved
+
+
+def _harmonics_reverse(cotangents: Inputs, saved: HarmonicsSaved) -> Found:
+    return harmonics_reverse(cotangents["colour"], saved)._asdict()
+
+
+def _harmonics_trace(inputs: Inputs, settings: Settings, saved: HarmonicsSaved) -> dict[str, NDArray]:
+    return {"clamped": saved.clamped.astype(int)}
+
+
+def _harmonics_variant(degree: int) -> Variant:
+    count = (degree + 1) ** 2
+
+    def inputs(rng: Random) -> dict[str, NDArray]:
+        """Colours on both sides of the clamp at zero, none near it; in degree 0 the direction has no say."""
+        made = {
+            "harmonics": rng.uniform(-0.2, 0.2, (count, 3, COUNT)) / count,
+            "residual": rng.uniform(-0.1, 0.1, (3, COUNT)),
+            "position": rng.normal(0, 1, (3, COUNT)) + np.array([[0.0], [0.0], [4.0]]),
+            "centre": rng.normal(0, 0.3, 3),
+        }
+        made["harmonics"][0, :, ::3] = -4.0  # clamped
+        return made if degree > 0 else {name: made[name] for name in ("harmonics", "residual")}
+
+    def still(dtype: np.dtype) -> dict[str, NDArray]:
+        return {} if degree > 0 else {"position": np.zeros((3, COUNT), dtype), "centre": np.zeros(3, dtype)}
+
+    return Variant(
+        f"harmonics_degree_{degree}",
+        inputs,
+        settings={"degree": degree},
+        fixed=still,
+        blocks=split_blocks({"harmonics": {f"degree {d}": slice(d * d, (d + 1) ** 2) for d in range(degree + 1)}}),
+        covers=lambda settings: settings["degree"] == degree,
+    )
+
+
+POSE_UNITS = {"rotation_matrix": "1", "translation": "scene unit"}
+PROJECTED = "splatting_oracle.project"
+
+STAGES = [
+    Stage(
+        name="covariance",
+        equation="B2",
+        text="rotation and semi-axes",
+        function="endotsr.splatting.covariance.covariance_forward",
+        inputs={"quaternion": "1", "log_scale": "1"},
+        forward=_covariance,
+        asked={
+            "rotation": Asked(1, "1", "last", "splatting_oracle.rotation"),
+            "scale": Asked(1, "scene unit", "last"),
+            "d_quaternion": Asked(2, "loss", "last"),
+            "d_log_scale": Asked(2, "loss", "last"),
+        },
+        reverse=_covariance_reverse,
+        variants=(Variant("covariance", _covariance_inputs),),
+    ),
+    Stage(
+        name="projection",
+        equation="B3",
+        text="screen mean, covariance and depth",
+        function="endotsr.splatting.projection.projection_forward",
+        inputs={"position": "scene unit", "rotation": "1", "scale": "scene unit", **POSE_UNITS},
+        forward=_projection,
+        asked={
+            "visible": Asked(1, scale="exact"),
+            "mean2d": Asked(1, "px", "last", PROJECTED),
+            "covariance2d": Asked(1, "px^2", "last", PROJECTED),
+            "depth": Asked(1, "scene unit", "last", PROJECTED),
+            "d_position": Asked(2, "loss per scene unit", "last"),
+            "d_rotation": Asked(2, "loss", "last"),
+            "d_scale": Asked(2, "loss per scene unit", "last"),
+            "d_rotation_matrix": Asked(2, "loss"),
+            "d_translation": Asked(2, "loss per scene unit"),
+        },
+        reverse=_projection_reverse,
+        extra=lambda inputs, settings, saved: {"visible": saved[0].visible},
+        variants=(_projection_variant("exact", EXACT), _projection_variant("paper", PAPER)),
+    ),
+    Stage(
+        name="harmonics",
+        equation="B4",
+        text="colour from harmonics",
+        function="endotsr.splatting.harmonics.harmonics_forward",
+        inputs={
+            "harmonics": "display / Y00",
+            "residual": "display / Y00",
+            "position": "scene unit",
+            "centre": "scene unit",
+        },
+        forward=_harmonics,
+        asked={
+            "colour": Asked(1, "display", oracle="splatting_oracle.colour"),
+            "d_harmonics": Asked(2, "loss"),
+            "d_residual": Asked(2, "loss"),
+            "d_position": Asked(2, "loss per scene unit"),
+            "d_centre": Asked(2, "loss per scene unit"),
+        },
+        reverse=_harmonics_reverse,
+        trace=_harmonics_trace,
+        variants=tuple(_harmonics_variant(degree) for degree in range(4)),
+    ),
+]

@@ -1,0 +1,48 @@
+"""docs/tradeoff.md: its generated parts are what the committed results say."""
+
+import json
+import re
+
+import pytest
+from marks import replaced
+from tradeoff_parts import fragments
+
+import tradeoff
+
+MARKED = re.compile(r"<!-- tradeoff:(\w+):start -->")
+
+
+@pytest.fixture
+def result():
+    return json.loads((tradeoff.RESULTS / "tradeoff.json").read_text(encoding="utf-8"))
+
+
+def test_committed_page_is_what_the_results_say(result):
+    text = tradeoff.PAGE.read_text(encoding="utf-8")
+    made = fragments(result, tradeoff.read_scenes(), tradeoff.read_trainings())
+    assert set(MARKED.findall(text)) == set(made)
+    assert replaced(text, made, tradeoff.PAGE, "tradeoff") == text
+
+
+def test_part_without_its_measurement_says_so(result):
+    made = fragments(result, {}, {})
+    assert made["scenes"] == made["training"] == "Not measured yet."
+
+
+def test_a_scene_on_which_the_advice_fails_is_named(result):
+    other = json.loads(json.dumps(result))
+    advised = next(p for p in other["points"] if p["name"].startswith("float32, cutoff 1e-4, stop"))
+    for p in other["points"]:
+        if p["name"].startswith("float32") and p["setting"]["raster"]["alpha_cutoff"] >= 1e-4:
+            p["error"]["max"] = 0.5
+    assert advised["error"]["max"] == 0.5
+    made = fragments(result, {"other": other}, {})["scenes"]
+    rows = [line for line in made.splitlines() if line.startswith("| simulated")]
+    assert rows[0].endswith("holds |") and "does not hold" in rows[1]
+
+
+def test_command_refuses_words_that_it_does_not_know(monkeypatch):
+    monkeypatch.setattr(tradeoff, "write_page", lambda: pytest.fail("wrote the page"))
+    for words in (["page"], ["train"], ["measure", "x"]):
+        with pytest.raises(SystemExit, match=r"python docs/pages/tradeoff\.py render"):
+            tradeoff.main(words)

@@ -1,0 +1,54 @@
+"""Every family holds its operations, cases and mistakes together, and the published order is kept."""
+
+import msgspec
+import pytest
+
+from endotsr.golden.judge.format import Manifest, read_struct
+from endotsr.golden.judge.store import golden_folder
+from endotsr.golden.vectors import registry
+from endotsr.golden.vectors.files import rendered_files
+from endotsr.golden.vectors.generate import solve_all
+from endotsr.golden.vectors.registry import FAMILIES, all_operations, all_specs, all_wrong_ports, families
+
+PUBLISHED = read_struct(golden_folder() / "manifest.json", Manifest)
+
+
+@pytest.mark.parametrize("family", families(), ids=FAMILIES)
+def test_a_family_has_cases_and_mistakes_of_its_own_operations(family):
+    assert {spec.operation for spec in family.cases()} == set(family.OPERATIONS)
+    for wrong_port in family.WRONG_PORTS:
+        assert set(wrong_port.apply) <= set(all_operations()), wrong_port.flag
+        assert set(wrong_port.apply) & set(family.OPERATIONS), f"{wrong_port.flag} breaks no rule of this family"
+
+
+def test_every_operation_is_in_a_family():
+    assert {name for family in families() for name in family.OPERATIONS} == set(all_operations())
+
+
+def test_the_cases_are_those_of_the_manifest():
+    published = {f"{family}/{case}" for family, cases in PUBLISHED.families.items() for case in cases}
+    assert {spec.name for spec in all_specs()} == published
+
+
+def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
+    monkeypatch.setattr(registry, "FAMILIES", ("motion", "motion"))
+    with pytest.raises(ValueError, match="a golden case is named twice"):
+        all_specs()
+    with pytest.raises(ValueError, match="motion_cosines_dropped is named twice"):
+        all_wrong_ports()
+
+
+def test_what_is_published_keeps_its_place_and_what_is_new_follows():
+    """Files, flags and mistakes, for a manifest that lists one of two cases of `laplacian` and two flags."""
+    solved = [one for one in solve_all() if one.case.name in ("motion/generic", "laplacian/co_sited", "laplacian/tiny")]
+    names = ("laplacian/tiny", "motion/generic")
+    files = tuple(next(f for f in PUBLISHED.files if f.path == f"cases/{name}/case.json") for name in names)
+    flags = {flag: PUBLISHED.flags[flag] for flag in ("upsampling_swapped", "mask_before_pyramid")}
+    before = msgspec.structs.replace(PUBLISHED, files=files, flags=flags)
+    fresh = rendered_files(solved, all_wrong_ports(), "1.0.0", before)
+    manifest = msgspec.json.decode(fresh["manifest.json"], type=Manifest)
+    assert manifest.families == {"laplacian": ("tiny", "co_sited"), "motion": ("generic",)}
+    assert list(manifest.flags)[:2] == list(flags) and set(manifest.flags) == set(all_wrong_ports())
+    case = msgspec.json.decode(fresh["cases/laplacian/co_sited/case.json"])
+    assert list(case["mistakes"])[:2] == ["upsampling_swapped", "mask_before_pyramid"]
+    assert next(iter(fresh)).startswith("cases/laplacian/tiny/")

@@ -1,0 +1,53 @@
+"""Parameters of frames: identity at the start, nothing where they are off, interpolation in time."""
+
+import numpy as np
+import pytest
+
+from endotsr.config import ModelConfig
+from endotsr.scene.parameters import (
+    Exposure,
+    FrameParameters,
+    column_gradients,
+    exposure_at,
+    exposure_of,
+    frame_parameters,
+    trained,
+)
+from oracle import exposure_oracle
+
+TIMES = np.array([0.0, 0.2, 0.3, 0.7])
+
+
+@pytest.fixture
+def frames():
+    rng = np.random.default_rng(4)
+    return FrameParameters(TIMES, rng.normal(size=(3, 4)), rng.normal(size=(3, 4)))
+
+
+def test_off_is_nothing_at_all_and_on_is_the_identity():
+    assert frame_parameters(ModelConfig(), TIMES, "float32") is None
+    assert trained(None) == {} and exposure_of(None, 0) is None and exposure_at(None, 0.5) is None
+    on = frame_parameters(ModelConfig(exposure=True), TIMES, "float32")
+    assert on is not None and set(trained(on)) == {"exposure_log_gain", "exposure_bias"}
+    assert all(a.shape == (3, 4) and a.dtype == np.float32 and not a.any() for a in trained(on).values())
+    assert exposure_at(FrameParameters(TIMES), 0.1) is None and exposure_of(FrameParameters(TIMES), 1) is None
+
+
+@pytest.mark.parametrize("t", [-1.0, 0.0, 0.13, 0.2, 0.55, 0.7, 0.99])
+def test_exposure_at_a_time_is_linear_between_the_neighbours(frames, t):
+    found = exposure_at(frames, t)
+    for row, array in zip(found, (frames.exposure_log_gain, frames.exposure_bias), strict=True):
+        expected = [exposure_oracle.at_time(t, TIMES.tolist(), channel) for channel in array.tolist()]
+        np.testing.assert_allclose(row, expected, rtol=1e-14)
+
+
+def test_at_the_time_of_a_training_frame_the_exposure_is_that_of_the_frame(frames):
+    for k, t in enumerate(TIMES):
+        for one, other in zip(exposure_at(frames, float(t)), exposure_of(frames, k), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_only_the_column_of_the_frame_has_a_gradient(frames):
+    gradients = column_gradients(frames, 2, Exposure(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])))
+    assert gradients["exposure_log_gain"].tolist() == [[0, 0, k, 0] for k in (1, 2, 3)]
+    assert gradients["exposure_bias"].tolist() == [[0, 0, k, 0] for k in (4, 5, 6)]

@@ -1,0 +1,257 @@
+"""The Python interface: the same numbers as the command line, stable names, and an import that loads nothing heavy."""
+
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+import endotsr
+from endotsr.cli.main import main
+from endotsr.sequences.endonerf import write_endonerf
+
+SIMULATOR = {"width": 48, "height": 32, "frames": 9}
+POINTS = {"first_frame_points": 150, "other_frame_points": 40}
+HEAVY = ("numpy", "numba", "cv2", "scipy", "matplotlib", "msgspec", "typing")
+
+
+@pytest.fixture(autouse=True)
+def threads_as_before():
+    import numba
+
+    before = numba.get_num_threads()
+    yield
+    numba.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    return endotsr.load_sequence("simulated", simulator=SIMULATOR)
+
+
+def tiny(sequence, **more):
+    """Eight iterations on one thread."""
+    given = {"preset": "demo", "iterations": 8, "initialisation": POINTS, "training": {"threads": 1}, **more}
+    return endotsr.train(sequence, **given, on_message=lambda line: None)
+
+
+@pytest.fixture(scope="module")
+def run(sequence):
+    return tiny(sequence)
+
+
+def arrays(run):
+    return {k: v.tobytes() for k, v in run.model.gaussians._asdict().items() if v is not None}
+
+
+def without_seconds(log):
+    return [{key: value for key, value in entry.items() if key != "seconds"} for entry in log]
+
+
+def test_import_is_light():
+    code = f"import sys, endotsr; endotsr.InputError; print([m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}; {code}"],
+                          capture_output=True, text=True, timeout=60)  # fmt: skip
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
+
+
+def test_every_public_name_exists_and_is_typed():
+    assert set(endotsr.__all__) <= set(dir(endotsr))
+    for name in endotsr.__all__:
+        assert getattr(endotsr, name) is not None
+    assert set(endotsr._MODULES) == set(endotsr.__all__) - {"__version__"}
+    with pytest.raises(AttributeError, match="no attribute 'trian'"):
+        _ = endotsr.trian
+    from importlib.resources import files
+
+    assert (files("endotsr") / "py.typed").is_file()
+
+
+def test_settings_are_those_of_the_command_line(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('preset = "sharp"\n[model]\nbases = 9\nbeta = 0.2\n')
+    config = endotsr.make_config(file=file, iterations=3000, model={"beta": 0.1}, training={"seed": 4})
+    assert (config.preset, config.model.bases, config.model.beta, config.training.seed) == ("sharp", 9, 0.1, 4)
+    assert config.training.residual_activation == 1500, "milestones keep their fraction of the run"
+    absolute = endotsr.make_config(training={"iterations": 3000})
+    assert (absolute.training.iterations, absolute.training.residual_activation) == (3000, 3000)
+
+
+@pytest.mark.parametrize(
+    "given, named",
+    [
+        ({"preset": "papper"}, "paper, sharp, demo"),
+        ({"modell": {}}, "unknown key modell"),
+        ({"model": {"basis": "cubic"}}, "quartic, gaussian"),
+        ({"model": {"base": 3}}, "unknown key model.base"),
+        ({"model": 3}, "model = 3 is not allowed"),
+        ({"iterations": 0}, "an integer >= 1"),
+        ({"file": "absent.toml"}, "absent.toml: cannot be read"),
+    ],
+)
+def test_settings_that_cannot_be_used(given, named):
+    with pytest.raises(endotsr.InputError, match=named):
+        endotsr.make_config(**given)
+
+
+def test_a_sequence_is_loaded_as_the_command_loads_it(sequence, tmp_path):
+    assert sequence.images.shape == (9, 3, 32, 48) and sequence.source == "simulated"
+    write_endonerf(sequence, tmp_path / "folder")
+    half = endotsr.load_sequence(tmp_path / "folder", scale=0.5, frames="1:8")
+    assert half.images.shape == (7, 3, 16, 24) and half.settings.scale == 0.5
+    near = endotsr.make_config(raster={"near": 1e6})
+    with pytest.raises(endotsr.InputError, match="in front of the near plane"):
+        endotsr.load_sequence(tmp_path / "folder", near)
+
+
+@pytest.mark.parametrize(
+    "given, named",
+    [
+        ({"source": "absent"}, "absent: sequence folder not found"),
+        ({"source": "simulated", "scale": 0.0}, "sequence.scale = 0.0 is not allowed"),
+        ({"source": "simulated", "size": 2}, "unknown key sequence.size"),
+        ({"source": "simulated", "simulator": {"frame": 9}}, "simulator: unknown key frame"),
+        ({"source": "simulated", "simulator": {"frames": 2}}, "simulator: frames = 2 is not allowed"),
+        ({"source": "arrays in memory"}, "folder that holds the same frames"),
+    ],
+)
+def test_sequences_that_cannot_be_loaded(given, named):
+    with pytest.raises(endotsr.InputError, match=named):
+        endotsr.load_sequence(**given)
+
+
+def test_training_is_that_of_the_command(run, tmp_path):
+    words = ["--simulator.width=48", "--simulator.height=32", "--simulator.frames=9", "--preset=demo"]
+    words += ["--iterations=8", "--initialisation.first-frame-points=150", "--initialisation.other-frame-points=40"]
+    out = tmp_path / "command"
+    assert main(["train", "simulated", "--out", str(out), *words, "--threads=1", "--no-evaluate"]) == 0
+    commanded = endotsr.open_run(out)
+    assert commanded.config == run.config
+    assert arrays(commanded) == arrays(run)
+    assert without_seconds(commanded.log) == without_seconds(run.log)
+    assert commanded.record.keys() == run.record.keys()
+
+
+def test_the_callback_sees_every_entry_and_its_answer_is_ignored(sequence, run):
+    seen = []
+    tiny(sequence, on_iteration=lambda entry: seen.append(entry) or True)
+    assert [entry["iteration"] for entry in seen] == list(range(1, 9))
+    assert without_seconds(seen) == without_seconds(run.log)
+    assert all(entry["seconds"] >= 0 and np.isfinite(entry["loss"]) for entry in seen)
+
+
+def test_the_callback_stops_and_the_run_resumes_to_the_same_bits(sequence, run, tmp_path):
+    def stop_at_three(entry):
+        if entry["iteration"] == 3:
+            raise endotsr.StopTraining
+
+    stopped = tiny(sequence, on_iteration=stop_at_three)
+    assert (stopped.iteration, len(stopped.log), stopped.record["status"]) == (3, 3, "interrupted")
+    assert repr(stopped).startswith("Run(iteration 3 of 8")
+    reopened = endotsr.open_run(stopped.save(tmp_path / "three"))
+    for half in (stopped, reopened):
+        assert half.resume(on_message=lambda line: None) is half
+        assert (half.iteration, half.record["status"]) == (8, "finished")
+        assert half.record["resumed"][0]["after_iteration"] == 3
+        assert arrays(half) == arrays(run)
+        assert without_seconds(half.log) == without_seconds(run.log)
+
+
+def test_an_error_of_the_callback_is_raised(sequence):
+    with pytest.raises(ZeroDivisionError):
+        tiny(sequence, on_iteration=lambda entry: 1 / 0)
+
+
+def test_what_cannot_be_trained_on(sequence):
+    with pytest.raises(endotsr.InputError, match="sequence is str"):
+        endotsr.train("my_sequence")  # type: ignore[arg-type]
+    with pytest.raises(endotsr.InputError, match="one of the two"):
+        endotsr.train(sequence, endotsr.make_config(), preset="sharp")
+
+
+def test_rendering_at_any_time_and_camera(sequence, run):
+    view = run.render(time=0.37)
+    assert view.colour.shape == (3, 32, 48) and view.depth.shape == view.opacity.shape == (32, 48)
+    frame = run.render(sequence.times[4], 4)
+    assert np.array_equal(run.render(4 / 9, np.int64(4)).colour, frame.colour)
+    assert np.array_equal(frame.colour, run.render(sequence.times[4], sequence.cameras[4]).colour)
+    moved = sequence.cameras[4]._replace(translation=np.array([5.0, 0.0, 0.0]))
+    assert not np.array_equal(frame.colour, run.render(sequence.times[4], moved).colour)
+    assert 0 <= view.opacity.min() and view.opacity.max() <= 1
+    plain = run.render(0.37, without=("appearance", "spectral_motion"))
+    assert not np.array_equal(view.colour, plain.colour), "both components contribute"
+
+
+@pytest.mark.parametrize(
+    "given, named",
+    [
+        ({"time": 1.2}, "a number in"),
+        ({"time": float("nan")}, "a number in"),
+        ({"time": 0.5, "camera": 9}, "a frame from 0 to 8"),
+        ({"time": 0.5, "camera": -1}, "a frame from 0 to 8"),
+        ({"time": 0.5, "without": ("laplacian",)}, "appearance, spectral_motion"),
+    ],
+)
+def test_views_that_do_not_exist(run, given, named):
+    with pytest.raises(endotsr.InputError, match=named):
+        run.render(**given)
+
+
+def test_a_saved_run_opens_with_the_same_bits_and_the_commands_read_it(run, tmp_path):
+    path = run.save(tmp_path / "deep" / "mine")
+    opened = endotsr.open_run(path)
+    assert arrays(opened) == arrays(run) and opened.config == run.config and opened.log == run.log
+    for name in ("colour", "depth", "opacity"):
+        a, b = getattr(opened.render(0.37), name), getattr(run.render(0.37), name)
+        assert a.tobytes() == b.tobytes(), name
+    with pytest.raises(endotsr.InputError, match="holds a run already"):
+        run.save(path)
+    metrics = run.evaluate()
+    assert opened.evaluate() == metrics
+    assert metrics["held_out"]["mean"]["psnr_tissue"] > 5 and set(metrics["baselines"])
+    assert main(["evaluate", str(path)]) == 0
+    written = msgspec.json.decode((path / "metrics.json").read_bytes())
+    assert written["held_out"] == msgspec.json.decode(msgspec.json.encode(metrics["held_out"]))
+
+
+def test_arrays_in_memory_train_and_are_saved(sequence, run, tmp_path):
+    names = [entry.name for entry in dataclasses.fields(endotsr.Sequence) if entry.init]
+    plain = endotsr.Sequence(**{name: getattr(sequence, name) for name in names})
+    trained = tiny(plain)
+    assert arrays(trained) == arrays(run)
+    path = trained.save(tmp_path / "run")
+    opened = endotsr.open_run(path)
+    assert arrays(opened) == arrays(run)
+    with pytest.raises(endotsr.InputError, match="folder that holds the same frames"):
+        opened.evaluate()
+
+
+def test_runs_that_cannot_be_opened(tmp_path):
+    with pytest.raises(endotsr.InputError, match="run folder not found"):
+        endotsr.open_run(tmp_path / "absent")
+
+
+def python_blocks(page):
+    text = (Path(__file__).parents[1] / page).read_text(encoding="utf-8")
+    return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/guides/python.md"])
+def test_the_code_of_the_pages_runs(page, sequence, tmp_path, monkeypatch, capsys):
+    """As printed, but for the length of the runs."""
+    monkeypatch.chdir(tmp_path)
+    write_endonerf(endotsr.load_sequence("simulated", simulator=SIMULATOR | {"height": 48}), Path("my_sequence"))
+    code = "\n".join(python_blocks(page))
+    assert len(code.splitlines()) >= 8 and "endotsr.load_sequence(" in code
+    short = {"training": {"checkpoint_every": 4}, "iterations": 4}
+    real = endotsr.api.make_config
+    monkeypatch.setattr(endotsr.api, "make_config", lambda *a, **k: real(*a, **(k | short)))
+    monkeypatch.setattr(endotsr, "make_config", endotsr.api.make_config)
+    found = {}
+    exec(compile(code, page, "exec"), found)
+    assert found["run"].iteration == 4 and found["view"].depth.shape == (24, 24)
+    assert endotsr.open_run("runs/mine").iteration == 4
