@@ -50,6 +50,13 @@ UNDIFFERENTIATED = {
         "it comes before training",
         "tests/scene/test_initialisation.py",
     ),
+    "b14": Undifferentiated(
+        ("endotsr.sequences.between.frame_between", "endotsr.sequences.between.motion_between"),
+        "a target is a constant of training",
+        "tests/sequences/test_between.py",
+        "none: dense optical flow is an estimate, and a port may take any",
+        "none: it is an option of training that is not part of the paper",
+    ),
     "m1": Undifferentiated(
         ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",

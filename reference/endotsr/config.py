@@ -208,7 +208,11 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     time_jitter: NonNegative = 0.0
     """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
     bridge_fraction: Fraction = 0.0
-    """fraction of iterations at a time between two training frames, compared with either by its nearness in time"""
+    """fraction of iterations that are rendered at a time between two training frames"""
+    bridge_target: Literal["neighbour", "flow"] = "neighbour"
+    """what such a render is compared with: one of the neighbours, or both moved along optical flow to that time"""
+    bridge_flow: Literal["dis", "farneback", "deepflow", "tvl1", "rlof"] = "dis"
+    """method of the optical flow"""
     seed: Count = 0
     """seed of every random draw"""
     threads: Count = 0

@@ -15,13 +15,16 @@ from endotsr.config import Config
 from endotsr.fitting.adam import AdamState, adam_state
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
+from endotsr.fitting.moments import Moments
 from endotsr.fitting.objective import Targets, frame_targets
+from endotsr.fitting.sampling import View
 from endotsr.kernels.memory import keep_freed_memory
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
 from endotsr.scene.parameters import FrameParameters, frame_parameters, trained
 from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import check_finite
 
 
@@ -48,6 +51,14 @@ class Workshop:
     spectral: Spectral
     extent: float
     targets: dict[int, Targets]  # by frame, filled at first use
+    moments: Moments  # between the frames, filled at first use
+
+    def observed(self, view: View) -> tuple[Targets, Camera]:
+        """What the render of a view is compared with, and the camera that it is seen by."""
+        if view.moment is None:
+            return self.targets_of(view.index), self.sequence.cameras[view.index]
+        frame = self.moments.frame(view.moment, self.config.training.precision)
+        return frame_targets(frame, self.config), frame.camera
 
     def targets_of(self, index: int) -> Targets:
         """The loss targets of a frame, made once."""
@@ -61,7 +72,7 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     keep_freed_memory()
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    return Workshop(sequence, config, spectral, extent, {})
+    return Workshop(sequence, config, spectral, extent, {}, Moments(sequence, config.training.bridge_flow))
 
 
 def new_training(sequence: Sequence, config: Config) -> TrainingState:

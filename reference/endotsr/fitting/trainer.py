@@ -99,7 +99,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     if residuals_activate(iteration, config):
         _activate_residuals(state, config)
     view = draw_view(state.rng, shop.sequence, config.training)
-    targets, camera = shop.targets_of(view.index), shop.sequence.cameras[view.index]
+    targets, camera = shop.observed(view)
     column = int(np.searchsorted(shop.sequence.train_index, view.index))
     scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, view.t, state.ahead, timer)
     degree = active_degree(iteration, config)

@@ -1,0 +1,79 @@
+"""Moments between the training frames: which are drawn, what is kept of them, and that a training uses them."""
+
+import itertools
+from collections import Counter
+
+import msgspec
+import numpy as np
+import pytest
+
+from endotsr.config import DEMO, TrainingConfig
+from endotsr.fitting import moments as module
+from endotsr.fitting.moments import STEPS, Moments
+from endotsr.fitting.sampling import Moment, draw_view
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.sequences.between import flows_between, frame_between
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.simulate import simulate
+
+FLOW = TrainingConfig(bridge_fraction=1.0, bridge_target="flow")
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    """Eleven frames, of which 1 and 9 are held out: gaps of 2, 1, 1 ... and 2."""
+    return simulate(SimulatorSettings(frames=11, width=64, height=48)).sequence
+
+
+def test_every_moment_of_every_gap_is_drawn_alike(sequence):
+    rng = np.random.default_rng(0)
+    views = [draw_view(rng, sequence, FLOW) for _ in range(6000)]
+    found = Counter(view.moment for view in views)
+    train = [int(i) for i in sequence.train_index]
+    wanted = {Moment(a, b, k / (2 * (b - a))) for a, b in itertools.pairwise(train) for k in range(1, 2 * (b - a))}
+    assert set(found) == wanted and len(wanted) == 2 * 3 + 6
+    assert all(abs(count - 6000 / len(wanted)) < 5 * np.sqrt(6000 / len(wanted)) for count in found.values())
+    for view in views[:200]:
+        assert view.moment is not None and view.index in (view.moment.earlier, view.moment.later)
+        assert view.t == pytest.approx((view.moment.earlier + view.moment.fraction * (view.moment.later -
+                                        view.moment.earlier)) / sequence.count)  # fmt: skip
+
+
+def test_the_frame_of_a_moment_is_that_of_the_equation(sequence):
+    kept = Moments(sequence, "dis")
+    moment = Moment(0, 2, 0.75)
+    wanted = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
+    found = kept.frame(moment)
+    assert np.abs(found.image - wanted.image).max() <= 0.51 / STEPS
+    assert np.array_equal(found.mask, wanted.mask) and np.array_equal(found.depth, wanted.depth)
+    assert (found.time, found.camera) == (wanted.time, wanted.camera)
+    assert found.image.dtype == np.float32 and kept.frame(moment, "float64").image.dtype == np.float64
+
+
+def test_the_flows_of_a_gap_are_computed_once(sequence, monkeypatch):
+    asked = []
+    real = module.flows_between
+    monkeypatch.setattr(module, "flows_between", lambda *rest: asked.append(rest[1:]) or real(*rest))
+    kept = Moments(sequence, "farneback")
+    for fraction in (0.25, 0.5, 0.75, 0.5):
+        kept.frame(Moment(0, 2, fraction))
+    assert asked == [(0, 2, "farneback")]
+
+
+def test_a_training_compares_with_the_moments(sequence):
+    config = msgspec.structs.replace(
+        DEMO,
+        training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0, bridge_target="flow", iterations=6),
+        initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=300, other_frame_points=60),
+    )
+    shop, state = workshop(sequence, config), new_training(sequence, config)
+    entries = [training_step(state, shop) for _ in range(4)]
+    assert not shop.targets and shop.moments.stored  # no frame was looked at
+    assert all(np.isfinite(entry["loss"]) for entry in entries)
+
+
+def test_without_bridges_no_moment_is_made(sequence):
+    shop, state = workshop(sequence, DEMO), new_training(sequence, DEMO)
+    training_step(state, shop)
+    assert not shop.moments.stored
