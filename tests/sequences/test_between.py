@@ -118,6 +118,7 @@ def test_held_out_pictures_are_not_read():
     three = Sequence(
         **{name: np.insert(getattr(sequence, name), 1, value, axis=0)
            for name, value in (("images", 7), ("masks", False), ("depth", np.nan), ("times", 0.25))},
+        cameras=[CAMERA] * 3, names=list("axb"), unit="", static_camera=True,
         train_index=np.array([0, 2]), test_index=np.array([1]),
     )  # fmt: skip
     a = frame_between(sequence, 0, 1, 0.5, flows_between(sequence, 0, 1))
