@@ -1,4 +1,4 @@
-"""The judge: a folder of outputs against the golden cases. Every state of the folder leads to a verdict."""
+"""The judge: compares a folder of outputs with the golden cases. Every state of the folder leads to a verdict."""
 
 from pathlib import Path
 from typing import Literal
@@ -47,7 +47,7 @@ class CaseReport(msgspec.Struct, kw_only=True):
 
 
 class Report(msgspec.Struct, kw_only=True):
-    """Everything the judge says."""
+    """The report of the judge."""
 
     version: str
     precision: str
