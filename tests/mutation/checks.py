@@ -97,7 +97,7 @@ def surveyed(check: Check, kernels: Mapping[CodeType, str], limit: float = SLOW)
 
 
 def of_pair(pair: Pair, recorded: Recorded, blocks: bool) -> list[Check]:
-    """Judge the gradient against the differences of the right kernels, and differentiate anew."""
+    """Judge the gradient against the differences of the right kernels, and differentiate again."""
 
     def judge(facts: dict[str, Any]) -> str:
         wrong, change = replay(pair, recorded)

@@ -1,6 +1,6 @@
 """The public gradient checker, arranged so that it can check thousands of wrong kernels.
 
-A mutant that the forward pass never runs leaves the finite differences as they are. They are therefore taken once,
+A mutant that the forward pass never runs does not change the finite differences. They are therefore taken once,
 with the right kernels, and the gradient of the mutant is judged against them (`Replay`). A mutant of the forward pass
 needs new differences, which are taken along fewer lines (`Live`).
 """

@@ -105,7 +105,7 @@ def replaced(function: Callable, *changes: tuple[str, str]) -> CodeType:
     source = textwrap.dedent(inspect.getsource(function))
     for old, new in changes:
         if source.count(old) != 1:
-            raise ValueError(f"{function.__qualname__}: {old!r} stands there {source.count(old)} times")
+            raise ValueError(f"{function.__qualname__}: {old!r} occurs {source.count(old)} times")
         source = source.replace(old, new)
     tree = ast.parse(source).body[0]
     assert isinstance(tree, ast.FunctionDef)

@@ -52,7 +52,7 @@ class RunOptions(_Reported):
 
 @dataclass
 class GenerateOptions:
-    """Compute all cases anew and compare with the folder; exit code 1 if anything differs."""
+    """Recompute all cases and compare with the folder; exit code 1 if anything differs."""
 
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""

@@ -126,7 +126,7 @@ class Taylor(NamedTuple):
 
 
 def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER) -> Taylor:
-    """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it stands clear of rounding.
+    """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it clearly exceeds rounding.
 
     The remainder of a right derivative falls as h^2 or faster, that of a wrong one as h.
     """

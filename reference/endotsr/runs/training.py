@@ -41,7 +41,7 @@ class Observer(Protocol):
         """The log entry of one iteration."""
 
     def say(self, message: str) -> None:
-        """One line for a person."""
+        """One line of text for the user."""
 
     def close(self) -> None:
         """The training has ended."""

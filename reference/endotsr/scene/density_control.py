@@ -98,7 +98,7 @@ def densify(
     rng: np.random.Generator,
     extent: float,
 ) -> Densified:
-    """Clone, split and prune in one gather; the inputs are left as they are.
+    """Clone, split and prune in one gather; the inputs are not changed.
 
     extent   scene units, see `scene_extent`
     returns  survivors in their old order, then clones, then first children, then second children, the last three

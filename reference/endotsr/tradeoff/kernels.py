@@ -18,7 +18,7 @@ from endotsr.splatting import compositing
 from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.tradeoff.settings import Setting
 
-COEFFICIENTS = (1.0,)  # stands for the coefficients of a variant, highest power first
+COEFFICIENTS = (1.0,)  # placeholder for the coefficients of a variant, highest power first
 
 
 def _exp2_polynomial(x):

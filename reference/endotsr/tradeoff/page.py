@@ -167,7 +167,7 @@ def write_page(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> 
         _pictures(folder, name, [""]),
         "<ol>" + "".join(f"<li>{plain(sentence)}</li>" for sentence in advice(result)) + "</ol>",
         parts.section(
-            "Settings worth having", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
+            "Settings that are not dominated", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
         ),
         parts.section("Presets", "<ul>" + "".join(f"<li>{plain(x)}</li>" for x in preset_lines(result)) + "</ul>"),
         parts.section("Every dial alone", _pictures(folder, name, [e for e in PICTURES if e])),

@@ -186,7 +186,7 @@ def run_training_study(
     """Train every configuration that the time allows, writing `file` after each; those it holds already are kept.
 
     load         settings -> sequence, which depends on the image scale
-    iterations   of every training; None = as many as fill the minutes (a study that goes on keeps its number)
+    iterations   of every training; None = as many as fit the minutes (a resumed study keeps its number)
     returns      training.json
     """
     full = load(base)

@@ -125,7 +125,7 @@ def _stop_after(request: Request) -> dict[str, NDArray] | None:
 
 
 def _skips(request: Request) -> dict[str, NDArray] | None:
-    """Leaves out the Gaussian that would stop the pixel and goes on; flat images only."""
+    """Leaves out the Gaussian that would stop the pixel and continues; flat images only."""
     raster, i = request.settings["raster"], request.inputs
     if i["covariance2d"].min(axis=1)[0] < 1e5:
         return None

@@ -169,7 +169,7 @@ def _interleaved(request: Request) -> dict[str, NDArray]:
 
 
 def _first_candidates(request: Request) -> dict[str, NDArray] | None:
-    """The first candidates are densified, whatever their gradient."""
+    """The first candidates are densified, independent of their gradient."""
     alive = ~request.right["pruned"]
     candidates = alive & (request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"])
     room = request.settings["density"]["maximum"] - alive.sum()
