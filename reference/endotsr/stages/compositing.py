@@ -34,7 +34,7 @@ IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
 
 
 class CompositeSaved(NamedTuple):
-    """What the reverse pass of a compositor needs, and the gather behind it."""
+    """Inputs of the reverse pass of a compositor and of the gather that follows it."""
 
     compositor: Any  # saved tuple of either compositor
     transmittance: NDArray  # (H, W)
@@ -160,7 +160,7 @@ HARMONICS = {f"harmonics degree {d}": slice(d * d, (d + 1) ** 2) for d in range(
 
 
 def _variants(stage: str) -> tuple[Variant, ...]:
-    """The definition with both presets, and the fast compositor where it answers too."""
+    """The definition with both presets, and the fast compositor where it applies."""
     made = []
     for name, raster in (("exact", EXACT), ("paper", WIDE), ("blocks", WIDE)):
         common = {"raster": raster_dict(raster), "_compositor": "blocks" if name == "blocks" else "definition"}

@@ -1,4 +1,4 @@
-"""The stage of the flexible deformation model (B1); one variant a time basis, so that neither can go unchecked."""
+"""The stage of the flexible deformation model (B1); one variant a time basis, so that both are checked."""
 
 from functools import partial
 

@@ -25,7 +25,7 @@ PER_DISPLAY, PER_LENGTH = "loss per display unit", "loss per scene unit"
 
 
 def _mask() -> NDArray[np.bool_]:
-    """A tool that reaches in from the right and one excluded pixel alone."""
+    """An instrument that enters from the right, and one isolated excluded pixel."""
     mask = np.ones((HEIGHT, WIDTH), bool)
     mask[2:5, 8:] = False
     mask[7, 2] = False

@@ -135,7 +135,7 @@ def _matern_reverse(cotangents: Inputs, saved: MaternSaved) -> Found:
 
 
 def _matern_inputs(rng: Random) -> dict[str, NDArray]:
-    # rho spans five decades; this scale lets every atom count alike, so that none is lost in the rounding of another
+    # rho spans five decades; this scale gives all atoms equal weight, so that none is lost in the rounding of another
     rho = matern_weights(frequencies(FREQUENCIES, 1.0, 16.0), LENGTH)
     scale = 0.5 / np.sqrt(np.tile(rho, 2))[:, None]
     return {"motion_coefficients": scale * rng.normal(0.0, 1.0, (3, 2 * FREQUENCIES, GAUSSIANS))}
@@ -154,7 +154,7 @@ STAGES = [
     Stage(
         name="dictionary",
         equation="1",
-        text="atoms at one time and the way back",
+        text="atoms at one time, forward and reverse",
         function="endotsr.equations.dictionary.dictionary_forward",
         inputs={"t": "1", "omega": "cycles per sequence"},
         forward=_dictionary,

@@ -1,4 +1,4 @@
-"""What a stage is: a forward pass, its reverse pass, the arrays that it answers and the inputs it is checked at.
+"""A stage: a forward pass, its reverse pass, the arrays that it returns and the inputs at which it is checked.
 
 The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss by NAME: a
 cotangent where NAME is an output, a gradient where it is an input.
@@ -19,7 +19,7 @@ Blocks = Mapping[str, tuple[str, object]]
 
 
 class Asked(NamedTuple):
-    """An array that a stage answers, and how a golden case judges it."""
+    """An array that a stage returns, and how a golden case judges it."""
 
     level: int
     unit: str = "1"
@@ -90,7 +90,7 @@ class Stage(NamedTuple):
     is_loss: bool = False
 
     def compute(self, inputs: Inputs, settings: Settings) -> Outputs:
-        """Everything that can be answered: outputs, and gradients where the request holds every cotangent.
+        """All results of a request: outputs, and gradients where the request holds every cotangent.
 
         returns  arrays by name in C order; may hold more, or fewer, names than `asked`
         """
@@ -118,7 +118,7 @@ def real_of(inputs: Inputs) -> np.dtype:
 
 
 def tidy(found: Found) -> Outputs:
-    """Outputs as C-ordered arrays; what is None was not asked for."""
+    """Outputs as C-ordered arrays; None marks an output that was not requested."""
     return {name: np.array(value, order="C") for name, value in found.items() if value is not None}
 
 

@@ -1,8 +1,8 @@
 """One Adam step of everything that is trained, from the gradients by the deformed scene.
 
-Where the gradient of an array is much larger than what it is made of (time bases, Fourier coefficients), the reverse
-pass and the step are one sweep, and the gradient is never stored. The sweep over the time bases takes the curves of
-the next iteration as well.
+Where the gradient of an array is much larger than its factors (time bases, Fourier coefficients), the reverse pass and
+the step are one sweep, and the gradient is never stored. The sweep over the time bases also computes the offsets of
+the next iteration.
 """
 
 from endotsr.config import Config
@@ -33,12 +33,12 @@ def optimise(
 ) -> OffsetsAhead | None:
     """Change the Gaussians and their moments in place.
 
-    saved   of `scene_at`, for these very Gaussians
+    saved   of `scene_at`, for the same Gaussians
     grads   gradients by the deformed scene
     back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
     rates   learning rate of every array
     next_time  normalised time of the next iteration, if it is known
-    timer   told of the stages "FDM" and "Adam"
+    timer   records the stages "FDM" and "Adam"
     returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
     """
     o = config.optimiser
@@ -70,7 +70,7 @@ def optimise(
             shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
 
-    ahead, *_ = parallel_calls(  # arrays of their own; the longest sweep first
+    ahead, *_ = parallel_calls(  # independent arrays; the longest sweep is listed first
         timed(timer, "FDM", step_deformation),
         timed(timer, "Adam", step_appearance),
         timed(timer, "Adam", step_motion),
