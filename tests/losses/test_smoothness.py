@@ -66,7 +66,7 @@ def test_hard_L5_all_or_no_tissue():
     _, grads = loss_and_gradients(depth, rendered, everything, edges)
     assert not grads.d_rendered.any()
     assert loss_and_gradients(depth, rendered, nothing, edges, 0.0)[0] == 0.0
-    assert not loss_and_gradients(depth, rendered, nothing, edges, 0.0)[1].rendered_depth.any()
+    assert not loss_and_gradients(depth, rendered, nothing, edges, 0.0)[1].d_rendered_depth.any()
 
 
 def test_hard_L6_values_outside_each_term_do_not_matter():
@@ -101,7 +101,7 @@ def test_float32_and_threads():
         found.append(loss_and_gradients(depth.astype(np.float32), rendered.astype(np.float32), mask, edges))
     assert found[0][0] == found[1][0]
     assert all(np.array_equal(a, b) for a, b in zip(found[0][1], found[1][1]))
-    assert found[0][1].rendered.dtype == found[0][1].rendered_depth.dtype == np.float32
+    assert found[0][1].d_rendered.dtype == found[0][1].d_rendered_depth.dtype == np.float32
     wide, wide_grads = loss_and_gradients(
         depth.astype(np.float32).astype(float), rendered.astype(np.float32).astype(float), mask, edges
     )
