@@ -101,7 +101,9 @@ def _ours(scene: Any, camera: Any, settings: Any, d_colour: FloatArray, d_depth:
         out, saved = render_forward(scene, camera, settings)
         grads = render_reverse(d_colour, d_depth, None, saved)
         found.update(colour=out.colour, depth=out.depth)
-        found.update({name: getattr(grads, name) for name, array in scene._asdict().items() if array is not None})
+        found.update(
+            {name: getattr(grads, f"d_{name}") for name, array in scene._asdict().items() if array is not None}
+        )
 
     return found, repeated(once, OURS_REPEATS, warm_up=2)
 

@@ -107,7 +107,7 @@ def rehearse_picture(shop: Any, state: Any) -> None:
     scene, saved = scene_at(base, shop.spectral, config.model, 0.5)
     out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
     grads = render_reverse(out.colour, out.depth, None, render_saved)
-    gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
+    gather_statistics(state.statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
     scene_reverse(grads, saved, coefficients=False)
 
 

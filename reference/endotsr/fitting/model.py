@@ -60,10 +60,10 @@ class OffsetsAhead(NamedTuple):
 
 
 class SceneGrads(NamedTuple):
-    """Gradients by the raw parameters; `offsets` is what the FDM's reverse pass takes."""
+    """Gradients by the raw parameters; `d_offsets` is what the FDM's reverse pass takes."""
 
     by_field: dict[str, FloatArray]  # every field but the three of the FDM
-    offsets: FloatArray | None  # (10, N)
+    d_offsets: FloatArray | None  # (10, N)
 
 
 def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spectral:
@@ -153,19 +153,19 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
 
     coefficients   False leaves the gradients of the Fourier coefficients to `coefficients_adam_step`
     """
-    by_field = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
-    by_field["harmonics"] = grads.harmonics
+    by_field = {name: getattr(grads, f"d_{name}") for name in ("position", "quaternion", "log_scale", "opacity_logit")}
+    by_field["harmonics"] = grads.d_harmonics
     if saved.appearance is not None and coefficients:
-        assert grads.residual is not None
-        appearance = appearance_reverse(grads.residual, saved.appearance, atom_gradient=False)
-        by_field["appearance_coefficients"] = appearance.appearance_coefficients
+        assert grads.d_residual is not None
+        appearance = appearance_reverse(grads.d_residual, saved.appearance, atom_gradient=False)
+        by_field["appearance_coefficients"] = appearance.d_appearance_coefficients
     if saved.motion is not None and coefficients:
-        motion = motion_reverse(grads.position, saved.motion, atom_gradient=False)
-        by_field["motion_coefficients"] = motion.motion_coefficients
-    offsets = None
+        motion = motion_reverse(grads.d_position, saved.motion, atom_gradient=False)
+        by_field["motion_coefficients"] = motion.d_motion_coefficients
+    d_offsets = None
     if saved.deformation is not None:
-        offsets = np.concatenate([grads.position, grads.quaternion, grads.log_scale])
-    return SceneGrads(by_field, offsets)
+        d_offsets = np.concatenate([grads.d_position, grads.d_quaternion, grads.d_log_scale])
+    return SceneGrads(by_field, d_offsets)
 
 
 def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
@@ -181,7 +181,7 @@ def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[
     if saved is None:
         return d_colour, None
     grads = exposure_reverse(d_colour, saved)
-    return grads.colour, Exposure(grads.log_gain, grads.bias)
+    return grads.d_colour, Exposure(grads.d_log_gain, grads.d_bias)
 
 
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:

@@ -113,7 +113,7 @@ def smoothness_term(
     edges = canny_edges(rendered.depth) if edges is None else edges
     value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
     smooth = smoothness_reverse(weight, saved)
-    return Term(value, smooth.rendered, smooth.rendered_depth)
+    return Term(value, smooth.d_rendered, smooth.d_rendered_depth)
 
 
 def laplacian_term(

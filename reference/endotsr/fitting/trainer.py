@@ -152,7 +152,7 @@ def _matern_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
 def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
     """Add this view to the statistics of density control."""
     if active:
-        gather_statistics(state.statistics, d_scene.mean2d, d_scene.visible, camera.width, camera.height)
+        gather_statistics(state.statistics, d_scene.d_mean2d, d_scene.visible, camera.width, camera.height)
 
 
 def _optimise(

@@ -32,7 +32,7 @@ class ViewGradients(NamedTuple):
     loss: float  # the Matern penalty included
     terms: dict[str, float]  # unweighted; only those evaluated
     gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
-    exposure: Exposure | None  # gradients by the exposure of this frame
+    d_exposure: Exposure | None  # gradients by the exposure of this frame
     rendered: RenderOut  # the images that were compared
 
 
@@ -75,7 +75,7 @@ def view_gradients(
     gradients, d_offsets = scene_reverse(d_scene, scene_saved)
     if scene_saved.deformation is not None and d_offsets is not None:
         fdm = deformation_reverse(d_offsets, scene_saved.deformation)
-        gradients |= {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
+        gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
     if gaussians.motion_coefficients is not None:
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}

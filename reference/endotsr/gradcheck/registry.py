@@ -65,7 +65,7 @@ def pair_of(stage: Stage, variant: Variant) -> Pair:
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
         _, saved = stage.forward(whole(inputs), variant.settings)
         found = reverse_pass(cotangents, saved)
-        return {name: np.asarray(found[name]) for name in inputs}
+        return {name: np.asarray(found[f"d_{name}"]) for name in inputs}
 
     def trace(inputs: Arrays) -> Mapping[str, NDArray]:
         assert trace_pass is not None

@@ -31,7 +31,7 @@ def _laplacian(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Laplaci
 
 
 def _laplacian_reverse(cotangents: Inputs, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
-    return {"rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
+    return {"d_rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
 
 
 def _bands(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:

@@ -77,9 +77,9 @@ def _exposure(inputs: Inputs) -> Exposure | None:
 def _objective_reverse(cotangents: Inputs, saved: ObjectiveSaved) -> Found:
     """The gradients of the view, times the cotangent of the loss."""
     view, up = saved.view, float(cotangents["objective"])
-    exposure = {} if view.exposure is None else view.exposure._asdict()
-    gradients = view.gradients | {f"exposure_{name}": array for name, array in exposure.items()}
-    return {name: array * array.dtype.type(up) for name, array in gradients.items()}
+    d_exposure = {} if view.d_exposure is None else view.d_exposure._asdict()
+    gradients = view.gradients | {f"exposure_{name}": array for name, array in d_exposure.items()}
+    return {f"d_{name}": array * array.dtype.type(up) for name, array in gradients.items()}
 
 
 def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> Found:

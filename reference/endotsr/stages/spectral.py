@@ -45,8 +45,7 @@ def _dictionary(inputs: Inputs, settings: Settings) -> tuple[Found, DictionarySa
 
 
 def _dictionary_reverse(cotangents: Inputs, saved: DictionarySaved) -> Found:
-    grads = dictionary_reverse(cotangents["phi"], saved)
-    return {"t": grads.t, "omega": grads.omega}
+    return dictionary_reverse(cotangents["phi"], saved)._asdict()
 
 
 def _dictionary_inputs(rng: Random) -> dict[str, NDArray]:
@@ -62,7 +61,7 @@ def _atoms(inputs: Inputs, settings: Settings) -> tuple[Found, NormaliseSaved]:
 
 
 def _atoms_reverse(cotangents: Inputs, saved: NormaliseSaved) -> Found:
-    return {"phi": normalise_reverse(cotangents["phi_bar"], saved)}
+    return {"d_phi": normalise_reverse(cotangents["phi_bar"], saved)}
 
 
 def _statistics(inputs: Inputs, settings: Settings, saved: NormaliseSaved) -> Found:
@@ -131,7 +130,7 @@ def _matern(inputs: Inputs, settings: Settings) -> tuple[Found, MaternSaved]:
 
 
 def _matern_reverse(cotangents: Inputs, saved: MaternSaved) -> Found:
-    return {"motion_coefficients": matern_penalty_reverse(float(cotangents["penalty"]), saved)}
+    return {"d_motion_coefficients": matern_penalty_reverse(float(cotangents["penalty"]), saved)}
 
 
 def _matern_inputs(rng: Random) -> dict[str, NDArray]:

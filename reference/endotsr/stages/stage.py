@@ -68,7 +68,7 @@ class Stage(NamedTuple):
     inputs    unit by name of every array that a request may hold, cotangents apart
     forward   (inputs, settings) -> (outputs that can be differentiated, saved)
     asked     outputs, `extra` outputs and gradients in the order in which they are stored and judged
-    reverse   (cotangents by output name, saved) -> gradients by input name; None = not differentiated
+    reverse   (cotangents by output name, saved) -> gradients, named `d_` and the input; None = not differentiated
     extra     (inputs, settings, saved) -> further outputs, which are not differentiated
     trace     (inputs, settings, saved) -> the discrete decisions of the forward pass (order, contributors, clamps,
               signs); a finite difference across a change of them is refused. None = no decisions
@@ -101,7 +101,7 @@ class Stage(NamedTuple):
         given = {name: inputs[f"d_{name}"] for name in outputs if f"d_{name}" in inputs}
         cotangents = dict.fromkeys(outputs, np.array(1.0)) | given if self.is_loss else given
         if self.reverse is not None and cotangents.keys() == outputs.keys():
-            found |= {f"d_{name}": value for name, value in self.reverse(cotangents, saved).items()}
+            found |= self.reverse(cotangents, saved)
         return tidy(found)
 
     def checks(self, settings: Settings) -> tuple[str, ...]:

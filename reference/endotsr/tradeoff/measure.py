@@ -135,7 +135,7 @@ def frame(prepared: Prepared) -> tuple[Frame, int]:
     full, small = prepared.scene.camera, prepared.camera
     if small.height != full.height or small.width != full.width:
         colour = _upsampling(small.height, full.height) @ colour @ _upsampling(small.width, full.width).T
-    found = {name: getattr(grads, name) for name in BLOCKS}
+    found = {name: getattr(grads, f"d_{name}") for name in BLOCKS}
     return Frame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
 
 

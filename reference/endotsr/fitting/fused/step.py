@@ -47,25 +47,25 @@ def optimise(
     def step_deformation() -> OffsetsAhead | None:
         if saved.deformation is None:
             return None
-        assert back.offsets is not None
+        assert back.d_offsets is not None
         fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-        offsets = deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
+        offsets = deformation_adam_step(back.d_offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
         if next_time is None or offsets is None:
             return None
         return OffsetsAhead(saved.deformation.weight, next_time, offsets)
 
     def step_appearance() -> None:
         if saved.appearance is not None:
-            assert grads.residual is not None
+            assert grads.d_residual is not None
             coefficients, atoms, _ = saved.appearance
-            d_argument = argument_gradient(grads.residual, saved.appearance)
+            d_argument = argument_gradient(grads.d_residual, saved.appearance)
             coefficients_adam_step(
                 d_argument, atoms, None, coefficients, adam, "appearance_coefficients", rates, *settings
             )
 
     def step_motion() -> None:
         if saved.motion is not None:
-            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.position
+            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.d_position
             rho, dtype = spectral.rho, coefficients.dtype
             shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
