@@ -240,8 +240,8 @@ g_phi = rng.normal(size=2 * F)
 _, saved = dictionary_forward(0.37, omega)
 grads = dictionary_reverse(g_phi, saved)
 g_t, g_omega = dictionary_reverse_text(g_phi, 0.37, omega)
-np.testing.assert_allclose(grads.t, g_t, rtol=1e-12)
-np.testing.assert_allclose(grads.omega, g_omega, rtol=1e-11)
+np.testing.assert_allclose(grads.d_t, g_t, rtol=1e-12)
+np.testing.assert_allclose(grads.d_omega, g_omega, rtol=1e-11)
 
 _, saved_32 = normalise_forward(phi, statistics_32)
 np.testing.assert_allclose(

@@ -150,15 +150,15 @@ def reverse_text(g_h, A, phi_bar, beta):
 g_h = rng.normal(size=(3, N))
 grads = appearance_reverse(g_h, appearance_forward(A, phi_bar, beta)[1])
 g_A, g_phi_bar = reverse_text(g_h, A, phi_bar, beta)
-np.testing.assert_allclose(grads.appearance_coefficients, g_A, rtol=1e-12)
-np.testing.assert_allclose(grads.phi_bar, g_phi_bar, rtol=1e-11)
+np.testing.assert_allclose(grads.d_appearance_coefficients, g_A, rtol=1e-12)
+np.testing.assert_allclose(grads.d_phi_bar, g_phi_bar, rtol=1e-11)
 
-saturated = appearance_reverse(g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]).appearance_coefficients
+saturated = appearance_reverse(g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]).d_appearance_coefficients
 np.testing.assert_allclose(
     saturated, reverse_text(g_h, 1e3 * A, phi_bar, beta)[0], rtol=1e-9, atol=1e-290
 )  # finite far out
 
-start = appearance_reverse(g_h, appearance_forward(zero, phi_bar, beta)[1]).appearance_coefficients
+start = appearance_reverse(g_h, appearance_forward(zero, phi_bar, beta)[1]).d_appearance_coefficients
 np.testing.assert_allclose(start, beta / Y00 * phi_bar[None, :, None] * g_h[:, None, :], rtol=1e-14)
 assert np.abs(start).max() > 0
 

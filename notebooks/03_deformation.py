@@ -164,7 +164,7 @@ for basis in ("quartic", "gaussian"):
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
 still = deformation_reverse(g_psi, saved)
-assert np.any(still.weight) and not np.any(still.centre) and not np.any(still.width)
+assert np.any(still.d_fdm_weight) and not np.any(still.d_fdm_centre) and not np.any(still.d_fdm_width)
 
 # %% [markdown]
 # ## The gradient check
@@ -192,5 +192,5 @@ assert abs(v[np.argmax(np.exp(-(v**2) / 2) * v)] - 1) < 1e-4
 one = np.ones((10, 1, 2001))
 t = 0.5 + np.sqrt(0.05**2 + 1e-4) * np.linspace(0, 2, 2001)
 _, saved = deformation_forward(one, 0.5 - (t - 0.5)[None, None, :] * one, 0.05 * one, 0.5)
-push = deformation_reverse(np.ones((10, 2001)), saved).centre[0, 0]
+push = deformation_reverse(np.ones((10, 2001)), saved).d_fdm_centre[0, 0]
 assert abs(np.linspace(0, 2, 2001)[np.argmax(push)] - 0.75**0.25) < 1e-3

@@ -139,14 +139,14 @@ g_R, g_S = (np.stack(parts, axis=-1) for parts in zip(*pairs))
 grads = covariance_reverse(Shape(g_R, g_S), saved)
 for i in range(N):
     np.testing.assert_allclose(
-        grads.quaternion[:, i], quaternion_reverse_text(g_R[:, :, i], q[:, i]), rtol=1e-9, atol=1e-12
+        grads.d_quaternion[:, i], quaternion_reverse_text(g_R[:, :, i], q[:, i]), rtol=1e-9, atol=1e-12
     )
-np.testing.assert_allclose(grads.log_scale, np.exp(s) * g_S, rtol=1e-12)
+np.testing.assert_allclose(grads.d_log_scale, np.exp(s) * g_S, rtol=1e-12)
 
-along = np.abs((q * grads.quaternion).sum(axis=0)) / np.linalg.norm(grads.quaternion, axis=0)
+along = np.abs((q * grads.d_quaternion).sum(axis=0)) / np.linalg.norm(grads.d_quaternion, axis=0)
 assert along.max() < 1e-12, "a gradient along the quaternion would change nothing"
 np.testing.assert_allclose(
-    covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).quaternion, grads.quaternion / 5
+    covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).d_quaternion, grads.d_quaternion / 5
 )
 
 # %% [markdown]
@@ -168,7 +168,7 @@ for _ in range(800):
     path.append(covariance_matrix(shape_now)[:, :, 0])
     back = from_sigma_text(2 * difference, shape_now.rotation[:, :, 0], shape_now.scale[:, 0])
     step = covariance_reverse(Shape(*(part[..., None] for part in back)), saved_now)
-    q_now, s_now = q_now - 0.05 * step.quaternion, s_now - 0.05 * step.log_scale
+    q_now, s_now = q_now - 0.05 * step.d_quaternion, s_now - 0.05 * step.d_log_scale
 assert losses[-1] < 1e-3 * losses[0]
 
 circle = np.stack([np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))])
@@ -207,7 +207,8 @@ def sigma_forward(inputs):
 def sigma_reverse(inputs, g):
     shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
     parts = [from_sigma_text(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)]
-    return covariance_reverse(Shape(*(np.stack(p, axis=-1) for p in zip(*parts))), saved)._asdict()
+    grads = covariance_reverse(Shape(*(np.stack(p, axis=-1) for p in zip(*parts))), saved)
+    return {"quaternion": grads.d_quaternion, "log_scale": grads.d_log_scale}
 
 
 with one_thread():

@@ -247,12 +247,12 @@ for settings in (PAPER, EXACT):
             camera,
             settings.jacobian_clamp,
         )
-        np.testing.assert_allclose(grads.position[:, i], g_mu, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(grads.rotation[:, :, i], g_R, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(grads.scale[:, i], g_S, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(grads.d_position[:, i], g_mu, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(grads.d_rotation[:, :, i], g_R, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(grads.d_scale[:, i], g_S, rtol=1e-9, atol=1e-10)
         g_d, g_W = g_d + g_xyz, g_W + part
-    np.testing.assert_allclose(grads.camera.translation, g_d, rtol=1e-10)
-    np.testing.assert_allclose(grads.camera.rotation, g_W, rtol=1e-10)
+    np.testing.assert_allclose(grads.d_camera.d_translation, g_d, rtol=1e-10)
+    np.testing.assert_allclose(grads.d_camera.d_rotation, g_W, rtol=1e-10)
 
 # %% [markdown]
 # The direct form gives the same gradients as the form through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in
@@ -286,10 +286,10 @@ for i in range(N):
         project_text(mu[:, i], shape.rotation[:, :, i], shape.scale[:, i], camera, 1.3)[3][-2:],
     )
     g_S, g_T = footprint_reverse_text(g_A[i], g_m[i], g_r[i], T, S, a[i], b[i], c[i], projected.determinant[i])
-    np.testing.assert_allclose(direct.scale[:, i], g_S, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(direct.rotation[:, :, i], (J @ camera.rotation).T @ g_T, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(direct.d_scale[:, i], g_S, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(direct.d_rotation[:, :, i], (J @ camera.rotation).T @ g_T, rtol=1e-9, atol=1e-12)
 for name in ("position", "rotation", "scale"):
-    np.testing.assert_allclose(getattr(direct, name), getattr(through, name), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(getattr(direct, f"d_{name}"), getattr(through, f"d_{name}"), rtol=1e-7, atol=1e-9)
 
 # %% [markdown]
 # ## The gradient check
@@ -323,5 +323,5 @@ single = projection_forward(mu, shape, camera, PAPER)
 np.testing.assert_allclose(doubled[0].mean2d, single[0].mean2d, rtol=1e-12)
 np.testing.assert_allclose(doubled[0].covariance2d, single[0].covariance2d, rtol=1e-9, atol=1e-9)
 np.testing.assert_allclose(doubled[0].depth, 2 * single[0].depth, rtol=1e-13)
-back = [projection_reverse(g_uv, g_abc, 0 * g_z, saved).position for saved in (doubled[1], single[1])]
+back = [projection_reverse(g_uv, g_abc, 0 * g_z, saved).d_position for saved in (doubled[1], single[1])]
 np.testing.assert_allclose(back[0], back[1] / 2, rtol=1e-9, atol=1e-10)

@@ -325,9 +325,9 @@ found = exposure_reverse(g_I, saved_exposure)
 for c in range(3):
     gain = np.exp(gamma[c])
     np.testing.assert_allclose(exposed[c], gain * I_hat[c] + b[c], rtol=1e-14)
-    np.testing.assert_allclose(found.colour[c], gain * g_I[c], rtol=1e-14)
-    np.testing.assert_allclose(found.log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11)
-    np.testing.assert_allclose(found.bias[c], g_I[c].sum(), rtol=1e-11)
+    np.testing.assert_allclose(found.d_colour[c], gain * g_I[c], rtol=1e-14)
+    np.testing.assert_allclose(found.d_log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11)
+    np.testing.assert_allclose(found.d_bias[c], g_I[c].sum(), rtol=1e-11)
 
 # %% [markdown]
 # ## The gradient check

@@ -180,8 +180,8 @@ for _ in range(3):  # three views: a shifted camera, and a random pull on the im
     seen_from = camera._replace(translation=rng.normal(0, 0.2, 3))
     out, saved = render_forward(scene, seen_from, RASTER, degree=0)
     grads = render_reverse(rng.normal(0, 1e-5, out.colour.shape), 0 * out.depth, None, saved)
-    gather_statistics(statistics, grads.mean2d, grads.visible, camera.width, camera.height)
-    views.append((*grads.mean2d, grads.visible))
+    gather_statistics(statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
+    views.append((*grads.d_mean2d, grads.visible))
 steep = statistic_text(views, 64, 48)
 np.testing.assert_allclose(statistics.gradient_sum / np.maximum(statistics.visits, 1), steep, rtol=1e-12)
 

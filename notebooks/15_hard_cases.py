@@ -166,7 +166,7 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
     assert np.array_equal(out.colour, render(plain, small, PAPER)[0].colour)
     grads = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), None, saved)
     assert not any(
-        np.any(getattr(grads, name)[..., 1]) for name in ("position", "quaternion", "log_scale", "opacity_logit")
+        np.any(getattr(grads, f"d_{name}")[..., 1]) for name in ("position", "quaternion", "log_scale", "opacity_logit")
     )
 
 # %% [markdown]
@@ -178,7 +178,7 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
 nothing = made(np.zeros((3, 0)))
 out, saved = render(nothing, small._replace(width=1, height=1), background=np.array([0.1, 0.2, 0.3]))
 assert out.colour.ravel().tolist() == [0.1, 0.2, 0.3] and out.depth.item() == 0
-assert render_reverse(out.colour, out.depth, None, saved).position.shape == (3, 0)
+assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3, 0)
 
 # %% [markdown]
 # ## Two thousand faint sheets
@@ -348,4 +348,4 @@ identity, zero = (
 )
 (one, _), (two, saved) = render(identity, small), render(zero, small)
 assert np.array_equal(one.colour, two.colour)
-assert not render_reverse(np.ones_like(two.colour), np.ones_like(two.depth), None, saved).quaternion.any()
+assert not render_reverse(np.ones_like(two.colour), np.ones_like(two.depth), None, saved).d_quaternion.any()

@@ -9,11 +9,12 @@
     run = endotsr.open_run("runs/mine")
 
 Every function calls the code that the command of the same purpose calls, so that the numbers are the same, bit for
-bit: `train` those of `endotsr train`, `Run.render` those of `endotsr render`, `Run.evaluate` those of
-`endotsr evaluate`. A run folder that `Run.save` writes is one that the commands read, and the reverse.
+bit: `train` gives those of `endotsr train`, `Run.render` those of `endotsr render`, `Run.evaluate` those of
+`endotsr evaluate`. The commands read a run folder that `Run.save` writes, and `open_run` reads one that a command
+writes.
 
-Import the names from `endotsr` itself; `endotsr.__all__` lists those that are stable. Input that cannot be used is an
-`InputError` that names the argument and the allowed values.
+Import the names from `endotsr` itself; `endotsr.__all__` lists those that are stable. Input that cannot be used raises
+an `InputError` that names the argument and the allowed values.
 """
 
 import shutil
@@ -137,7 +138,7 @@ def train(
 
     sequence       from `load_sequence`, whose settings apply; or a `Sequence` made of arrays
     config         from `make_config`; without it, preset, iterations and sections make the settings as there.
-                   With it, iterations and sections change it
+                   With it, iterations and sections are applied on top of it
     on_iteration   called after every iteration with its log entry: iteration, frame, loss, the terms of the loss,
                    gaussians, seconds, and every tenth time psnr. `raise StopTraining` in it ends the training. What it
                    returns is ignored
@@ -174,7 +175,7 @@ def train(
 def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
     """The run of a run folder at its latest checkpoint, whether a command or `Run.save` wrote it.
 
-    sequence   where the sequence of the run is now; default: where it was. It is read when it is needed first
+    sequence   current location of the sequence of the run; default: the recorded location. It is read at first use
 
     Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
     """

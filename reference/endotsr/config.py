@@ -1,4 +1,4 @@
-"""Every setting of a run in one typed, frozen tree: defaults = the published schedule (preset `paper`).
+"""Every setting of a run in one typed, frozen tree; the defaults are the published schedule (preset `paper`).
 
 Read from TOML with `load_config`; an unknown key or a wrong type is an `InputError` that names the key
 and the allowed values. Iterations are counted from 1. Lengths are in scene units (millimetres for EndoNeRF).
@@ -28,7 +28,7 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class SequenceConfig(Section, frozen=True, kw_only=True):
-    """What is read from an EndoNeRF folder."""
+    """The frames, masks and depth that are read from an EndoNeRF folder."""
 
     masks: Literal["masks", "gt_masks"] = "masks"
     """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only"""
@@ -45,18 +45,18 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     block_length: PositiveCount = 8
     """frames in a held-out block; a block starts every max(24, 2 x length) frames"""
     depth_percentiles: tuple[float, float] = (3.0, 99.8)
-    """per-frame clip of the non-zero depth prior, percent"""
+    """per-frame clip of the non-zero prior depth, percent"""
 
 
 class ModelConfig(Section, frozen=True, kw_only=True):
-    """What the model is made of. A component that is off allocates nothing and runs nothing."""
+    """Components and sizes of the model. A component that is off allocates nothing and runs nothing."""
 
     appearance: bool = True
     """component A: bounded Fourier colour residual, eq. (1)-(2)"""
     spectral_motion: bool = True
     """component S: Fourier translation residual and its Matern penalty, eq. (3)-(4)"""
     laplacian: bool = True
-    """component L: mask-propagating Laplacian detail loss, eq. (5)"""
+    """component L: mask-propagating Laplacian loss, eq. (5)"""
     deformation: bool = True
     """flexible deformation model; off = a rigid scene"""
     exposure: bool = False
@@ -112,11 +112,11 @@ class LossConfig(Section, frozen=True, kw_only=True):
     lambda_msp: NonNegative = 1.0
     """weight of the Matern spectral penalty"""
     lambda_lap: NonNegative | Literal["auto"] = 0.83
-    """full detail weight; `auto` = calibrate on this sequence by eq. (7)"""
+    """full Laplacian weight; `auto` = calibrate on this sequence by eq. (7)"""
     laplacian_from: Count = 1000
-    """last iteration with detail weight 0"""
+    """last iteration with Laplacian weight 0"""
     laplacian_full: Count = 2500
-    """first iteration with full detail weight"""
+    """first iteration with full Laplacian weight"""
     upsampling: Literal["co_sited", "half_pixel"] = "co_sited"
     """up-sampling rule of the pyramid"""
     gradient_ratio: Positive = 0.25
@@ -126,7 +126,7 @@ class LossConfig(Section, frozen=True, kw_only=True):
 
 
 class OptimiserConfig(Section, frozen=True, kw_only=True):
-    """Adam and its learning rates. Decaying rates fall exponentially to `final_factor` of their start."""
+    """Adam and its learning rates. Decaying rates fall exponentially to `final_factor` x their initial value."""
 
     position: NonNegative = 1.6e-3
     """canonical position, scene units per step, decaying"""
@@ -170,11 +170,11 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     start: Count = 500
     """densify at iterations > start"""
     interval: PositiveCount = 100
-    """every so many iterations"""
+    """iterations between two densifications"""
     until: Count = 4000
-    """and < until"""
+    """densify at iterations < until"""
     gradient_threshold: Positive = 2e-4
-    """mean screen gradient, NDC units"""
+    """mean screen gradient from which a Gaussian is cloned or split, NDC units"""
     extent: Positive | Literal["cameras"] = 10.0
     """scene extent, scene units; `cameras` = 1.1 x the largest camera distance from their mean"""
     dense_fraction: Positive = 0.01
@@ -189,9 +189,9 @@ class InitialisationConfig(Section, frozen=True, kw_only=True):
     """Back-projected training pixels."""
 
     first_frame_points: PositiveCount = 35_000
-    """drawn from the first training frame"""
+    """number of pixels drawn from the first training frame"""
     other_frame_points: Count = 5_000
-    """spread over the other training frames"""
+    """number of pixels drawn from the other training frames together"""
     motion_threshold: Positive = 40.0
     """a pixel of another frame counts as moved when its depth differs by more, scene units"""
 
@@ -200,17 +200,17 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     """Length, seed and bookkeeping of a run."""
 
     iterations: PositiveCount = 6000
-    """one view each"""
+    """number of iterations; each renders one view"""
     residual_activation: Count = 3000
-    """K_s: the iteration after which A and S are evaluated"""
+    """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
     """iterations between raises of the active harmonic degree"""
     time_jitter: NonNegative = 0.0
     """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
     bridge_fraction: Fraction = 0.0
-    """fraction of iterations that are rendered at a time between two training frames"""
+    """fraction of iterations that render a time between two training frames"""
     bridge_target: Literal["neighbour", "flow"] = "neighbour"
-    """what such a render is compared with: one of the neighbours, or both moved along optical flow to that time"""
+    """target of such a render: one of the two frames, or both moved along optical flow to that time"""
     bridge_flow: Literal["dis", "farneback", "deepflow", "tvl1", "rlof"] = "dis"
     """method of the optical flow"""
     seed: Count = 0
@@ -218,7 +218,7 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     threads: Count = 0
     """threads; 0 = all cores (results are bitwise equal for any number)"""
     precision: Literal["float32", "float64"] = "float32"
-    """arithmetic of the run"""
+    """floating-point precision of the run"""
     checkpoint_every: PositiveCount = 1000
     """iterations between checkpoints"""
 
@@ -227,7 +227,7 @@ class Config(Section, frozen=True, kw_only=True):
     """All settings of a run."""
 
     preset: Literal["paper", "sharp", "demo"] = "paper"
-    """where these settings started from"""
+    """preset whose values these settings start from"""
     sequence: SequenceConfig = SequenceConfig()
     model: ModelConfig = ModelConfig()
     raster: RasterConfig = RasterConfig()
@@ -270,7 +270,7 @@ def with_iterations(config: Config, iterations: int) -> Config:
 DEMO = msgspec.structs.replace(
     with_iterations(PAPER, 600),
     preset="demo",
-    # wide time bases and bridged times suit its 24 frames; as many points as its 160x128 pixels can tell apart
+    # wide time bases and bridged times suit its 24 frames; the number of points suits its 160x128 pixels
     model=ModelConfig(initial_width=0.1),
     initialisation=InitialisationConfig(first_frame_points=6000, other_frame_points=1500),
 )
@@ -371,7 +371,7 @@ def allowed_values(kind: Any) -> str:
 
 
 def _refuse_contradictions(config: Config, where: str) -> None:
-    """Settings that are each allowed but not together."""
+    """Raises InputError for settings that are allowed one by one but not together."""
     model, loss, (low, high) = config.model, config.loss, config.sequence.depth_percentiles
     if model.frequency_max < model.frequency_min or (
         model.frequencies > 1 and model.frequency_max == model.frequency_min

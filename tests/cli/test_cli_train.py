@@ -344,10 +344,13 @@ def test_resume_of_a_finished_run_changes_nothing(finished_run, tmp_path, capsys
     ("more", "named"),
     [
         (["--model.beta", "0.2"], ["model.beta = 0.2", "keeps the settings"]),
-        (["--model.beta", "0.2"], ["asked: model.beta = 0.2 (run: 0.3)\n"]),
-        (["--iterations", "40"], ["keeps the settings", "asked: training.iterations = 40 (run: 30)\n"]),
-        (["--scale", "0.5", "--seed", "1"], ["asked: sequence.scale = 0.5 (run: 1.0), training.seed = 1 (run: 0)\n"]),
-        (["--preset", "sharp"], ["asked: preset = 'sharp' (run: 'paper')\n"]),
+        (["--model.beta", "0.2"], ["requested: model.beta = 0.2 (run: 0.3)\n"]),
+        (["--iterations", "40"], ["keeps the settings", "requested: training.iterations = 40 (run: 30)\n"]),
+        (
+            ["--scale", "0.5", "--seed", "1"],
+            ["requested: sequence.scale = 0.5 (run: 1.0), training.seed = 1 (run: 0)\n"],
+        ),
+        (["--preset", "sharp"], ["requested: preset = 'sharp' (run: 'paper')\n"]),
         (["--iterations", "30", "--schedule", "absolute"], ["loss.laplacian_from = 1000 (run: 5)"]),
         (["--seed", "1"], ["training.seed = 1"]),
         (["--simulator.seed", "1"], ["images differ", "sha256"]),
@@ -384,9 +387,9 @@ def test_resume_compares_only_what_was_asked_for(tmp_path, capsys):
     assert (out / "config.toml").read_bytes() == kept
     file.write_text("[model]\nbeta = 0.45\nbases = 17\n")
     asked = [*resume(out), "--config", str(file)]
-    assert_refused(capsys, asked, "asked: model.beta = 0.45 (run: 0.4)\n")
+    assert_refused(capsys, asked, "requested: model.beta = 0.45 (run: 0.4)\n")
     file.write_text('preset = "sharp"\n')
-    assert_refused(capsys, asked, "asked: preset = 'sharp' (run: 'paper')\n")
+    assert_refused(capsys, asked, "requested: preset = 'sharp' (run: 'paper')\n")
 
 
 def test_resume_of_a_demo_needs_none_of_its_options(tmp_path, capsys):

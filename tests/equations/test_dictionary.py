@@ -68,9 +68,9 @@ def test_dictionary_reverse_against_differences():
     def slope(f):
         return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
 
-    assert slope(lambda s: value(s, 0)) == pytest.approx(grads.t, rel=1e-8)
+    assert slope(lambda s: value(s, 0)) == pytest.approx(grads.d_t, rel=1e-8)
     for one in np.eye(5):
-        assert slope(lambda s, one=one: value(0, s * one)) == pytest.approx(grads.omega @ one, rel=1e-8)
+        assert slope(lambda s, one=one: value(0, s * one)) == pytest.approx(grads.d_omega @ one, rel=1e-8)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -216,7 +216,7 @@ def test_hard_W6_stamps_outside_the_unit_interval(dtype):
         assert np.all(np.isfinite(normalised_atoms(t, omega, statistics)))
         phi, saved = dictionary_forward(t, omega)
         grads = dictionary_reverse(np.ones_like(phi), saved)
-        assert np.isfinite(phi).all() and np.isfinite(grads.t) and np.isfinite(grads.omega).all()
+        assert np.isfinite(phi).all() and np.isfinite(grads.d_t) and np.isfinite(grads.d_omega).all()
     assert not np.allclose(dictionary_forward(0.2, omega)[0], dictionary_forward(1.2, omega)[0])
 
 

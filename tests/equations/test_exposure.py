@@ -37,7 +37,7 @@ def test_identity_changes_no_bit_and_writes_nothing_into_its_inputs(case):
 def test_an_empty_image_has_no_gradient():
     exposed, saved = exposure_forward(np.zeros((3, 0, 4)), np.ones(3), np.ones(3))
     grads = exposure_reverse(exposed, saved)
-    assert exposed.shape == (3, 0, 4) and not grads.log_gain.any() and not grads.bias.any()
+    assert exposed.shape == (3, 0, 4) and not grads.d_log_gain.any() and not grads.d_bias.any()
 
 
 @pytest.mark.parametrize("log_gain, bias", [(np.zeros(2), np.zeros(3)), (np.zeros(3), np.zeros(1))])

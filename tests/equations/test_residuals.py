@@ -60,8 +60,8 @@ def test_hard_H3_a_tiny_residual_keeps_its_digits(dtype):
     residual, saved = appearance_forward(np.tile(x, (3, 1, 1)), np.ones(1, dtype), BETA)
     np.testing.assert_allclose(residual[0], BETA / Y00 * x.astype(np.float64), rtol=8 * unit(dtype))
     back = appearance_reverse(np.ones((3, 64), dtype), saved)
-    np.testing.assert_allclose(back.appearance_coefficients, BETA / Y00, rtol=8 * unit(dtype))
-    np.testing.assert_allclose(back.phi_bar, 3 * BETA / Y00 * x.astype(np.float64).sum(), rtol=8 * unit(dtype))
+    np.testing.assert_allclose(back.d_appearance_coefficients, BETA / Y00, rtol=8 * unit(dtype))
+    np.testing.assert_allclose(back.d_phi_bar, 3 * BETA / Y00 * x.astype(np.float64).sum(), rtol=8 * unit(dtype))
     if dtype is np.float32:
         base = np.float32(0.5)
         assert ((base + residual[0]) - base == 0).all()
@@ -85,7 +85,7 @@ def test_hard_T2_zero_coefficients_change_nothing_but_can_start(dtype):
     assert np.array_equal(residual, np.zeros((3, 9), dtype))
     base = np.random.default_rng(1).normal(size=(3, 9)).astype(dtype)
     assert (base + residual).tobytes() == base.tobytes()
-    gradient = appearance_reverse(upstream, saved).appearance_coefficients
+    gradient = appearance_reverse(upstream, saved).d_appearance_coefficients
     expected = BETA / Y00 * np.einsum("ci,a->cai", upstream.astype(np.float64), atoms.astype(np.float64))
     np.testing.assert_allclose(gradient, expected, rtol=4 * unit(dtype))
     translation, _ = motion_forward(np.zeros((3, 16, 9), dtype), atoms)

@@ -98,7 +98,7 @@ def test_a_step_of_everything_equals_the_gradients_of_the_definition_put_to_adam
     grads = _gradients(rng, scene)
 
     back = scene_reverse(grads, saved)
-    fdm = deformation_reverse(back.offsets, saved.deformation)
+    fdm = deformation_reverse(back.d_offsets, saved.deformation)
     by_field = back.by_field | dict(zip(NAMES, fdm[:3], strict=True))
     if weight > 0:
         extra = matern_penalty_reverse(weight, MaternSaved(gaussians.motion_coefficients, spectral.rho))
@@ -120,7 +120,7 @@ def test_a_step_of_everything_equals_the_gradients_of_the_definition_put_to_adam
 
 
 def _gradients(rng, scene):
-    made = {n: rng.normal(size=np.shape(a)).astype(a.dtype) for n, a in scene._asdict().items()}
+    made = {f"d_{n}": rng.normal(size=np.shape(a)).astype(a.dtype) for n, a in scene._asdict().items()}
     count = scene.position.shape[1]
-    none = {"background": None, "camera": None}
-    return RenderGrads(**made, mean2d=np.zeros((2, count)), visible=np.ones(count, bool), **none)
+    none = {"d_background": None, "d_camera": None}
+    return RenderGrads(**made, d_mean2d=np.zeros((2, count)), visible=np.ones(count, bool), **none)

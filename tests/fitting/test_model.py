@@ -96,7 +96,7 @@ def test_a_component_without_arrays_adds_nothing_and_gets_no_gradient(gaussians,
     back = scene_reverse(gradients(appearance), saved)
     assert ("appearance_coefficients" in back.by_field) == appearance
     assert ("motion_coefficients" in back.by_field) == motion
-    assert (back.offsets is not None) == deformation
+    assert (back.d_offsets is not None) == deformation
 
 
 def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(gaussians):
@@ -118,10 +118,10 @@ def test_offsets_taken_ahead_serve_their_own_gaussians_and_time_alone(gaussians)
 def gradients(appearance=True):
     rng = np.random.default_rng(8)
     return RenderGrads(
-        position=rng.normal(size=(3, N)), quaternion=rng.normal(size=(4, N)), log_scale=rng.normal(size=(3, N)),
-        opacity_logit=rng.normal(size=N), harmonics=rng.normal(size=(16, 3, N)),
-        residual=rng.normal(size=(3, N)) if appearance else None, mean2d=np.zeros((2, N)),
-        visible=np.ones(N, bool), background=None, camera=None,
+        d_position=rng.normal(size=(3, N)), d_quaternion=rng.normal(size=(4, N)), d_log_scale=rng.normal(size=(3, N)),
+        d_opacity_logit=rng.normal(size=N), d_harmonics=rng.normal(size=(16, 3, N)),
+        d_residual=rng.normal(size=(3, N)) if appearance else None, d_mean2d=np.zeros((2, N)),
+        visible=np.ones(N, bool), d_background=None, d_camera=None,
     )  # fmt: skip
 
 
@@ -129,16 +129,16 @@ def test_gradients_reach_every_raw_array(gaussians):
     _, saved = scene_at(gaussians, SPECTRAL, MODEL, T)
     grads = gradients()
     back = scene_reverse(grads, saved)
-    wanted = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
-    wanted["harmonics"] = grads.harmonics
-    wanted["appearance_coefficients"] = appearance_reverse(grads.residual, saved.appearance).appearance_coefficients
-    wanted["motion_coefficients"] = motion_reverse(grads.position, saved.motion).motion_coefficients
+    wanted = {name: getattr(grads, f"d_{name}") for name in ("position", "quaternion", "log_scale", "opacity_logit")}
+    wanted["harmonics"] = grads.d_harmonics
+    wanted["appearance_coefficients"] = appearance_reverse(grads.d_residual, saved.appearance).d_appearance_coefficients
+    wanted["motion_coefficients"] = motion_reverse(grads.d_position, saved.motion).d_motion_coefficients
     assert back.by_field.keys() == wanted.keys() == arrays(gaussians).keys() - {"fdm_weight", "fdm_centre", "fdm_width"}
     for name, array in wanted.items():
         np.testing.assert_array_equal(back.by_field[name], array, err_msg=name)
-    np.testing.assert_array_equal(back.offsets[:3], grads.position)
-    np.testing.assert_array_equal(back.offsets[3:7], grads.quaternion)
-    np.testing.assert_array_equal(back.offsets[7:], grads.log_scale)
+    np.testing.assert_array_equal(back.d_offsets[:3], grads.d_position)
+    np.testing.assert_array_equal(back.d_offsets[3:7], grads.d_quaternion)
+    np.testing.assert_array_equal(back.d_offsets[7:], grads.d_log_scale)
 
 
 def test_settings_of_the_raster_that_are_set_replace_those_of_its_preset():

@@ -79,7 +79,7 @@ def parts(rendered, frame):
         "l1": (l1, masked_l1_reverse(1.0, l1_saved), none),
         "ssim": (ssim, masked_ssim_reverse(1.0, ssim_saved), none),
         "depth": (depth, 0, normalised_depth_reverse(1.0, depth_saved)),
-        "smoothness": (smooth, back.rendered, back.rendered_depth),
+        "smoothness": (smooth, back.d_rendered, back.d_rendered_depth),
         "laplacian": (detail, laplacian_loss_reverse(1.0, detail_saved), none),
     }
 

@@ -67,7 +67,7 @@ def plain_step(state, shop):
     )  # fmt: skip
     gradients = dict(view.gradients)
     if state.frames is not None:
-        gradients |= column_gradients(state.frames, column, view.exposure)
+        gradients |= column_gradients(state.frames, column, view.d_exposure)
     parameters = arrays(state.gaussians) | trained(state.frames)
     rates = learning_rates(iteration, config)
     adam_update(state.adam, parameters, gradients, rates, o.beta1, o.beta2, o.epsilon)
@@ -115,7 +115,7 @@ def test_a_component_that_is_off_has_no_gradient_and_no_term(sequence):
     state, shop = warm(sequence, settings(appearance=False, spectral_motion=False, deformation=False), 3)
     view = view_of(state, shop)
     assert view.gradients.keys() == arrays(state.gaussians).keys()
-    assert "matern_penalty" not in view.terms and view.exposure is None
+    assert "matern_penalty" not in view.terms and view.d_exposure is None
 
 
 def test_degree_of_the_model_is_the_default(sequence):

@@ -133,7 +133,7 @@ def test_clamp_of_the_jacobian_is_continuous_and_the_limit_itself_is_free(axis, 
         position[axis] = sign * slope
         out, saved = projection_forward(position, shape, camera, PAPER)
         back = projection_reverse(np.zeros((2, 1)), weights, np.zeros(1), saved)
-        return float((weights * out.covariance2d).sum()), sign * back.position[axis, 0]
+        return float((weights * out.covariance2d).sum()), sign * back.d_position[axis, 0]
 
     (low, below), (high, above) = sides(lambda x: one(x)[0], limit, 1e-3)
     assert low == pytest.approx(high, rel=1e-8) and abs(below) > 1 and above == pytest.approx(0, abs=1e-10)
@@ -146,7 +146,7 @@ def test_clip_of_the_log_scale_passes_on_the_bound_and_not_beyond(bound):
     one = lambda s: covariance_forward(np.array([[1.0], [0], [0], [0]]), np.full((3, 1), s))
 
     def gradient(s):
-        return covariance_reverse(Shape(np.zeros((3, 3, 1)), np.ones((3, 1))), one(s)[1]).log_scale[0, 0]
+        return covariance_reverse(Shape(np.zeros((3, 3, 1)), np.ones((3, 1))), one(s)[1]).d_log_scale[0, 0]
 
     inside, beyond = sides(lambda s: one(s)[0].scale[0, 0] / np.exp(bound), bound)[:: 1 if bound > 0 else -1]
     assert inside == (pytest.approx(1, rel=1e-9), pytest.approx(1, rel=1e-6))
@@ -158,7 +158,7 @@ def test_colour_clamp_at_zero():
     def one(value):
         h = np.full((1, 3, 1), (value - 0.5) / Y00)
         colour, saved = harmonics_forward(h, None, np.ones((3, 1)), np.zeros(3), 0)
-        return colour[0, 0], harmonics_reverse(np.ones((3, 1)), saved).harmonics[0, 0, 0] / Y00
+        return colour[0, 0], harmonics_reverse(np.ones((3, 1)), saved).d_harmonics[0, 0, 0] / Y00
 
     (low, below), (high, above) = sides(lambda x: one(x)[0], 0.0)
     assert (low, below) == (0, 0) and high == pytest.approx(0, abs=1e-15) and above == pytest.approx(1, rel=1e-10)
@@ -172,7 +172,7 @@ def test_colour_of_exactly_zero_passes_the_gradient():
         extra[:] = step * 2.0**-52
         _, saved = harmonics_forward(h, extra, np.ones((3, 1)), np.zeros(3), 0)
         before = 0.5 + Y00 * (h[0] + extra)
-        passes = harmonics_reverse(np.ones((3, 1)), saved).harmonics[0] != 0
+        passes = harmonics_reverse(np.ones((3, 1)), saved).d_harmonics[0] != 0
         np.testing.assert_array_equal(passes, before >= 0)
 
 
@@ -224,7 +224,7 @@ def test_total_variation_of_equal_neighbours():
         rendered = np.where(mask, 0.0, 0.6)[None].copy()
         rendered[0, 2, 2] += x
         loss, saved = smoothness_forward(np.zeros((5, 5)), rendered, mask, np.zeros((5, 5), bool), 1.0)
-        return loss, smoothness_reverse(1.0, saved).rendered[0, 2, 2]
+        return loss, smoothness_reverse(1.0, saved).d_rendered[0, 2, 2]
 
     (low, below), (high, above) = sides(lambda x: one(x)[0], 0.0)
     assert low == pytest.approx(high, rel=1e-12)
@@ -310,7 +310,7 @@ def test_bounded_residual_has_no_kink_at_zero():
     one = lambda x: appearance_forward(np.full((3, 1, 1), x), np.ones(1), 0.3)
     (low, below), (high, above) = sides(lambda x: one(x)[0][0, 0], 0.0)
     assert low == pytest.approx(high, abs=1e-11) and below == pytest.approx(above, rel=1e-9)
-    slope = appearance_reverse(np.ones((3, 1)), one(0.0)[1]).appearance_coefficients[0, 0, 0]
+    slope = appearance_reverse(np.ones((3, 1)), one(0.0)[1]).d_appearance_coefficients[0, 0, 0]
     assert slope == pytest.approx(0.3 / Y00, rel=1e-15) and below == pytest.approx(slope, rel=1e-6)
 
 

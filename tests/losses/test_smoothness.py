@@ -27,8 +27,8 @@ def test_equals_the_oracle(shape):
     loss, grads = loss_and_gradients(depth, rendered, mask, edges)
     expected, d_depth, d_rendered = oracle.smoothness(depth, rendered, mask, edges, FACTOR)
     assert loss == pytest.approx(expected, rel=1e-13)
-    np.testing.assert_allclose(grads.rendered_depth, d_depth, rtol=0, atol=1e-13 * max(1e-9, np.abs(d_depth).max()))
-    np.testing.assert_allclose(grads.rendered, d_rendered, rtol=1e-13, atol=0)
+    np.testing.assert_allclose(grads.d_rendered_depth, d_depth, rtol=0, atol=1e-13 * max(1e-9, np.abs(d_depth).max()))
+    np.testing.assert_allclose(grads.d_rendered, d_rendered, rtol=1e-13, atol=0)
 
 
 def test_border_pairs_are_kept():
@@ -39,8 +39,8 @@ def test_border_pairs_are_kept():
     rendered[0, 2, 2] = 1.0
     loss, grads = loss_and_gradients(np.zeros((5, 5)), rendered, mask, np.zeros((5, 5), bool), 1.0)
     assert loss == pytest.approx(4 / 25)
-    assert grads.rendered[0, 2, 2] == pytest.approx(4 / 25)
-    assert np.count_nonzero(grads.rendered) == 1
+    assert grads.d_rendered[0, 2, 2] == pytest.approx(4 / 25)
+    assert np.count_nonzero(grads.d_rendered) == 1
 
 
 def test_images_are_not_clamped():
@@ -57,16 +57,16 @@ def test_edges_stop_the_smoothing():
     kept, _ = loss_and_gradients(depth, rendered, mask, free, 0.0)
     cut, grads = loss_and_gradients(depth, rendered, mask, fenced, 0.0)
     assert kept > 3 * cut
-    assert not grads.rendered_depth[:, 5].any()
+    assert not grads.d_rendered_depth[:, 5].any()
 
 
 def test_hard_L5_all_or_no_tissue():
     depth, rendered, _, edges = case()
     everything, nothing = np.ones((12, 17), bool), np.zeros((12, 17), bool)
     _, grads = loss_and_gradients(depth, rendered, everything, edges)
-    assert not grads.rendered.any()
+    assert not grads.d_rendered.any()
     assert loss_and_gradients(depth, rendered, nothing, edges, 0.0)[0] == 0.0
-    assert not loss_and_gradients(depth, rendered, nothing, edges, 0.0)[1].rendered_depth.any()
+    assert not loss_and_gradients(depth, rendered, nothing, edges, 0.0)[1].d_rendered_depth.any()
 
 
 def test_hard_L6_values_outside_each_term_do_not_matter():
@@ -77,8 +77,8 @@ def test_hard_L6_values_outside_each_term_do_not_matter():
         other_depth = np.where(mask & edges, bad, depth)
         other, other_grads = loss_and_gradients(other_depth, np.where(mask, bad, rendered), mask, edges)
         assert other == loss
-        assert np.array_equal(other_grads.rendered, grads.rendered)
-        assert np.array_equal(other_grads.rendered_depth, grads.rendered_depth)
+        assert np.array_equal(other_grads.d_rendered, grads.d_rendered)
+        assert np.array_equal(other_grads.d_rendered_depth, grads.d_rendered_depth)
 
 
 def test_hard_D6_depths_above_255_are_not_wrapped():
@@ -90,7 +90,7 @@ def test_hard_D6_depths_above_255_are_not_wrapped():
 def test_equal_neighbours_have_subgradient_zero():
     depth, rendered, mask, edges = np.ones((12, 17)), np.zeros((3, 12, 17)), tool_mask(), np.zeros((12, 17), bool)
     _, grads = loss_and_gradients(depth, rendered, mask, edges)
-    assert not grads.rendered.any()
+    assert not grads.d_rendered.any()
 
 
 def test_float32_and_threads():
@@ -101,7 +101,7 @@ def test_float32_and_threads():
         found.append(loss_and_gradients(depth.astype(np.float32), rendered.astype(np.float32), mask, edges))
     assert found[0][0] == found[1][0]
     assert all(np.array_equal(a, b) for a, b in zip(found[0][1], found[1][1]))
-    assert found[0][1].rendered.dtype == found[0][1].rendered_depth.dtype == np.float32
+    assert found[0][1].d_rendered.dtype == found[0][1].d_rendered_depth.dtype == np.float32
     wide, wide_grads = loss_and_gradients(
         depth.astype(np.float32).astype(float), rendered.astype(np.float32).astype(float), mask, edges
     )

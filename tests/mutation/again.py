@@ -1,7 +1,7 @@
-"""Put some mutants of the last report to the checks that noticed them: python tests/mutation/again.py COUNT
+"""Run the checks that detected some mutants of the last report again: python tests/mutation/again.py COUNT
 
-Prints the names of those that are not noticed any more; the exit status is their number. Gradient checks are left
-out, because their differences take long; the named defects are all among the mutants.
+Prints the names of those that are no longer detected; the exit status is their number. Gradient checks are left
+out, because their differences take long. All named defects are among the mutants.
 """
 
 import json
@@ -44,7 +44,7 @@ def chosen(result: dict[str, Any], count: int, functions: dict) -> list[tuple[Mu
 
 
 def examine(mutant: Mutant, function, checks: list[Check]) -> Outcome:
-    """Whether one of the checks notices the mutant."""
+    """Whether one of the checks detects the mutant."""
     with in_place(function, mutant.code):
         seen = next((c.name for c in checks if run(c, 10 * SLOW, {})), "")
     return Outcome(dict.fromkeys(SUITES, seen), None)

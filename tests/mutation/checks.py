@@ -1,4 +1,4 @@
-"""What mutants are put to: gradient checks, golden cases and tests, each with the kernels it runs.
+"""The checks of mutants: gradient checks, golden cases and tests, each with the kernels it runs.
 
 The suites: `gradcheck` the public checker on the registered pairs; `oracle` tests that compare with tests/oracle or
 with a library; `hard` the tests named after the catalogue of hard cases; `properties` all other tests; `golden` the
@@ -33,7 +33,7 @@ BLOCKS = 0.01  # s; a forward pass as quick as this is also differentiated block
 
 
 class Check(NamedTuple):
-    """One check. `run` answers what is wrong, "" if nothing, and may put facts into a mapping."""
+    """One check. `run` returns the fault as text, "" if there is none, and may put facts into a mapping."""
 
     suite: str
     name: str
@@ -54,7 +54,7 @@ def limited(seconds: float) -> Iterator[None]:
         raise OutOfTime
 
     before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 5.0)  # again, should the first be swallowed
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 5.0)  # again, in case the first is swallowed
     try:
         yield
     finally:
@@ -63,7 +63,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def run(check: Check, seconds: float, facts: dict[str, Any]) -> str:
-    """What is wrong, an exception and too much time included."""
+    """The fault as text; exceptions and timeouts are faults too."""
     try:
         with limited(seconds), np.errstate(all="ignore"):
             return check.run(facts)
@@ -74,7 +74,7 @@ def run(check: Check, seconds: float, facts: dict[str, Any]) -> str:
 
 
 def surveyed(check: Check, kernels: Mapping[CodeType, str], limit: float = SLOW) -> Check | str:
-    """The check with its time and the kernels it runs, or why it is left out."""
+    """The check with its time and the kernels it runs, or the reason why it is left out."""
     seen: set[CodeType] = set()
 
     def watch(frame, event, argument):
@@ -97,7 +97,7 @@ def surveyed(check: Check, kernels: Mapping[CodeType, str], limit: float = SLOW)
 
 
 def of_pair(pair: Pair, recorded: Recorded, blocks: bool) -> list[Check]:
-    """Judge the gradient against the differences of the right kernels, and differentiate anew."""
+    """Judge the gradient against the differences of the right kernels, and differentiate again."""
 
     def judge(facts: dict[str, Any]) -> str:
         wrong, change = replay(pair, recorded)
@@ -159,7 +159,7 @@ def of_item(item: pytest.Item) -> Check:
 
 
 def suite_of(item: pytest.Function) -> str:
-    """By the name of the test, then by what it compares with."""
+    """The suite of a test, by its name and then by its oracle."""
     if item.name.startswith("test_hard_"):
         return "hard"
     source = inspect.getsource(item.function)

@@ -1,10 +1,10 @@
-"""Put every mutant of every kernel to every suite and write docs/results/discrimination.json.
+"""Run every suite on every mutant of every kernel and write docs/results/discrimination.json.
 
     python tests/mutation/discrimination.py [--jobs 2] [--only losses.similarity] [--sample 20] [--minutes 30]
                                             [--keep FOLDER] [--survivors]
 
---only    kernels whose name starts so; may be given several times
---sample  at most so many mutants of a kernel, evenly spread
+--only    kernels whose name starts with this; may be given several times
+--sample  at most this number of mutants of a kernel, evenly spread
 --survivors   only what survived the run in the JSON file and is not listed as equivalent, and what is not in the file;
               the file is brought up to date (a run that is cut short by --minutes is continued so); --sample then
               chooses among what is not in the file
@@ -52,11 +52,11 @@ FOLDERS = (
     "checker/pieces_without_compiler.py",
 )
 FIRST = {"gradcheck": 4.0}  # s of checks of one suite; 1 s of the others
-LATER = 30.0  # s of further checks for a mutant that no suite has noticed and that is not listed as equivalent
+LATER = 30.0  # s of further checks for a mutant that no suite has detected and that is not listed as equivalent
 
 
 def examine(mutant: Mutant, function, checks: Checks) -> Outcome:
-    """Every suite until its first check that notices; the rest of the checks only if no suite did."""
+    """Run every suite until its first check that detects the mutant; the remaining checks only if no suite did."""
     facts: dict[str, Any] = {}
     later: list[tuple[str, Check]] = []
     killed = dict.fromkeys(SUITES, "")
@@ -91,7 +91,7 @@ def every(found: list[Mutant], sample: int) -> list[Mutant]:
 
 
 class Plugin:
-    """Collects the tests as pytest does, then puts the mutants to them instead of running them once."""
+    """Collects the tests as pytest does, then runs them on the mutants instead of once."""
 
     def __init__(self, options: argparse.Namespace):
         self.options, self.begin = options, time.monotonic()
@@ -139,13 +139,13 @@ class Plugin:
         return True
 
     def false_alarms(self, outcomes: dict[str, Outcome], checks: Checks) -> set[str]:
-        """Checks that noticed something, and also fail with the right kernels."""
+        """Checks that detected a mutant but also fail with the right kernels."""
         used = {name for outcome in outcomes.values() for name in outcome.killed.values() if name}
         work = [(Mutant("", "", c.name, kernels.__code__), partial(_alone, c)) for c in checks.all if c.name in used]
         return {m.name for m, outcome in in_processes(work, self.options.jobs) if any(outcome.killed.values())}
 
     def report(self, chosen: list[Mutant], outcomes: dict[str, Outcome], checks: Checks) -> dict[str, Any]:
-        """What is written: checks by number, so that the file stays small."""
+        """The report, with checks by number so that the file stays small."""
         number = {c.name: k for k, c in enumerate(checks.all)} | {"": -1}
         by_kernel: dict[str, dict[str, Any]] = {}
         defects: dict[str, Any] = {}

@@ -1,6 +1,6 @@
-"""The public gradient checker, arranged so that thousands of wrong kernels can be put to it.
+"""The public gradient checker, arranged so that it can check thousands of wrong kernels.
 
-A mutant that the forward pass never runs leaves the finite differences as they are. They are therefore taken once,
+A mutant that the forward pass never runs does not change the finite differences. They are therefore taken once,
 with the right kernels, and the gradient of the mutant is judged against them (`Replay`). A mutant of the forward pass
 needs new differences, which are taken along fewer lines (`Live`).
 """
@@ -18,11 +18,11 @@ from endotsr.gradcheck.probes import Probe, block_probes, joint_probes, make_blo
 from endotsr.gradcheck.session import LINEAR, Session, norm
 
 SEED = 0
-CHANGED = 1e-6  # a gradient that moves by more than this, relative, must be noticed
+CHANGED = 1e-6  # a gradient that changes by more than this, relative, must be detected
 
 
 class Recorded(NamedTuple):
-    """One pair at fixed inputs: its gradient and what finite differences say along many lines."""
+    """One pair at fixed inputs: its gradient and finite differences along many lines."""
 
     inputs: dict[str, NDArray]
     cotangents: dict[str, NDArray]
@@ -87,7 +87,7 @@ def _not_linear(pair: Pair, recorded: Recorded, gradient: dict[str, NDArray]) ->
 
 
 def live(pair: Pair, *, blocks: bool) -> str:
-    """What the checker finds along two joint lines and, if wanted, the first two lines of every block."""
+    """The verdict of the checker along two joint lines and, optionally, the first two lines of every block."""
     session = _session(pair)
     if session.faults:
         return session.faults[0]

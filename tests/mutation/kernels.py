@@ -1,4 +1,4 @@
-"""What is mutated: every function of the numerical modules, kernels and the plain Python around them alike."""
+"""The mutated functions: all of the numerical modules, kernels and the plain Python around them alike."""
 
 import ast
 import importlib
@@ -35,24 +35,24 @@ def kernels() -> dict[str, Callable]:
 
 
 def planted() -> dict[str, Callable]:
-    """Functions beside the kernels that a named defect stands in."""
+    """Functions beside the kernels in which a named defect is planted."""
     parts = [name.rsplit(".", 1) for name in MORE]
     return {f"{m}.{f}": getattr(importlib.import_module(f"endotsr.{m}"), f) for m, f in parts}
 
 
 def _plain(function: Callable) -> Callable:
-    """Without what a compiler or a cache has put around it."""
+    """The function without the wrapper of a compiler or a cache."""
     function = getattr(function, "py_func", function)
     return inspect.unwrap(function)
 
 
 def _for_the_compiler(node: ast.FunctionDef) -> bool:
-    """Functions that only tell Numba what to compile never run uncompiled."""
+    """Whether a function only instructs Numba what to compile; such a function never runs uncompiled."""
     return any(isinstance(d, ast.Call) and getattr(d.func, "id", "") == "overload" for d in node.decorator_list)
 
 
 def clear_caches() -> None:
-    """Forget what unchanged functions have computed."""
+    """Clear the cached results of unchanged functions."""
     for name in MODULES:
         for value in vars(importlib.import_module(f"endotsr.{name}")).values():
             if hasattr(value, "cache_clear"):

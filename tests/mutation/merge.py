@@ -1,4 +1,4 @@
-"""A later run of what survived an earlier one, added to its report."""
+"""Adds a later run on the survivors of an earlier one to its report."""
 
 import json
 from typing import Any
@@ -14,7 +14,7 @@ def names(result: dict[str, Any]) -> set[str]:
 
 
 def survivors(result: dict[str, Any]) -> set[str]:
-    """Names of the mutants that no suite noticed and that are not listed as equivalent."""
+    """Names of the mutants that no suite detected and that are not listed as equivalent."""
     found = {name: row for mutants in result["kernels"].values() for name, row in mutants.items()}
     return {name for name, (_, killed, _) in found.items() if max(killed) < 0} - reasons().keys()
 
@@ -36,7 +36,7 @@ def whole(result: dict[str, Any], functions: dict[str, Any]) -> bool:
 
 
 def added(before: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:
-    """The first run with what a later one, of the same kernels and newer tests, noticed; checks keep their numbers."""
+    """The first run with the detections of a later one, of the same kernels and newer tests; numbers of checks stay."""
     checks = [*before["checks"], *(n for n in later["checks"] if n not in before["checks"])]
     place = {k: checks.index(name) for k, name in enumerate(later["checks"])}
     numbers = lambda killed: [place.get(k, k) for k in killed]

@@ -1,9 +1,9 @@
 """Small wrong changes of one function: the syntax tree is changed in one place and compiled again.
 
-A mutant is put in place by exchanging the code object of the function, so every name under which the function is
-known runs the wrong code. This needs the functions uncompiled (NUMBA_DISABLE_JIT=1).
+A mutant is installed by exchanging the code object of the function, so that every name of the function runs the wrong
+code. This requires uncompiled functions (NUMBA_DISABLE_JIT=1).
 
-Left alone: docstrings, annotations, messages, checks of arguments that only raise, and whether an array is copied.
+Not mutated: docstrings, annotations, messages, checks of arguments that only raise, and whether an array is copied.
 """
 
 import ast
@@ -47,7 +47,7 @@ Place = tuple[ast.AST, str, int | None]  # parent, field, position within a list
 
 
 class Change(NamedTuple):
-    """One place of a function and what would stand there."""
+    """One place of a function and its replacement."""
 
     kind: str
     name: str  # unique within the function, unchanged when lines move
@@ -101,11 +101,11 @@ def _compiled(tree: ast.FunctionDef, function: Callable) -> CodeType:
 
 
 def replaced(function: Callable, *changes: tuple[str, str]) -> CodeType:
-    """The code of the function with pieces (old, new) of its source replaced; each old stands there exactly once."""
+    """The code of the function with pieces (old, new) of its source replaced; each old piece occurs exactly once."""
     source = textwrap.dedent(inspect.getsource(function))
     for old, new in changes:
         if source.count(old) != 1:
-            raise ValueError(f"{function.__qualname__}: {old!r} stands there {source.count(old)} times")
+            raise ValueError(f"{function.__qualname__}: {old!r} occurs {source.count(old)} times")
         source = source.replace(old, new)
     tree = ast.parse(source).body[0]
     assert isinstance(tree, ast.FunctionDef)
@@ -117,7 +117,7 @@ def replaced(function: Callable, *changes: tuple[str, str]) -> CodeType:
 
 
 def changes(tree: ast.FunctionDef) -> list[Change]:
-    """Every change, named by what it changes and the statement it stands in."""
+    """Every change, named by the changed expression and its statement."""
     found: list[Change] = []
     seen: Counter[str] = Counter()
     indices = _indices(tree)
@@ -210,7 +210,7 @@ def _indices(tree: ast.AST) -> set[int]:
     return {id(e) for s in slices for e in (s.elts if isinstance(s, ast.Tuple) else [s])}
 
 
-# ---- what would stand there ----
+# ---- the replacements ----
 
 
 def _alternatives(node: ast.AST, is_index: bool) -> Iterator[tuple[str, ast.AST]]:

@@ -22,7 +22,7 @@ class Row(NamedTuple):
     kernel: str
     name: str
     kind: str
-    suites: tuple[str, ...]  # those that noticed it
+    suites: tuple[str, ...]  # those that detected it
     change: float | None
     equivalent: bool
 
@@ -38,7 +38,7 @@ def rows(result: dict[str, Any]) -> list[Row]:
 
 
 def cells(found: list[Row], suites: Iterable[str]) -> list[str]:
-    """Mutants, noticed by each suite, noticed by any, equivalent, survivors."""
+    """Numbers of mutants: all, detected by each suite, detected by any, equivalent, survivors."""
     each = [sum(s in r.suites for r in found) for s in suites]
     alive = [r for r in found if not r.suites and not r.equivalent]
     numbers = [len(found), *each, sum(bool(r.suites) for r in found), sum(r.equivalent for r in found), len(alive)]
@@ -61,7 +61,7 @@ def grouped(found: list[Row], key) -> dict[str, list[Row]]:
 
 
 def defects(result: dict[str, Any]) -> list[str]:
-    """Which suites notice each named defect."""
+    """The suites that detect each named defect."""
     suites = result["suites"]
     lines = ["| defect | function | " + " | ".join(suites) + " |", "|---" * (2 + len(suites)) + "|"]
     for name, (kernel, found) in result["defects"].items():
@@ -71,7 +71,7 @@ def defects(result: dict[str, Any]) -> list[str]:
 
 
 def reverse_part(found: list[Row]) -> list[str]:
-    """The mutants that change a gradient, and what the gradient checks alone say."""
+    """The mutants that change a gradient, and how many of them the gradient checks alone detect."""
     changing = [r for r in found if r.change is not None and r.change > CHANGED and not r.equivalent]
     missed = [r for r in changing if "gradcheck" not in r.suites]
     lines = [

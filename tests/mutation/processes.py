@@ -1,4 +1,4 @@
-"""Mutants in processes of their own: what a wrong kernel breaks, or never ends, is gone with its process."""
+"""Mutants in processes of their own, so that a wrong kernel that crashes or never ends affects its process only."""
 
 import json
 import os
@@ -12,11 +12,11 @@ from mutation.checks import SUITES
 from mutation.mutator import Mutant
 
 LONGEST = 900.0  # s; a process that takes longer is ended
-MEMORY = 6 << 30  # bytes a process may ask for
+MEMORY = 6 << 30  # largest memory of a process, bytes
 
 
 class Outcome(NamedTuple):
-    """What became of one mutant: per suite the check that noticed it, or ""."""
+    """The result of one mutant: per suite the check that detected it, or ""."""
 
     killed: dict[str, str]
     change: float | None  # largest relative change of a gradient, where the differences are those of the right kernels
@@ -32,7 +32,7 @@ class Child(NamedTuple):
 
 
 def start(mutant: Mutant, work: Callable[[], Outcome]) -> Child:
-    """Do the work in a process of its own: whatever a mutant breaks is gone with it."""
+    """Do the work in a process of its own, so that no effect of the mutant outlasts it."""
     ours, theirs = os.pipe()
     sys.stdout.flush()
     pid = os.fork()
@@ -76,7 +76,7 @@ def finished(children: list[Child], limit: float) -> list[tuple[Child, Outcome]]
 
 
 def in_processes(queue: list[tuple[Mutant, Callable[[], Outcome]]], jobs: int) -> Iterator[tuple[Mutant, Outcome]]:
-    """Work through the queue, so many at a time, in the order in which they end."""
+    """Work through the queue with a fixed number of processes; results come in the order in which they end."""
     children: list[Child] = []
     waiting = list(reversed(queue))
     try:

@@ -9,7 +9,7 @@ DEFECT = "named defect"
 
 
 class Defect(NamedTuple):
-    """One mistake in one function; every `old` stands in its source exactly once."""
+    """One mistake in one function; every `old` occurs in its source exactly once."""
 
     name: str
     kernel: str
@@ -181,5 +181,5 @@ DEFECTS: tuple[Defect, ...] = (
 
 
 def defect_mutants(functions: dict[str, Callable]) -> list[Mutant]:
-    """The defects as mutants of today's source. Raises ValueError where the source has moved on."""
+    """The defects as mutants of the current source. Raises ValueError where the source has changed."""
     return [Mutant(d.kernel, DEFECT, d.name, replaced(functions[d.kernel], *d.changes)) for d in DEFECTS]

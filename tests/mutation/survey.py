@@ -1,4 +1,4 @@
-"""What is measured with the right kernels before any mutant runs: differences, times, and who runs which kernel."""
+"""Measurements with the right kernels before any mutant runs: differences, times, and the kernels of each check."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The report on mutants fits today's source, and what it says was noticed still is."""
+"""The report on mutants fits the current source, and its detections are reproduced."""
 
 import json
 import os

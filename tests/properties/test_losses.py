@@ -138,5 +138,5 @@ def test_smoothness_of_tissue_depth_knows_no_offset(pair, seed, offset):
     moved, other = smoothness_forward(depth + offset, image, mask, edges, 0.0)
     assert moved == pytest.approx(loss, rel=1e-11, abs=1e-11)
     gradient, same = smoothness_reverse(1.0, saved), smoothness_reverse(1.0, other)
-    np.testing.assert_allclose(same.rendered_depth, gradient.rendered_depth, rtol=1e-9, atol=1e-11)
-    assert abs(gradient.rendered_depth.sum()) <= 1e-9 and not gradient.rendered.any()
+    np.testing.assert_allclose(same.d_rendered_depth, gradient.d_rendered_depth, rtol=1e-9, atol=1e-11)
+    assert abs(gradient.d_rendered_depth.sum()) <= 1e-9 and not gradient.d_rendered.any()

@@ -94,7 +94,7 @@ def test_the_colour_residual_is_bounded_odd_and_finite(seed, count, n, dtype, si
     assert np.array_equal(appearance_forward(-a, atoms, beta)[0], -residual)
     back = appearance_reverse(np.ones((3, n), dtype), saved)
     assert all(np.isfinite(g).all() for g in back)
-    assert (back.appearance_coefficients >= 0).all()  # monotone in every coefficient of a positive atom
+    assert (back.d_appearance_coefficients >= 0).all()  # monotone in every coefficient of a positive atom
 
 
 @given(SEEDS, COUNTS, DTYPES, st.permutations(range(3)))
@@ -115,7 +115,7 @@ def test_the_translation_residual_is_linear(seed, count, factor):
     assert np.abs(move(one + two) - move(one) - move(two)).max() <= 1e-15 * size * np.abs(atoms).max()
     up = np.random.default_rng(seed).normal(0, 1, (3, 4))
     back = motion_reverse(up, motion_forward(one, atoms)[1])
-    assert np.vdot(up, move(two)) == pytest.approx(np.vdot(back.motion_coefficients, two), rel=1e-11, abs=1e-11)
+    assert np.vdot(up, move(two)) == pytest.approx(np.vdot(back.d_motion_coefficients, two), rel=1e-11, abs=1e-11)
 
 
 # --- Matern prior (4) ---
@@ -162,7 +162,7 @@ def test_the_deformation_is_even_in_the_width_linear_in_the_weight_and_moves_wit
     assert np.array_equal(at(weight, centre + dtype(shift), width, 0.375 + shift), offsets)
     _, saved = deformation_forward(weight, centre, width, 0.375, basis)
     back = deformation_reverse(np.ones((10, n), dtype), saved)
-    assert np.allclose(np.sum(back.centre, dtype=np.float64), -float(back.t), rtol=1e-4, atol=1e-3)
+    assert np.allclose(np.sum(back.d_fdm_centre, dtype=np.float64), -float(back.d_t), rtol=1e-4, atol=1e-3)
 
 
 # --- calibration (7) ---

@@ -106,9 +106,9 @@ def run(
     out, saved = render_forward(scene, camera, settings, degree=degree, background=background, compositor=path)
     given = cotangents(out, seed) if given is None else given
     grads = render_reverse(*given, saved, background_gradient=True, pose_gradient=True)
-    named = {name: getattr(grads, name) for name in (*FIELDS, "mean2d", "background")}
-    assert grads.camera is not None
-    named |= {"rotation_matrix": grads.camera.rotation, "translation": grads.camera.translation}
+    named = {name: getattr(grads, f"d_{name}") for name in (*FIELDS, "mean2d", "background")}
+    assert grads.d_camera is not None
+    named |= {"rotation_matrix": grads.d_camera.d_rotation, "translation": grads.d_camera.d_translation}
     return out._asdict(), {name: a for name, a in named.items() if a is not None}
 
 

@@ -122,7 +122,7 @@ def test_hard_P2_P7_gradient_by_position_through_mean_jacobian_and_depth(stage):
     rng = np.random.default_rng(9)
     given = {"mean2d": np.zeros((2, n)), "covariance2d": np.zeros((3, n)), "depth": np.zeros(n)}
     given[stage] = rng.normal(0, 1, given[stage].shape)
-    found = projection_reverse(given["mean2d"], given["covariance2d"], given["depth"], saved).position
+    found = projection_reverse(given["mean2d"], given["covariance2d"], given["depth"], saved).d_position
     sigma = oracle.covariance(q, s)
     for axis in range(3):
         moved = position.astype(complex)
@@ -211,11 +211,11 @@ def test_an_axis_beyond_the_limit_is_as_long_as_the_limit_with_zero_gradient(dty
     a, b = (projection_reverse_footprint(d_mean2d, d_footprint, d_mean2d[0], saved) for _, saved in (found, wanted))
     clipped, seen = np.zeros((3, n), bool), found[0].visible
     clipped[huge] = factor > 1
-    assert seen.sum() > 80 and b.scale[:, seen].all()
-    np.testing.assert_array_equal((a.scale == 0)[:, seen], clipped[:, seen])
-    assert not a.rotation[:, clipped].any()
-    np.testing.assert_allclose(a.scale[~clipped], b.scale[~clipped], rtol=bound)
-    np.testing.assert_allclose(a.rotation[:, ~clipped], b.rotation[:, ~clipped], rtol=bound)
+    assert seen.sum() > 80 and b.d_scale[:, seen].all()
+    np.testing.assert_array_equal((a.d_scale == 0)[:, seen], clipped[:, seen])
+    assert not a.d_rotation[:, clipped].any()
+    np.testing.assert_allclose(a.d_scale[~clipped], b.d_scale[~clipped], rtol=bound)
+    np.testing.assert_allclose(a.d_rotation[:, ~clipped], b.d_rotation[:, ~clipped], rtol=bound)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
@@ -229,7 +229,7 @@ def test_an_axis_exactly_at_the_limit_is_not_clipped(axis, dtype):
         shape.scale[axis] = length
         out, saved = projection_forward(np.array([[0], [0], [1]], dtype), shape, camera, EXACT)
         back = projection_reverse_footprint(np.zeros((2, 1), dtype), np.ones((3, 1), dtype), np.zeros(1, dtype), saved)
-        seen.append((*out.covariance2d[:, 0], out.determinant[0], back.scale[axis, 0] != 0))
+        seen.append((*out.covariance2d[:, 0], out.determinant[0], back.d_scale[axis, 0] != 0))
     assert seen[0][:-1] == seen[1][:-1] and seen[0][-1] and not seen[1][-1]
 
 

@@ -109,10 +109,10 @@ def test_gradients_that_nobody_asks_for_are_not_made():
     scene = random_scene(4, 30, CAMERA)._replace(residual=None)
     out, saved = render_forward(scene, CAMERA, PAPER)
     grads = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), None, saved)
-    assert grads.background is None and grads.camera is None and grads.residual is None
+    assert grads.d_background is None and grads.d_camera is None and grads.d_residual is None
     zero = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), np.zeros_like(out.depth), saved)
     for name in FIELDS[:5]:
-        np.testing.assert_array_equal(getattr(grads, name), getattr(zero, name))
+        np.testing.assert_array_equal(getattr(grads, f"d_{name}"), getattr(zero, f"d_{name}"))
 
 
 @pytest.mark.parametrize("preset, path", CASES)
@@ -123,7 +123,7 @@ def test_visible_is_who_reaches_a_pixel_box(preset, path):
     hidden = ~grads.visible
     assert hidden.any() and grads.visible.any()
     for name in (*FIELDS, "mean2d"):
-        assert (getattr(grads, name)[..., hidden] == 0).all(), name
+        assert (getattr(grads, f"d_{name}")[..., hidden] == 0).all(), name
 
 
 # --- nothing to see ---

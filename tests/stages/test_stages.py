@@ -30,7 +30,7 @@ STAGE = Stage(
     inputs={"x": "m"},
     forward=cubed,
     asked={"out": Asked(1, "m^3"), "d_x": Asked(2, "loss per m")},
-    reverse=lambda cotangents, saved: {"x": cotangents["out"] * saved},
+    reverse=lambda cotangents, saved: {"d_x": cotangents["out"] * saved},
     variants=(Variant("cubed", lambda rng: {"x": rng.uniform(1, 2, 4)}, {"factor": 2.0}),),
 )
 
@@ -103,7 +103,7 @@ def test_a_pair_holds_settings_and_fixed_inputs():
     )
     stage = STAGE._replace(
         forward=weighted,
-        reverse=lambda cotangents, saved: {"x": saved * cotangents["out"], "weight": cotangents["out"]},
+        reverse=lambda cotangents, saved: {"d_x": saved * cotangents["out"], "d_weight": cotangents["out"]},
         trace=lambda inputs, settings, saved: {"w": saved},
         variants=(variant,),
     )

@@ -71,7 +71,7 @@ def test_refusal_with_the_reason(result):
     ):
         frame_advice(result, parse_budget(f"{least * 1e3 * 0.99} ms"))
     without = result | {"fronts": {"forward": [n for n in result["fronts"]["forward"] if n != "exact"]}}
-    with pytest.raises(InputError, match="no measured setting errs so little"):
+    with pytest.raises(InputError, match="no measured setting reaches this error"):
         frame_advice(without, parse_budget("1e-30"))
 
 

@@ -113,7 +113,7 @@ def weight_gradient(alphas, dtype):
     up = np.zeros_like(out.colour)
     up[0] = 1
     back = render_reverse(up, np.zeros_like(out.depth), None, saved)
-    return back.opacity_logit[0] / (dtype(alphas[0]) * (dtype(1) - dtype(alphas[0])))
+    return back.d_opacity_logit[0] / (dtype(alphas[0]) * (dtype(1) - dtype(alphas[0])))
 
 
 def by_division(alphas, dtype):

@@ -1,1 +1,1 @@
-"""What is timed, and with what: a fixed workload that every version of the software and every peer can be given."""
+"""Benchmarks on a fixed workload, which is the same for every version of the software and for every peer."""

@@ -1,7 +1,7 @@
 """One point of a benchmark: sizes in, times by stage, pairs and memory out. Runs in a process of its own.
 
-The iteration that is timed is one of the published schedule after which everything runs: all components, all losses,
-the statistics of density control. Densification, which comes once an interval, is timed after the others.
+The timed iteration is one of the published schedule at which everything is active: all components, all losses, the
+statistics of density control. Densification, which runs once an interval, is timed after the others.
 """
 
 import multiprocessing
@@ -27,7 +27,7 @@ WARM_UP = 2  # iterations after the compiling one
 
 @dataclass(frozen=True)
 class Case:
-    """What is timed; the defaults are the common workload at 60 000 Gaussians."""
+    """The sizes of a case; the defaults are the common workload at 60 000 Gaussians."""
 
     gaussians: int = 60_000
     width: int = workload.WIDTH
@@ -63,7 +63,7 @@ def measure(case: Case) -> dict[str, Any]:
     returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration", the same for the sum of the four
              splatting stages and for everything; "first_iteration_s", compilation or loading of compiled code
              included; "view" {"visible", "listed", "blended"}; "parameters" a Gaussian; "peak_memory_bytes";
-             "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was asked for
+             "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
     """
     import numba
 
@@ -90,13 +90,13 @@ def measure(case: Case) -> dict[str, Any]:
 
 
 def prepare(case: Case, config: Config) -> tuple[Any, Any]:
-    """State and workshop of a case, at the iteration that is timed, every target made."""
+    """State and workshop of a case, at the timed iteration, with every target computed."""
     from endotsr.bench.trained import trained_gaussians
     from endotsr.fitting.state import bench_state, workshop
 
     shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in shop.sequence.train_index:
-        shop.targets_of(int(index))  # a run makes them once a frame
+        shop.targets_of(int(index))  # a run computes them once a frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:
@@ -105,7 +105,7 @@ def prepare(case: Case, config: Config) -> tuple[Any, Any]:
 
 
 def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
-    """The same iteration of the schedule again and again, after warm-up.
+    """Repeat the same iteration of the schedule, after warm-up.
 
     returns  seconds of the very first iteration (compilation or loading of compiled code included); of each of the
              `repeats`, seconds by stage, whose sum is the iteration
@@ -124,7 +124,7 @@ def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[di
 
 
 def representative(config: Config) -> int:
-    """An iteration after which everything runs: residuals, Laplacian loss and statistics, but no densification."""
+    """An iteration at which residuals, Laplacian loss and statistics are active, but without densification."""
     t, loss = config.training, config.loss
     start = max(t.residual_activation + 1, loss.laplacian_full, loss.smoothness_from)
     return start + config.density.interval // 2
@@ -145,7 +145,7 @@ def _view(state: Any, shop: Any) -> dict[str, int]:
 
 
 def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:
-    """What an iteration that densifies spends on it; the scene changes, so there are few repeats."""
+    """Time of the densification within an iteration; the scene changes, so there are few repeats."""
     from endotsr.fitting.trainer import training_step
 
     if repeats == 0:

@@ -1,7 +1,7 @@
 """Charts of benchmark results: stacked bars of the stages, and cost against each size.
 
-Comes in: what `bench.stages` and `bench.scaling` return. Goes out: a picture file, png or svg. Colours of stages are
-fixed here, everything else of the style in `endotsr.report.style`.
+In: the results of `bench.stages` and `bench.scaling`. Out: a picture file, png or svg. The colours of stages are
+defined here, the rest of the style in `endotsr.report.style`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ assert set(COLOURS) == {*STAGES, REST}
 
 
 def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """One stacked bar a case, the stages in their order, the whole iteration in numbers at its end."""
+    """One stacked bar a case with the stages in their order; the time of the whole iteration is printed at its end."""
     figure = new_figure(9.6, 1.7 + 0.42 * len(cases))
     axes = figure.subplots()
     labels = [_label(case["case"]) for case in cases]
@@ -81,14 +81,14 @@ def scaling_curves(axes: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
 
 def _logarithmic(panel: Any, size: Sequence[float], curves: int) -> None:
-    """Both axes logarithmic with few plain labels: the sizes themselves where they span little."""
+    """Make both axes logarithmic with few plain labels: the sizes themselves where their range is small."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     panel.set_xscale("log")
     panel.set_yscale("log")
     low, high = panel.get_ylim()
     middle = (low * high) ** 0.5
-    low, high = min(low, middle / 4), max(high, middle * 4)  # noise of a flat curve must not fill the panel
+    low, high = min(low, middle / 4), max(high, middle * 4)  # so that the noise of a flat curve does not fill the panel
     panel.set_ylim(low / 1.2, high * 9.0 ** (curves / 6.0))  # room for the legend above the curves
     if max(size) < 10 * min(size):
         panel.set_xticks(size)

@@ -1,8 +1,8 @@
-"""Which stage the time of an iteration goes to: the timer that a benchmark hands to the training step.
+"""Time of an iteration by stage: the timer that a benchmark passes to the training step.
 
-Comes in: the stages that the training announces (`endotsr.kernels.timer`). Goes out: seconds by stage, one entry a
-repeat. Stages may nest: a stage gets its own time, not that of a stage inside it. While several threads are in
-stages, each stage gets an equal part of the time. What is left (the log entry, additions between stages) is "rest".
+In: the stages that the training announces (`endotsr.kernels.timer`). Out: seconds by stage, one entry a repeat.
+Stages may nest: a stage is assigned its own time, not that of a stage inside it. While several threads are in stages,
+each stage is assigned an equal part of the time. The remainder (the log entry, additions between stages) is "rest".
 Cost: about 2 us a stage, some twenty stages an iteration.
 """
 
@@ -39,7 +39,7 @@ class StageClock:
 
     @contextmanager
     def iteration(self) -> Iterator[None]:
-        """One repeat: the time of the block is divided among the stages and "rest"."""
+        """Time one repeat; the time of the block is divided among the stages and "rest"."""
         self.repeats.append(dict.fromkeys((*STAGES, REST), 0.0))
         self._since = time.perf_counter()
         self._stacks = {}
@@ -49,7 +49,7 @@ class StageClock:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """The block belongs to the stage `name`. Raises: KeyError for a name that is not in STAGES."""
+        """Assign the time of the block to the stage `name`. Raises: KeyError for a name that is not in STAGES."""
         if name not in STAGES:
             raise KeyError(f"unknown stage {name!r}; allowed: {', '.join(STAGES)}")
         thread = threading.get_ident()
@@ -64,7 +64,7 @@ class StageClock:
                 self._stacks[thread].pop()
 
     def _charge(self) -> None:
-        """The time since the last event to the innermost stage of every thread, in equal parts."""
+        """Divide the time since the last event equally among the innermost stages of all threads."""
         now = time.perf_counter()
         active = [stack[-1] for stack in self._stacks.values() if stack] or [REST]
         for stage in active:

@@ -1,8 +1,8 @@
 """`endotsr bench iteration`: one full training iteration, stage by stage, in the process and threads of the command.
 
-Comes in: the size of the common workload and the settings. Goes out: medians and quartiles by stage, because a shared
-machine is never quiet. Every repeat is the same iteration of the schedule (all components and losses active, between
-two densifications), after warm-up; compilation is timed apart.
+In: the size of the common workload and the settings. Out: medians and quartiles by stage, because other work disturbs
+the times on a shared machine. Every repeat is the same iteration of the schedule (all components and losses active,
+between two densifications), after warm-up; compilation is timed separately.
 """
 
 from typing import Any
@@ -47,7 +47,7 @@ def benchmark_iteration(
 
 
 def table(result: dict[str, Any]) -> str:
-    """The result for a person."""
+    """The result as a table for the terminal."""
     total = result["iteration"]["median_ms"]
     rows = []
     for name, times in [*result["stages"].items(), ("iteration", result["iteration"])]:

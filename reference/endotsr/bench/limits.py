@@ -1,10 +1,10 @@
-"""How fast a stage could be at most: the work that its formulas ask for, at the measured peaks of the machine.
+"""Lower bounds on the time of a stage: the work in its formulas, at the measured peaks of the machine.
 
 For each stage, floating-point operations and bytes. Operations are counted in the forward and reverse formulas (a
 fused multiply-add is two, so is a division); bytes are compulsory traffic: every large array is read once and
 written once, nothing is read twice. The limit is the longer of the two times, so a stage exceeds 100 % of its limit
-only where data stay in a cache between stages. Sorting and bookkeeping have almost no arithmetic: their limit is
-traffic alone.
+only where data stay in a cache between stages. Sorting and bookkeeping have almost no arithmetic, so their limit is
+set by traffic alone.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ DEPTH_SMOOTHNESS = 60  # per pixel, forward and reverse, edge detection included
 
 
 class Work(NamedTuple):
-    """What a stage must at least do in one iteration."""
+    """The least work of a stage in one iteration."""
 
     flop: float
     bytes: float

@@ -1,7 +1,8 @@
-"""What this machine can do at most: fused multiply-adds per second, and bytes to and from memory per second.
+"""Peaks of this machine: fused multiply-adds per second, and bytes to and from memory per second.
 
-Measured, not looked up, because a virtual machine gets what its host leaves; contracted like the fast path. A stage of
-the training is then compared with these peaks (see `endotsr.bench.limits`).
+The peaks are measured, not looked up, because the capacity of a virtual machine depends on the load of its host. The
+kernels are compiled with contraction, like the fast path. A stage of the training is then compared with these peaks
+(see `endotsr.bench.limits`).
 """
 
 from typing import Any
@@ -21,9 +22,9 @@ ARRAY_BYTES = 96 << 20  # of each array of a memory kernel, beyond any cache of 
 
 
 def _multiply_add(first, stop, values, f):
-    """STEPS steps x <- f x + f of CHAINS chains for every number: 2 operations each, and no memory to wait for.
+    """STEPS steps x <- f x + f of CHAINS chains for every number: 2 operations each, without memory traffic.
 
-    Plain names, one array and a fixed count of steps: the loop over the numbers becomes vector code.
+    With plain names, one array and a fixed count of steps, the loop over the numbers is vectorised.
     """
     real = values.dtype.type
     for task in range(first, stop):
@@ -53,7 +54,7 @@ def _triad(first, stop, out, left, right, factor):
 
 
 def _update(first, stop, out, left, right, factor):
-    """out <- right + factor out, in place: what an optimiser does; `left` is not read."""
+    """out <- right + factor out, in place, like the step of an optimiser; `left` is not read."""
     begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, y = out[begin:end], right[begin:end]
     for i in range(o.size):
@@ -78,7 +79,7 @@ def bandwidths(repeats: int = 7, array_bytes: int = ARRAY_BYTES) -> dict[str, fl
     """Bytes per second with the threads in use: "triad" (two arrays read, one written), "update"
     (one read, one changed).
 
-    A line that is only written is read first by most processors; that traffic is not counted, as in STREAM.
+    Most processors first read a cache line that is only written; that traffic is not counted, as in STREAM.
     """
     out, left, right = (np.ones(array_bytes // 4, np.float32) for _ in range(3))
     tasks, factor = -(-out.size // MEMORY_NUMBERS_PER_TASK), np.float32(0.5)

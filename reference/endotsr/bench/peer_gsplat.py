@@ -32,7 +32,7 @@ class PeerRender(NamedTuple):
 
 
 def available() -> str | None:
-    """None where torch and gsplat can be imported, else the reason why not."""
+    """None if torch and gsplat can be imported, else the reason why they cannot."""
     try:
         import torch  # noqa: F401
         from gsplat.cuda import _torch_impl  # noqa: F401
@@ -42,7 +42,7 @@ def available() -> str | None:
 
 
 def difference_of_rules(scene: Scene, camera: Camera, settings: RasterSettings) -> str | None:
-    """Why gsplat would draw this scene by another rule than `settings`, or None. Its own constants stay as they are."""
+    """Why gsplat would render this scene by other rules than `settings`, or None. Its constants are fixed."""
     if settings.support == "three_sigma_tiles" or any(settings.deviations):
         return "support by 3 sigma tiles and the deviations of `legacy` have no counterpart"
     if scene.residual is not None:
@@ -131,7 +131,7 @@ def _screen(leaves: dict[str, Any], camera: Camera, settings: RasterSettings) ->
 
 
 def _colour(leaves: dict[str, Any], camera: Camera, degree: int) -> Any:
-    """(N, 3) display colour, the way gsplat's `rasterization` makes it of its harmonics."""
+    """(N, 3) display colour from harmonics, computed as in gsplat's `rasterization`."""
     import torch
     from gsplat.cuda import _torch_impl as gsplat
 
@@ -195,7 +195,7 @@ def _boxes(means2d, conics, opacity, width, height, settings):
 
 
 def _accumulate(means2d, conics, opacity, channels, gaussian, pixel, camera: Camera) -> tuple[Any, Any]:
-    """gsplat's `accumulate` (H, W, channels), (H, W, 1), with `_along_rays` in the place of nerfacc."""
+    """gsplat's `accumulate` (H, W, channels), (H, W, 1), with `_along_rays` in place of nerfacc."""
     import torch
     from gsplat.cuda import _torch_impl as gsplat
 

@@ -1,8 +1,8 @@
 """`endotsr bench peers`: gsplat's pure-torch reference on the same arrays in the same run; no time without an error.
 
 One view of the common workload without time: colour and depth forward, then the gradients of a fixed random
-combination of the two images, one after the other in one process. The lists of pairs, which gsplat makes in a CUDA
-kernel, are handed to it by a substitute; what that takes is shown, and not counted against gsplat.
+combination of the two images, one after the other in one process. A substitute makes the lists of pairs, which gsplat
+makes in a CUDA kernel. Its time is shown separately and is not part of the time of gsplat.
 """
 
 import time
@@ -38,7 +38,7 @@ def measure_peers(
     """{"cases": of `compare`}. Raises: InputError with the pip lines where torch or gsplat is missing."""
     from endotsr.bench.peer_gsplat import available
 
-    reason = apart(available)  # torch stays out of this process
+    reason = apart(available)  # torch is not imported in this process
     if reason is not None:
         raise InputError(f"bench peers needs torch and gsplat ({reason}); install with: {'; '.join(PIP_LINES)}")
     cases = [Case(n, precision=p, threads=threads, repeats=repeats) for n in gaussians for p in precisions]
@@ -61,7 +61,7 @@ def compare(case: Case) -> dict[str, Any]:
     torch.set_num_threads(case.threads)
     view = _view(case)
     ours, our_seconds = _ours(*view)
-    _theirs(_view(WARM_UP), 1)  # torch sets itself up at its first use
+    _theirs(_view(WARM_UP), 1)  # torch initialises itself at its first use
     theirs, seconds, lists = _theirs(view, case.repeats)
     return {
         "gaussians": case.gaussians,
@@ -101,7 +101,9 @@ def _ours(scene: Any, camera: Any, settings: Any, d_colour: FloatArray, d_depth:
         out, saved = render_forward(scene, camera, settings)
         grads = render_reverse(d_colour, d_depth, None, saved)
         found.update(colour=out.colour, depth=out.depth)
-        found.update({name: getattr(grads, name) for name, array in scene._asdict().items() if array is not None})
+        found.update(
+            {name: getattr(grads, f"d_{name}") for name, array in scene._asdict().items() if array is not None}
+        )
 
     return found, repeated(once, OURS_REPEATS, warm_up=2)
 
@@ -123,7 +125,7 @@ def _theirs(view: tuple[Any, ...], repeats: int) -> tuple[dict[str, FloatArray],
 
 @contextmanager
 def _list_seconds(peer: ModuleType) -> Iterator[list[float]]:
-    """The seconds that the substitute for the pair lists takes while the block lasts."""
+    """The seconds that the substitute for the pair lists takes within the block."""
     spent: list[float] = []
     pair_list = peer.pair_list
 
@@ -145,7 +147,7 @@ def relative_error(found: FloatArray, expected: FloatArray) -> float:
 
 
 def table(result: dict[str, Any]) -> str:
-    """For a person: times, ratio and the largest error beside it."""
+    """Times, ratio and the largest error as a table for the terminal."""
     rows = []
     for case in result["cases"]:
         ours, gsplat, lists = (case[name]["median_ms"] for name in ("ours", "gsplat", "pair_lists"))
@@ -156,7 +158,7 @@ def table(result: dict[str, Any]) -> str:
 
 
 def verdict(case: dict[str, Any]) -> str:
-    """The largest error, where, and whether it is within the limit of the precision."""
+    """The largest error, its array, and whether it is within the limit of the precision."""
     worst = max(case["errors"], key=lambda name: case["errors"][name])
     error, limit = case["errors"][worst], LIMITS[case["precision"]]
     return f"{error:.1e} ({worst}), {'within' if error <= limit else 'BEYOND'} {limit:.0e}"

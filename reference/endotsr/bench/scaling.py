@@ -1,9 +1,9 @@
-"""`endotsr bench scaling`: how cost grows with each size alone, with fitted exponents.
+"""`endotsr bench scaling`: growth of cost with each size alone, with fitted exponents.
 
-Every point is measured in a process of its own, so its peak memory is that of its size, and twice: on the way up and
-on the way down again. The faster one counts, so that a neighbour who is busy for a while does not bend the curve. An
-exponent is the slope of log time against log size, least squares over the upper decade: below it, fixed costs flatten
-the curve.
+Every point is measured in a process of its own, so that its peak memory is that of its size. It is measured twice, once
+with sizes ascending and once descending, and the faster time is used, so that a temporary load of the machine does not
+distort the curve. An exponent is the slope of log time against log size by least squares over the upper decade,
+because fixed costs flatten the curve below it.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ CURVES: dict[str, tuple[str, ...]] = {
     "losses": ("L1 and SSIM", "pyramid", "depth and smoothness"),
 }
 BASE = Case(gaussians=20_000, repeats=7, densifications=0)
-LARGE = 100_000  # Gaussians from which fewer repeats are enough: an iteration is long against any disturbance
+LARGE = 100_000  # Gaussians from which fewer repeats suffice, as an iteration is long then
 
 
 class Axis(NamedTuple):
@@ -41,7 +41,7 @@ class Axis(NamedTuple):
 
 
 def axes(largest: int) -> dict[str, Axis]:
-    """Every axis; `largest` ends that of the Gaussians."""
+    """Every axis; `largest` is the last size on that of the Gaussians."""
     counts = [n for n in (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000) if n <= largest]
     sizes = ((192, 108), (384, 216), (640, 360), (960, 540), (1440, 810), (1920, 1080))
     of_case = lambda name: lambda result: float(result["case"][name])
@@ -87,7 +87,7 @@ def measure_scaling(largest: int, names: Sequence[str], say: Say) -> dict[str, A
 
 
 def faster(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Of every size the faster of two, from results in the order of the way up and back: first with last, and so on."""
+    """The faster of the two results of every size, from results with ascending and then descending sizes."""
     there, back = results[: len(results) // 2], results[: len(results) // 2 - 1 : -1]
     return [min(pair, key=lambda result: _total(result, CURVES["iteration"])) for pair in zip(there, back)]
 
@@ -131,7 +131,7 @@ def exponent(size: Sequence[float], times: Sequence[float]) -> float | None:
 
 
 def memory(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Bytes a Gaussian and bytes a frame: slopes of the peak memory over the upper decade; None if not known."""
+    """Bytes per Gaussian and per frame: slopes of the peak memory over the upper decade; None if not known."""
     return {f"bytes_per_{name[:-1]}": _slope(found.get(name)) for name in ("gaussians", "frames")}
 
 
@@ -143,7 +143,7 @@ def _slope(axis: dict[str, Any] | None) -> float | None:
 
 
 def table(result: dict[str, Any]) -> str:
-    """For a person: exponents of every curve, then memory."""
+    """Exponents of every curve, then memory, as tables for the terminal."""
     rows = []
     for axis in result["axes"].values():
         fits = ", ".join(f"{name} {p:.2f}" for name, p in axis["exponent"].items() if p is not None)

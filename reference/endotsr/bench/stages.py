@@ -16,7 +16,7 @@ Say = Callable[[str], None]
 
 
 class Grid(Protocol):
-    """What a person chooses."""
+    """The choices of the command line."""
 
     gaussians: tuple[int, ...]
     scenes: tuple[Path, ...]
@@ -28,7 +28,7 @@ class Grid(Protocol):
 
 
 def grid(chosen: Grid) -> list[Case]:
-    """Every combination of scene, precision and threads; the common workload first, one bar group a size."""
+    """Every combination of scene, precision and threads; the common workload comes first, grouped by size."""
     base = Case(width=chosen.width, height=chosen.height, repeats=chosen.repeats)
     scenes = [replace(base, gaussians=n) for n in chosen.gaussians]
     scenes += [replace(base, scene=str(path)) for path in chosen.scenes]
@@ -54,8 +54,8 @@ def measure_stages(cases: Iterable[Case], say: Say) -> dict[str, Any]:
     for case in cases:
         results.append(apart(measure, case))
         say(line(results[-1]))
-    after = [apart(measure_peaks, threads) for threads in numbers]
-    peaks = {threads: higher(a, b) for threads, a, b in zip(numbers, before, after)}  # a neighbour may have been busy
+    after = [apart(measure_peaks, threads) for threads in numbers]  # the first may have been disturbed
+    peaks = {threads: higher(a, b) for threads, a, b in zip(numbers, before, after)}
     for result in results:
         result["limits"] = limits(result, peaks[result["case"]["threads"]])
         result["ns_per_pair"] = ns_per_pair(result)
@@ -86,7 +86,7 @@ def line(result: dict[str, Any]) -> str:
 
 
 def table(result: dict[str, Any]) -> str:
-    """One case for a person: each stage with its quartiles, fraction of the iteration, limit and what binds it."""
+    """One case as a table: each stage with its quartiles, fraction of the iteration, limit and kind of limit."""
     rows = [*result["stages"].items(), ("splat", result["splat"]), ("iteration", result["iteration"])]
     cells = [_row(name, spread, result) for name, spread in rows]
     lines = [plain(("stage", "median ms", "quartiles", "fraction", "limit ms", "of limit", "bound by"), cells, (0, 6))]

@@ -1,8 +1,8 @@
 """`endotsr bench start`: from the call of the interpreter to the end of the first training iteration.
 
-Cold: the folder of compiled kernels is empty. Warm: the same again. Each in a fresh process, with the initialisation
-of a real run; then one iteration of the schedule after which everything runs, which needs the remaining kernels.
-As a module (`python -m endotsr.bench.start`) this is what the fresh process runs.
+A cold start begins with an empty kernel cache, a warm start with a full one. Each runs in a fresh process with the
+initialisation of a real run, and ends with one iteration at which everything is active, which needs the remaining
+kernels. The fresh process runs this module (`python -m endotsr.bench.start`).
 """
 
 import json
@@ -33,7 +33,7 @@ def measure_start(warm_repeats: int) -> dict[str, Any]:
 
 
 def fresh_process(cache: str) -> dict[str, float]:
-    """Seconds from the call to each moment, with compiled kernels looked for in the folder `cache`."""
+    """Seconds from the call to each moment, with `cache` as the folder of compiled kernels."""
     environment = os.environ | {"NUMBA_CACHE_DIR": cache}
     began = time.perf_counter()
     with subprocess.Popen(
@@ -47,7 +47,7 @@ def fresh_process(cache: str) -> dict[str, float]:
 
 
 def _first_iterations() -> None:
-    """Say each moment as it is reached; the parent takes the time."""
+    """Print each moment as it is reached; the parent process measures the time."""
     from endotsr.bench.case import representative
     from endotsr.config import PAPER
     from endotsr.fitting.compile_ahead import compile_ahead
@@ -71,7 +71,7 @@ def _first_iterations() -> None:
 
 
 def table(result: dict[str, Any]) -> str:
-    """For a person."""
+    """The result as a table for the terminal."""
     rows = [[moment, *(f"{result[kind][moment]:.2f}" for kind in ("cold", "warm"))] for moment in MOMENTS]
     return plain(("seconds from the call to", "cold", "warm"), rows)
 

@@ -1,4 +1,4 @@
-"""`endotsr bench all`: every measurement in one go, as JSON and pictures in one folder."""
+"""`endotsr bench all`: every measurement in one call, as JSON and pictures in one folder."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +27,7 @@ def dated(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def run_all(out: Path, scenes: tuple[Path, ...], say: Say) -> None:
-    """Measure and write everything into `out`. Without torch and gsplat the peers keep their last figures.
+    """Measure and write everything into `out`. Without torch and gsplat the existing figures of the peers are kept.
 
     Raises: InputError before anything is measured, if a file of `scenes` is not a trained scene.
     """

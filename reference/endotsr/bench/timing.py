@@ -1,4 +1,4 @@
-"""Medians and quartiles of repeated times: a shared machine is never quiet, and a mean follows its worst moment."""
+"""Medians and quartiles of repeated times. On a shared machine a mean would follow the largest disturbance."""
 
 import time
 from collections.abc import Callable, Sequence

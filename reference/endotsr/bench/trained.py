@@ -1,4 +1,4 @@
-"""A trained scene in place of the common workload: real sizes, needles and opacities, nothing tuned for speed.
+"""A trained scene in place of the common workload, with the sizes, needles and opacities that training produces.
 
 The file is an npz with xyz (N, 3), log_scale (N, 3), quat_wxyz (N, 4), rgb (N, 3) and opacity (N,).
 """
@@ -16,7 +16,7 @@ from endotsr.scene.gaussians import Gaussians
 
 ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
 DEPTH = 4.0  # scene units of the middle of the scene, that of the common workload
-PERCENTILES = (1, 99)  # of the positions: what is fitted into the picture
+PERCENTILES = (1, 99)  # of the positions: the range that is scaled to the picture
 
 
 def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:

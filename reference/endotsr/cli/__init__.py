@@ -1,5 +1,5 @@
 """One module a command, each with `run(argv) -> exit code`. Heavy imports stay inside the functions.
 
-Comes in: the words after the command. Goes out: files, a table on standard output, an exit code.
-No mathematics here: a command reads its options, calls the rooms in order and says what happened.
+In: the words after the command. Out: files, a table on standard output, an exit code.
+There is no mathematics here: a command reads its options, calls the packages in order and reports the result.
 """

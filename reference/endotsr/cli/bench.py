@@ -1,4 +1,4 @@
-"""`endotsr bench`: where the time goes, how it grows, and how it compares."""
+"""`endotsr bench`: time by stage, growth with size, comparison with a peer, and cold start."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,12 +17,12 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
 
 LEAST = {"gaussians": 4, "largest": 1000, "repeats": 1, "width": 16, "height": 16, "threads": 0}
-MORE = {"stages": {"threads": 1}, "peers": {"threads": 1}}  # their results name the number: it is not left open
+MORE = {"stages": {"threads": 1}, "peers": {"threads": 1}}  # their results state the number, so 0 is not allowed
 LISTS = ("gaussians", "precisions", "threads", "axes")
 
 
 def run(words: list[str]) -> int:
-    """The command: the first word says what to measure."""
+    """The command; the first word selects the measurement."""
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
         return 0
@@ -52,7 +52,7 @@ def _refuse_nothing(what: str, options: Any) -> None:
 
 
 def _refuse_other_pictures(plot: Path | None) -> None:
-    """Raises: InputError for a picture of a kind that is not drawn, before the measurement."""
+    """Raises: InputError for an unsupported kind of picture, before the measurement."""
     if plot is not None and plot.suffix.lower() not in (".png", ".svg"):
         raise InputError(f"bench: --plot {plot} is not allowed; allowed: a file whose name ends in .png or .svg")
 

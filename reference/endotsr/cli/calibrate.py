@@ -11,7 +11,7 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import open_run
 
-# What equation (7) reads beside the trained Gaussians and the sequence; no other setting would change the answer.
+# Settings that equation (7) reads; no other setting would change the result.
 REPLACEABLE = (
     "loss.ssim_weight",
     "loss.upsampling",
@@ -24,16 +24,16 @@ REPLACEABLE = (
 
 @dataclass
 class CalibrateOptions:
-    """The detail weight that equation (7) finds on the checkpoint of a run, with a table of its views.
+    """Compute the Laplacian weight of equation (7) on the checkpoint of a run, with a table of its views.
 
-    The run is not changed. What the rule reads can be replaced: --loss.ssim-weight, --loss.upsampling,
+    The run is not changed. The settings that equation (7) reads can be replaced: --loss.ssim-weight, --loss.upsampling,
     --loss.gradient-ratio, --loss.calibration-views and the settings of --raster. All others are fixed by the run.
     """
 
     run: Annotated[Path | None, Option("RUN", positional=True)] = None
     """run folder"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """where the sequence of the run is now (default: where it was)"""
+    """current location of the sequence of the run (default: the recorded one)"""
     json: Annotated[Path | None, Option("FILE")] = None
     """also write weight, ratios and table as JSON"""
     threads: int | None = None

@@ -14,7 +14,7 @@ from endotsr.runs.sources import SIMULATED
 class DemoOptions:
     """Simulate a sequence, train on it with the stretched schedule, evaluate, and write a report.
 
-    The same as `endotsr train simulated --preset demo`; every option of `endotsr train` is understood.
+    The same as `endotsr train simulated --preset demo`; every option of `endotsr train` is accepted.
     """
 
     out: Annotated[Path, Option("RUN")]

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class EvaluateOptions:
-    """Measure a run on its held-out frames: metrics.json, renders/, curves.png and report.html in the run folder."""
+    """Measure a run on its held-out frames; write metrics.json, renders/, curves.png and report.html in its folder."""
 
     run: Annotated[Path, Option("RUN", positional=True)]
     """run folder"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """where the sequence of the run is now (default: where it was)"""
+    """current location of the sequence of the run (default: the recorded one)"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
     paper_row: Literal["pulling"] | None = None

@@ -20,7 +20,7 @@ class _Reported:
     precision: Literal["float32", "float64"] = "float32"
     """precision that the port claims"""
     level: Level = 5
-    """highest level that is asked for; exit code 0 if it is complete"""
+    """level to judge; exit code 0 if it is complete"""
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
     json: Annotated[Path | None, Option("FILE")] = None
@@ -35,15 +35,15 @@ class JudgeOptions(_Reported):
 
     outdir: Outdir = Path()
     again: Annotated[Path | None, Option("DIR")] = None
-    """outputs of a second run: level 5 asks for the same bits"""
+    """outputs of a second run: level 5 requires the same bits"""
 
 
 @dataclass
 class RunOptions(_Reported):
-    """Hand all requests to a port's command, then judge what it wrote."""
+    """Pass all requests to a port's command, then judge its outputs."""
 
     port: str = ""
-    """the command, with {requests} and {outputs} where the folders go; called without a shell"""
+    """the command, with {requests} and {outputs} in place of the folders; called without a shell"""
     timeout: float = 600.0
     """seconds allowed for one call"""
     keep: Annotated[Path | None, Option("DIR")] = None
@@ -52,23 +52,23 @@ class RunOptions(_Reported):
 
 @dataclass
 class GenerateOptions:
-    """Compute all cases anew and compare with the folder; exit code 1 if anything differs."""
+    """Recompute all cases and compare with the folder; exit code 1 if anything differs."""
 
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
     within_tolerance: bool = False
     """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
     write: bool = False
-    """replace the vectors, print which expected values moved, and still end with exit code 1"""
+    """replace the vectors, print which expected values changed, and still end with exit code 1"""
 
 
 @dataclass
 class ReferenceOptions:
-    """Write the reference's own outputs; with --requests, as a port that sees the requests alone."""
+    """Write the reference's own outputs; with --requests, as a port that reads the requests alone."""
 
     outdir: Outdir
     precision: Literal["float32", "float64"] = "float32"
-    """precision of the arithmetic; with --requests, what the requests say"""
+    """precision of the arithmetic; with --requests, the precision of the requests"""
     requests: Annotated[Path | None, Option("DIR")] = None
     """answer this folder of requests"""
     golden: Annotated[Path | None, Option("DIR")] = None
@@ -77,7 +77,7 @@ class ReferenceOptions:
 
 @dataclass
 class WrongPortOptions:
-    """Write the outputs of a deliberately wrong port, in float64; without a name, list them."""
+    """Write the outputs of a deliberately wrong port, in float64; without a name, list all mistakes."""
 
     name: Annotated[str, Option("[FLAG]", positional=True)] = ""
     outdir: Outdir = Path()
@@ -87,9 +87,9 @@ class WrongPortOptions:
 
 DOORS = {
     "judge": "judge a folder of outputs",
-    "run": "call a port's command and judge what it wrote",
-    "reference": "the reference's own outputs, through the same door",
-    "negative": "the outputs of a deliberately wrong port",
+    "run": "call a port's command and judge its outputs",
+    "reference": "write the reference's own outputs in the same form",
+    "negative": "write the outputs of a deliberately wrong port",
     "generate": "check the vectors against a fresh computation; --write replaces them",
 }
 

@@ -1,8 +1,8 @@
-"""The command `endotsr`: finds the subcommand, imports it alone, and turns a person's mistakes into one line.
+"""The command `endotsr`: selects the subcommand, imports it alone, and reports a user error in one line.
 
-Nothing heavy is imported here, so that `endotsr --help` answers at once. Exit codes: 0 done, 1 a check or
-comparison did not pass, 2 input or usage that cannot be used, 130 interrupted (Ctrl-C or SIGTERM), 141 stopped because
-the reader of its output left (128 + SIGPIPE, as other programs).
+Nothing heavy is imported here, so that `endotsr --help` prints at once. Exit codes: 0 done, 1 a check or comparison
+did not pass, 2 invalid input or usage, 130 interrupted (Ctrl-C or SIGTERM), 141 stopped because the pipe that reads its
+output was closed (128 + SIGPIPE, as other programs).
 """
 
 import importlib
@@ -17,13 +17,13 @@ from endotsr.runs.stopping import signals_stop
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "train": "train on an EndoNeRF folder, or on a simulated sequence",
-    "calibrate": "the detail weight of equation (7), computed on the checkpoint of a run",
-    "render": "colour, depth and opacity at any time in [0, 1]",
-    "evaluate": "held-out metrics beside honest baselines, renders, and one self-contained report",
+    "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
+    "render": "render colour, depth and opacity at any time in [0, 1]",
+    "evaluate": "measure held-out frames, compare with baselines, and write renders and a self-contained report",
     "gradcheck": "check every reverse pass against finite differences",
-    "bench": "where the time goes: stages beside their limits, growth, a peer, cold start",
-    "tradeoff": "what accuracy costs in time: errors beside seconds, and what a budget buys",
-    "golden": "the conformance target of ports: judge outputs, run a port, check the vectors",
+    "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
+    "tradeoff": "measure error against time, and find the best setting within a budget",
+    "golden": "golden vectors for ports: judge outputs, run a port, check the vectors",
 }
 
 
@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run one command; `argv` without the program name. Returns the exit code."""
     argv = sys.argv[1:] if argv is None else argv
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal without the letters of a file name
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal whose encoding lacks letters of a file name
     if not argv or argv[0] in ("-h", "--help"):
         print(_overview())
         return 0
@@ -52,7 +52,7 @@ def main(argv: list[str] | None = None) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # the reader of our output left (`endotsr ... | head`)
+    except BrokenPipeError:  # the pipe that reads the output was closed (`endotsr ... | head`)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except OSError as error:

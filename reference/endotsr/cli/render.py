@@ -15,7 +15,7 @@ from endotsr.runs.folder import RunFolder, open_run
 class RenderOptions:
     """Render a run at observed poses, at the times of its frames or at any other time in [0, 1].
 
-    A time between frames is seen from the camera of the frame nearest in time, or from --camera. The output folder
+    A time between frames is rendered with the camera of the frame nearest in time, or with --camera. The output folder
     holds colour/, depth/, opacity/ and render.json (time, camera frame and file of every picture, depth scale).
     """
 
@@ -28,19 +28,19 @@ class RenderOptions:
     frames: Literal["test", "train", "all"] | None = None
     """the frames of the sequence instead of --times (default: test)"""
     count: Annotated[int | None, Option("N")] = None
-    """N times evenly spaced over [0, 1], instead of --times: a film with in-between times"""
+    """number of times, evenly spaced over [0, 1], instead of --times"""
     camera: Annotated[int | None, Option("FRAME")] = None
-    """always look from the camera of this frame"""
+    """use the camera of this frame for every picture"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
-    """leave these components out of the picture"""
+    """components to leave out of the picture"""
     threads: int = 0
     """threads, 0 = all cores"""
 
 
 class View(NamedTuple):
-    """One picture to make."""
+    """Time, camera and name of one picture."""
 
     time: float
     frame: int  # whose camera
@@ -66,7 +66,7 @@ def run(words: list[str]) -> int:
 
 
 def wanted_views(record: dict[str, Any], options: RenderOptions) -> list[View]:
-    """The pictures that the options ask for. Raises InputError for a time or frame that does not exist."""
+    """The pictures selected by the options. Raises InputError for a time or frame that does not exist."""
     from endotsr.runs.sources import nearest_frame
 
     given = [bool(options.times), options.frames is not None, options.count is not None]

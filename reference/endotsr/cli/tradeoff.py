@@ -1,4 +1,4 @@
-"""`endotsr tradeoff`: what accuracy costs in time, and what a budget buys."""
+"""`endotsr tradeoff`: error against time, and the best setting within a budget."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +24,8 @@ LEAST_REPEATS = 7
 class TradeoffOptions:
     """Measure error against time for every setting of the renderer: JSON, pictures and a page in --out.
 
-    The scene is a simulated one, a trained --run, or a file of --splats. `endotsr tradeoff train` does the same for
-    training; see its --help. With --budget, the answer comes from the measurement in --out, which is made if missing.
+    The scene is simulated, a trained --run, or a file of --splats. `endotsr tradeoff train` does the same for training;
+    see its --help. With --budget, the setting is chosen from the measurement in --out, which is made if it is missing.
     """
 
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
@@ -64,7 +64,7 @@ def run(words: list[str]) -> int:
 
     file = options.out / RESULT
     if budget is None and file.exists():
-        raise InputError(f"{options.out}: holds a measurement already; choose another --out, or ask it with --budget")
+        raise InputError(f"{options.out}: holds a measurement already; choose another --out, or read it with --budget")
     result = read_result(file, Measurement) if file.exists() else _measure(options)
     if budget is not None:
         from endotsr.tradeoff.budget import frame_advice
@@ -112,7 +112,7 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
 
 
 def chosen_scene(options: TradeoffOptions) -> "StudyScene":
-    """The scene that the options ask for."""
+    """The scene selected by the options."""
     from endotsr.tradeoff import scenes
 
     if options.splats is not None:

@@ -1,4 +1,4 @@
-"""`endotsr tradeoff train`: which minute of training buys how many decibels."""
+"""`endotsr tradeoff train`: held-out quality against training time."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +18,9 @@ TRAINING = "training.json"  # in the folder of the measurement
 
 @dataclass
 class TradeoffTrainOptions:
-    """Train the same sequence with one setting changed at a time, and measure held-out frames on the way.
+    """Train the same sequence with one setting changed at a time, and measure held-out frames during each training.
 
-    DIR/training.json is written after every training; the same command goes on where an interrupted one stopped.
+    DIR/training.json is written after every training; after an interruption, the same command continues the study.
     """
 
     sequence: Annotated[str, Option("[SEQUENCE]", positional=True)] = SIMULATED
@@ -28,7 +28,8 @@ class TradeoffTrainOptions:
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
     minutes: float = 8.0
-    """length of the whole study: it sets the iterations of each training, and none begins that would exceed it"""
+    """length of the whole study: it sets the iterations of each training, and a training that would exceed it is left
+    out"""
     iterations: Annotated[int | None, Option("N")] = None
     """iterations of each training instead"""
     preset: Literal["paper", "sharp", "demo"] | None = None

@@ -1,4 +1,4 @@
-"""`endotsr train`: a sequence in, a run folder out."""
+"""`endotsr train`: trains on a sequence and writes a run folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from endotsr.simulator.settings import SimulatorSettings
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
-RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run: they change no number
+RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run because they change no result
 DEMONSTRATION = SimulatorSettings()
 
 
@@ -55,7 +55,7 @@ class TrainOptions:
     """AlexNet LPIPS weights for the evaluation"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
     simulator: SimulatorSettings = DEMONSTRATION
-    """what `simulated` shows"""
+    """contents of the `simulated` sequence"""
 
 
 def run(words: list[str]) -> int:
@@ -78,7 +78,7 @@ def run(words: list[str]) -> int:
 
 
 def check_lpips(path: Path | None) -> None:
-    """Raises InputError for LPIPS weights that cannot be used: before a training, not after it."""
+    """Raises InputError for LPIPS weights that cannot be used, before the training begins."""
     from endotsr.evaluation.lpips import load_lpips_weights
 
     load_lpips_weights(path)
@@ -90,7 +90,7 @@ def _settings(options: TrainOptions) -> Config:
 
 
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
-    """Check everything, say what will be trained, and train to the end."""
+    """Check everything, print the settings and the sequence, and train to the end."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.sources import load_sequence
     from endotsr.runs.training import start_record, train_new_run
@@ -110,7 +110,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
-    """Refuse what would change the run, and train it from its last checkpoint to the end."""
+    """Refuse settings that would change the run, and train it from its last checkpoint to the end."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.sources import check_same_input, load_sequence, run_source
     from endotsr.runs.training import resume_run
@@ -123,7 +123,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     asked = _settings(options)
     refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
     if refused:
-        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; asked: {', '.join(refused)}")
+        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
     source = source or remembered
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)

@@ -33,8 +33,8 @@ class AppearanceSaved(NamedTuple):
 class AppearanceGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
-    appearance_coefficients: FloatArray  # (3, 2F, N)
-    phi_bar: FloatArray | None  # (2F,), None unless requested
+    d_appearance_coefficients: FloatArray  # (3, 2F, N)
+    d_phi_bar: FloatArray | None  # (2F,), None unless requested
 
 
 def _exp_nonpositive(z):

@@ -44,10 +44,10 @@ class DeformationSaved(NamedTuple):
 class DeformationGrads(NamedTuple):
     """Derivative of a loss by the inputs of the deformation."""
 
-    weight: FloatArray  # (10, B, N)
-    centre: FloatArray  # (10, B, N)
-    width: FloatArray  # (10, B, N)
-    t: float
+    d_fdm_weight: FloatArray  # (10, B, N)
+    d_fdm_centre: FloatArray  # (10, B, N)
+    d_fdm_width: FloatArray  # (10, B, N)
+    d_t: float
 
 
 def deformation_forward(

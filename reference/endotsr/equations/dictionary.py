@@ -33,8 +33,8 @@ class DictionarySaved(NamedTuple):
 class DictionaryGrads(NamedTuple):
     """Derivative by time and by the frequencies."""
 
-    t: float
-    omega: FloatArray  # (F,)
+    d_t: float
+    d_omega: FloatArray  # (F,)
 
 
 class AtomStatistics(NamedTuple):

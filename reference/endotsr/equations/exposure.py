@@ -23,9 +23,9 @@ class ExposureSaved(NamedTuple):
 class ExposureGrads(NamedTuple):
     """Derivatives by the three inputs."""
 
-    colour: FloatArray  # (C, H, W)
-    log_gain: FloatArray  # (C,)
-    bias: FloatArray  # (C,)
+    d_colour: FloatArray  # (C, H, W)
+    d_log_gain: FloatArray  # (C,)
+    d_bias: FloatArray  # (C,)
 
 
 def exposure_forward(colour: FloatArray, log_gain: FloatArray, bias: FloatArray) -> tuple[FloatArray, ExposureSaved]:

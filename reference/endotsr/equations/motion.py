@@ -21,8 +21,8 @@ class MotionSaved(NamedTuple):
 class MotionGrads(NamedTuple):
     """Derivative by the coefficients and by the atoms."""
 
-    motion_coefficients: FloatArray  # (3, 2F, N)
-    phi: FloatArray | None  # (2F,), None unless requested
+    d_motion_coefficients: FloatArray  # (3, 2F, N)
+    d_phi: FloatArray | None  # (2F,), None unless requested
 
 
 def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[FloatArray, MotionSaved]:

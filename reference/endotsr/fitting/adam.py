@@ -3,12 +3,12 @@
     m <- beta1 m + (1 - beta1) g            v <- beta2 v + (1 - beta2) g^2
     p <- p - rate (m / (1 - beta1^k)) / (sqrt(v / (1 - beta2^k)) + epsilon)
 
-k counts the steps of one array, so arrays that are born during a run start with k = 0 and zero moments.
-In: parameters and gradients by name, one rate a name (or one per part of the leading axis). This module
-knows no schedule and no Gaussians.
+k counts the steps of one array, so arrays that are created during a run start with k = 0 and zero moments.
+In: parameters and gradients by name, and one rate a name (or one per part of the leading axis). This module
+is independent of schedules and Gaussians.
 
-Consequences to know: a zero gradient still moves a parameter by its momentum; with epsilon 1e-15 a gradient
-that is pure rounding noise moves a parameter by up to a full rate, which is why gradients are summed in fixed order.
+Two consequences. A zero gradient still moves a parameter by its momentum. With epsilon 1e-15 a gradient that is pure
+rounding noise moves a parameter by up to a full rate, which is why gradients are summed in a fixed order.
 """
 
 from collections.abc import Iterable, Mapping
@@ -49,7 +49,7 @@ def adam_state(parameters: Mapping[str, FloatArray]) -> AdamState:
 
 
 def add_array(state: AdamState, name: str, array: FloatArray) -> None:
-    """Fresh moments and step 0 for one more array; what is there under this name is replaced."""
+    """Add zero moments and step 0 for one more array; an existing entry of this name is replaced."""
     state.first[name], state.second[name], state.step[name] = np.zeros_like(array), np.zeros_like(array), 0
 
 
@@ -59,7 +59,7 @@ def regather(state: AdamState, names: Iterable[str], source: NDArray[np.intp], k
     names    the arrays that were gathered; the moments of the others, and all step counters, stay as they are
     source   (M,) and `kept`: see `gather_columns`
 
-    In place, one array after another: old and new moments never stand in memory together.
+    The moments change in place, one array after another, so that old and new ones are never held in memory together.
     """
     for group in (state.first, state.second):
         for name in names:
@@ -122,15 +122,15 @@ def adam_step(
     """
     check_layout(parameter, {"parameter": parameter, "gradient": gradient, "first": first, "second": second})
     rate, root = step_factors(step, learning_rate, beta1, beta2)
-    p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous
+    p, g, m, v = (a.reshape(-1) for a in (parameter, gradient, first, second))  # views: contiguous arrays
     tasks = (p.size + NUMBERS_PER_TASK - 1) // NUMBERS_PER_TASK
     parallel_for(_adam_kernel, tasks, p, g, m, v, rate, root, float(beta1), float(beta2), float(epsilon))
 
 
 def check_layout(like: FloatArray, arrays: Mapping[str, FloatArray]) -> None:
-    """All of one kind, in one piece: else a step would fail half way, or go to a copy.
+    """Check shape, dtype and layout, since otherwise a step could fail half way or change a copy.
 
-    like   has the shape and dtype that are expected
+    like   array with the expected shape and dtype
 
     Raises: ValueError naming the first of `arrays` with another shape or dtype, or that is not C-contiguous.
     """

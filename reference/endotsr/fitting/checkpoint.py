@@ -3,8 +3,8 @@
 The file is an uncompressed npz without pickle: a JSON header (as bytes) and one entry per array,
 `gaussians.<field>`, `first.<field>`, `second.<field>`, `statistics.<field>`, and `frames.<field>` if the model has
 parameters of frames. The header lists dtype and shape of every array, so that a missing, foreign or damaged entry is
-found by name. The file is written beside the old one and put in its place by one rename: whatever happens, one whole
-checkpoint remains.
+reported by name. The file is written beside the old one and replaces it by one rename, so that one whole checkpoint
+remains at any time.
 """
 
 import json
@@ -38,7 +38,7 @@ class Checkpoint(NamedTuple):
     iteration: int
     rng_state: dict[str, Any]  # of the bit generator, see `restore_rng`
     statistics: DensityStatistics
-    header: dict[str, Any]  # what the caller stored: configuration, history
+    header: dict[str, Any]  # entries of the caller: configuration, history
     frames: FrameParameters | None = None  # None if the model has no parameters of frames
 
 
@@ -175,7 +175,7 @@ def _assemble(path: Path, description: dict[str, Any], entries: dict[str, NDArra
 
 
 def _grouped(path: Path, entries: dict[str, NDArray]) -> dict[str, dict[str, NDArray]]:
-    """Arrays by group and field; every name is known and every required one is there."""
+    """Arrays by group and field. Raises InputError for an unknown name or a missing required one."""
     known = {name: set(kind._fields) for name, kind in GROUPS.items()} | {"first": TRAINED, "second": TRAINED}
     groups: dict[str, dict[str, NDArray]] = {name: {} for name in known}
     for key, array in entries.items():
@@ -205,7 +205,7 @@ def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters
 
 
 def restore_rng(state: dict[str, Any]) -> np.random.Generator:
-    """The generator that goes on where the stored one stopped (PCG64, as made by `np.random.default_rng`)."""
+    """The generator in the stored state (PCG64, as made by `np.random.default_rng`)."""
     generator = np.random.default_rng()
     try:
         generator.bit_generator.state = state

@@ -1,9 +1,9 @@
-"""A cold start on two cores: what a training compiles is compiled by two processes at once.
+"""A cold start on two cores: two processes compile the kernels of a training at the same time.
 
-Compilation holds one lock for the whole process, so threads cannot share it. While this process compiles the way to
-the picture and back, a second one compiles losses and optimiser; both put their code into the folder of kernels,
-where the other finds it. The second process then goes on with what the schedule switches on later. No result depends
-on any of this: whatever is missing when it is called is compiled then.
+Compilation holds one lock for the whole process, so threads cannot divide it. While this process compiles the forward
+and reverse pass of rendering, a second one compiles losses and optimiser. Both store their code in the kernel cache,
+from which the other loads it. The second process then compiles the terms that the schedule switches on later. No
+result depends on this: a kernel that is missing at its first call is compiled at that call.
 
 As a module (`python -m endotsr.fitting.compile_ahead`) this is the second process; settings come as JSON on its input.
 """
@@ -21,14 +21,14 @@ from endotsr.config import Config
 from endotsr.kernels.threads import len_cores
 
 READY = "ready for the first iteration"
-_helpers: list[subprocess.Popen] = []  # referred to until this process ends: nobody waits for their last kernels
+_helpers: list[subprocess.Popen] = []  # kept until this process ends, which does not wait for their last kernels
 
 
 def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: None) -> bool:
-    """Compile what a training with these settings calls, on two cores, if the folder of kernels does not hold it yet.
+    """Compile the kernels of a training with these settings, on two cores, if the kernel cache does not hold them yet.
 
-    say      takes a line for the user when something is compiled
-    returns  whether anything had to be done. Nothing is with one core, or when the JIT is off.
+    say      called with a line for the user when something is compiled
+    returns  whether anything was compiled. With one core, or with the JIT off, nothing is.
     """
     import numba
 
@@ -43,7 +43,7 @@ def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: No
 
 
 def _second(config: Config) -> subprocess.Popen | None:
-    """The second process at work; None if the system refuses one. What fails there fails here where it is called."""
+    """The second process; None if the system refuses one. A kernel that fails there fails again here when called."""
     import numba
 
     environment = os.environ | {"NUMBA_CACHE_DIR": numba.config.CACHE_DIR}  # type: ignore[attr-defined]
@@ -65,7 +65,7 @@ def _second(config: Config) -> subprocess.Popen | None:
 
 
 def done_before(config: Config) -> Path:
-    """The file whose presence says that all kernels of this source and these components exist for this processor."""
+    """The file that marks all kernels of this source and these components as compiled for this processor."""
     import numba
     from llvmlite.binding import get_host_cpu_name
 
@@ -78,7 +78,7 @@ def done_before(config: Config) -> Path:
 
 
 def rehearse(config: Config) -> None:
-    """Compile, or load, everything that a training with these settings calls, in this process: for fair timing."""
+    """Compile or load every kernel of a training with these settings in this process, so that timings exclude it."""
     shop, state = _small(config)
     rehearse_picture(shop, state)
     rehearse_losses(shop, everything=True)
@@ -88,7 +88,7 @@ def rehearse(config: Config) -> None:
 
 
 def _small(config: Config) -> tuple[Any, Any]:
-    """Workshop and state of a few Gaussians and pixels: types and layouts as in any training, and nothing else."""
+    """Workshop and state of a few Gaussians and pixels, with the dtypes and layouts of any training."""
     from endotsr.fitting.state import bench_state, workshop
     from endotsr.scene import workload
 
@@ -107,7 +107,7 @@ def rehearse_picture(shop: Any, state: Any) -> None:
     scene, saved = scene_at(base, shop.spectral, config.model, 0.5)
     out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
     grads = render_reverse(out.colour, out.depth, None, render_saved)
-    gather_statistics(state.statistics, grads.mean2d, grads.visible, camera.width, camera.height)
+    gather_statistics(state.statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
     scene_reverse(grads, saved, coefficients=False)
 
 
@@ -120,7 +120,7 @@ def rehearse_losses(shop: Any, everything: bool) -> None:
     frame = shop.sequence.frame(0, config.training.precision)
     later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
-    seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no term is at its end: all kernels run
+    seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no loss term is zero, so every kernel runs
     image_loss(seen, frame_targets(frame, config), weights, config.loss)
 
 
@@ -184,7 +184,7 @@ def rehearse_densification(shop: Any, state: Any) -> None:
 
 
 def _second_process() -> None:
-    """Everything but the picture; says when the first iteration has what it needs."""
+    """Compile everything but rendering; print READY when the kernels of the first iteration are compiled."""
     from endotsr.kernels.threads import use_threads
 
     config = msgspec.json.decode(sys.stdin.buffer.read(), type=Config)

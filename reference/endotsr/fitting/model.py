@@ -1,10 +1,10 @@
-"""The moving scene: raw Gaussians at time t, every component of the model applied, and the way back.
+"""The moving scene: raw Gaussians at time t with every component of the model applied, and its reverse pass.
 
     mu(t) = mu + psi_mu(t) + C phi(t)       q(t) = q + psi_q(t)       s(t) = s + psi_s(t)
     h_0(t) = h_0 + beta tanh(A phi_bar(t)) / Y00
 
-A component whose arrays are None is not evaluated and gets no gradient array. Comes in: `Gaussians` and a
-time; goes out: the `Scene` that the rasteriser takes, or gradients by field name.
+A component whose arrays are None is not evaluated and gets no gradient array. In: `Gaussians` and a time. Out: the
+`Scene` that the rasteriser takes, or gradients by field name.
 """
 
 from typing import NamedTuple
@@ -36,7 +36,7 @@ from endotsr.splatting.settings import PRESETS, RasterSettings
 
 
 class Spectral(NamedTuple):
-    """What the Fourier components share: fixed by the configuration and the training times."""
+    """Constants of the Fourier components, fixed by the configuration and the training times."""
 
     omega: FloatArray  # (F,) float64, cycles per sequence
     statistics: AtomStatistics  # mean and RMS of the atoms over the training times
@@ -52,18 +52,18 @@ class SceneSaved(NamedTuple):
 
 
 class OffsetsAhead(NamedTuple):
-    """Offsets of the FDM at a later time, taken when its arrays were changed. Good until they change again."""
+    """Offsets of the FDM at a later time, computed when its arrays were updated. Valid until the next update."""
 
-    fdm_weight: FloatArray  # the array itself: tells whether the Gaussians are still the same
+    fdm_weight: FloatArray  # the array itself, whose identity shows whether the Gaussians are still the same
     t: float  # normalised time
     offsets: FloatArray  # (10, N)
 
 
 class SceneGrads(NamedTuple):
-    """Gradients by the raw parameters; `offsets` is what the FDM's reverse pass takes."""
+    """Gradients by the raw parameters; `d_offsets` is what the FDM's reverse pass takes."""
 
     by_field: dict[str, FloatArray]  # every field but the three of the FDM
-    offsets: FloatArray | None  # (10, N)
+    d_offsets: FloatArray | None  # (10, N)
 
 
 def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spectral:
@@ -78,7 +78,7 @@ def spectral_from(model: ModelConfig, train_times: NDArray[np.floating]) -> Spec
 
 
 def raster_settings(config: Config) -> RasterSettings:
-    """The rasteriser preset of a configuration with its near plane and whatever else is set by itself."""
+    """The rasteriser preset of a configuration with its near plane and every value that is set individually."""
     raster = config.raster
     given = {name: getattr(raster, name) for name in ("alpha_cutoff", "transmittance_stop", "alpha_max")}
     own = {name: value for name, value in given.items() if value != "preset"}
@@ -93,10 +93,10 @@ def scene_at(
     ahead: OffsetsAhead | None = None,
     timer: Timer = NO_TIMER,
 ) -> tuple[Scene, SceneSaved]:
-    """The Gaussians at time t (normalised; any value, in [0, 1] meant).
+    """The Gaussians at time t (normalised; any value is allowed, [0, 1] is the sequence).
 
     ahead   of `optimise`; used instead of a forward pass of the FDM if it is for these Gaussians and this time
-    timer   told of the stages "FDM" and "Fourier"
+    timer   records the stages "FDM" and "Fourier"
 
     Edges: zero coefficients of a component leave the scene as it is without it (x + 0 = x).
     """
@@ -149,23 +149,23 @@ def _residual(
 
 
 def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool = True) -> SceneGrads:
-    """From gradients by the deformed scene to gradients by the raw parameters (all additions are pre-activation).
+    """Gradients by the raw parameters from those by the deformed scene (all additions are pre-activation).
 
-    coefficients   False leaves those of the Fourier residuals to `coefficients_adam_step`
+    coefficients   False leaves the gradients of the Fourier coefficients to `coefficients_adam_step`
     """
-    by_field = {name: getattr(grads, name) for name in ("position", "quaternion", "log_scale", "opacity_logit")}
-    by_field["harmonics"] = grads.harmonics
+    by_field = {name: getattr(grads, f"d_{name}") for name in ("position", "quaternion", "log_scale", "opacity_logit")}
+    by_field["harmonics"] = grads.d_harmonics
     if saved.appearance is not None and coefficients:
-        assert grads.residual is not None
-        appearance = appearance_reverse(grads.residual, saved.appearance, atom_gradient=False)
-        by_field["appearance_coefficients"] = appearance.appearance_coefficients
+        assert grads.d_residual is not None
+        appearance = appearance_reverse(grads.d_residual, saved.appearance, atom_gradient=False)
+        by_field["appearance_coefficients"] = appearance.d_appearance_coefficients
     if saved.motion is not None and coefficients:
-        motion = motion_reverse(grads.position, saved.motion, atom_gradient=False)
-        by_field["motion_coefficients"] = motion.motion_coefficients
-    offsets = None
+        motion = motion_reverse(grads.d_position, saved.motion, atom_gradient=False)
+        by_field["motion_coefficients"] = motion.d_motion_coefficients
+    d_offsets = None
     if saved.deformation is not None:
-        offsets = np.concatenate([grads.position, grads.quaternion, grads.log_scale])
-    return SceneGrads(by_field, offsets)
+        d_offsets = np.concatenate([grads.d_position, grads.d_quaternion, grads.d_log_scale])
+    return SceneGrads(by_field, d_offsets)
 
 
 def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
@@ -181,11 +181,11 @@ def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[
     if saved is None:
         return d_colour, None
     grads = exposure_reverse(d_colour, saved)
-    return grads.colour, Exposure(grads.log_gain, grads.bias)
+    return grads.d_colour, Exposure(grads.d_log_gain, grads.d_bias)
 
 
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:
-    """The same Gaussians with the named spectral components taken out."""
+    """The same Gaussians without the named spectral components."""
     if not appearance:
         gaussians = gaussians._replace(appearance_coefficients=None)
     return gaussians if spectral_motion else gaussians._replace(motion_coefficients=None)
@@ -215,6 +215,6 @@ def render_at(
     chosen = without(gaussians, appearance=appearance, spectral_motion=spectral_motion)
     scene, _ = scene_at(chosen, spectral, config.model, t)
     check_scene(scene)
-    degree = config.model.harmonics_degree  # bands that are not active yet hold zeros
+    degree = config.model.harmonics_degree  # coefficients of degrees that are not active yet are zero
     rendered, _ = render_forward(scene, camera, raster_settings(config), degree=degree, background=background)
     return exposed(rendered, exposure_at(frames, t))[0]

@@ -39,7 +39,7 @@ TERM_STAGES = {"depth": "depth and smoothness", "smoothness": "depth and smoothn
 
 
 class Targets(NamedTuple):
-    """What the losses need of one frame; made once and kept. A term that is off has None."""
+    """Inputs of the losses for one frame, computed once and kept. A term that is off has None."""
 
     image: FloatArray  # (3, H, W) observed, 0 outside the tissue
     mask: NDArray[np.bool_]  # (H, W) True = tissue
@@ -93,7 +93,7 @@ def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -
 
 
 class Term(NamedTuple):
-    """One weighted term; a gradient that it has not is None."""
+    """One weighted term; a gradient that the term does not have is None."""
 
     value: float  # unweighted
     d_colour: FloatArray | None
@@ -109,17 +109,17 @@ def depth_term(rendered: RenderOut, target: DepthTarget, weight: float) -> Term:
 def smoothness_term(
     rendered: RenderOut, mask: NDArray[np.bool_], weight: float, factor: float, edges: NDArray[np.bool_] | None
 ) -> Term:
-    """Smooth depth away from its edges (None = Canny edges of this depth), and total variation."""
+    """Smoothness of the depth away from its edges (None = Canny edges of this depth), and total variation."""
     edges = canny_edges(rendered.depth) if edges is None else edges
     value, saved = smoothness_forward(rendered.depth, rendered.colour, mask, edges, factor)
     smooth = smoothness_reverse(weight, saved)
-    return Term(value, smooth.rendered, smooth.rendered_depth)
+    return Term(value, smooth.d_rendered, smooth.d_rendered_depth)
 
 
 def laplacian_term(
     colour: FloatArray, image: FloatArray, supports: SupportMasks, weight: float, rule: Upsampling
 ) -> Term:
-    """Detail between the bands of two pyramids."""
+    """The Laplacian loss, equation (5), between the bands of two pyramids."""
     value, saved = laplacian_loss_forward(colour, image, supports, rule)
     return Term(value, laplacian_loss_reverse(weight, saved), None)
 
@@ -137,7 +137,7 @@ def image_loss(
 
     edges   (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth. A constant of
             the loss either way: no gradient flows through it.
-    timer   told of the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
+    timer   records the stages "L1 and SSIM", "pyramid" and "depth and smoothness"
 
     Edges: a term of weight 0, or whose target is None, is not evaluated and not named in `terms`.
     """
@@ -175,8 +175,8 @@ def calibrate_on(
 ) -> Calibration:
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
-    Rendered without the spectral components, whatever the scene holds: the rule is one of the base model. The
-    exposures of `frames` belong to the base model.
+    The views are rendered without the spectral components, even if the scene has them, because equation (7) is
+    defined on the base model. The exposures of `frames` belong to the base model.
 
     Raises: CalibrationError with a per-view table when no view gives a ratio.
     """

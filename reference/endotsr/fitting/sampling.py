@@ -1,7 +1,8 @@
-"""Which frame an iteration looks at, and at which time: uniform, jittered or bridged (specification, equation 6).
+"""Choice of the training frame and of the time of an iteration: uniform, jittered or bridged (specification,
+equation 6).
 
-In: the random generator, the sequence and the training settings. Out: one `View`. This module knows no Gaussian; all
-that it changes is the generator.
+In: the random generator, the sequence and the training settings. Out: one `View`. This module is independent of the
+Gaussians; it changes the generator only.
 """
 
 import copy
@@ -22,7 +23,7 @@ class Moment(NamedTuple):
 
 
 class View(NamedTuple):
-    """What one iteration renders and what it is compared with."""
+    """The time that one iteration renders and the frame that the render is compared with."""
 
     index: int  # frame number, always one of the training frames; the nearest one to a moment
     t: float  # normalised time at which the scene is rendered
@@ -30,7 +31,7 @@ class View(NamedTuple):
 
 
 def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
-    """A training frame, uniform with replacement, and its time (jittered or bridged when asked for).
+    """A training frame, uniform with replacement, and its time (jittered or bridged if the settings say so).
 
     Draws: `rng.random()` if views are bridged, then `rng.integers` and, with jitter, `rng.uniform`; a bridged view
            draws as `_draw_bridge` or `_draw_moment` does.
@@ -50,8 +51,8 @@ def next_view(rng: np.random.Generator, sequence: Sequence, training: TrainingCo
 def _draw_bridge(rng: np.random.Generator, sequence: Sequence) -> View:
     """A time uniform between the first and the last training frame, and one of its two training neighbours.
 
-    The neighbour is drawn with the weight that linear interpolation would give it, so that the expected target at
-    every time is the blend of its neighbours: what lies between two frames is no longer free.
+    The neighbour is drawn with the weight that linear interpolation would give it. The expected target at every time
+    is therefore the blend of its neighbours, which constrains the scene between two frames.
     """
     index = sequence.train_index
     times = sequence.times[index]

@@ -41,7 +41,8 @@ def residual_decay(iteration: int, config: Config) -> float:
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
 
-    Those of the spectral residuals only while they are active, those of the exposures only if the model has them.
+    The rates of the spectral residuals are listed only while they are active, those of the exposures only if the model
+    has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant; degree 0 and the higher degrees have their own rate
@@ -84,7 +85,7 @@ def laplacian_ramp(iteration: int, config: Config) -> float:
 
 
 def smoothness_active(iteration: int, config: Config) -> bool:
-    """Whether the smoothness terms count at this iteration."""
+    """Whether the smoothness terms are active at this iteration."""
     return config.loss.smoothness_weight > 0.0 and iteration >= config.loss.smoothness_from
 
 

@@ -1,8 +1,8 @@
-"""What a training is made of: the state that it carries along, and the workshop of constants around it.
+"""The state of a training, and the workshop: its constants.
 
-`TrainingState` is all that a run carries from one iteration to the next and, but for `ahead`, which is then computed
-anew, all that a checkpoint holds. Everything else (targets, atoms, rates) is a function of the state, the sequence and
-the configuration. So a resumed run equals an uninterrupted one bit by bit. This module computes no gradient.
+`TrainingState` holds everything that a run carries from one iteration to the next. A checkpoint holds the same, except
+for `ahead`, which is then recomputed. Everything else (targets, atoms, rates) is a function of the state, the sequence
+and the configuration, so a resumed run equals an uninterrupted one bit by bit. This module computes no gradient.
 """
 
 from dataclasses import dataclass
@@ -37,14 +37,14 @@ class TrainingState:
     iteration: int  # completed iterations
     rng: np.random.Generator
     statistics: DensityStatistics
-    lambda_lap: float | None  # full detail weight; None until an `auto` weight is calibrated
+    lambda_lap: float | None  # full Laplacian weight; None until an `auto` weight is calibrated
     frames: FrameParameters | None = None  # parameters that are not per Gaussian; None if the model has none
-    ahead: OffsetsAhead | None = None  # taken while the FDM was changed; not part of a checkpoint
+    ahead: OffsetsAhead | None = None  # computed while the FDM was updated; not part of a checkpoint
 
 
 @dataclass
 class Workshop:
-    """What an iteration needs beside the state: functions of the sequence and the configuration."""
+    """Constants of a training: functions of the sequence and the configuration."""
 
     sequence: Sequence
     config: Config
@@ -61,7 +61,7 @@ class Workshop:
         return frame_targets(frame, self.config), frame.camera
 
     def targets_of(self, index: int) -> Targets:
-        """The loss targets of a frame, made once."""
+        """The loss targets of a frame, computed once."""
         if index not in self.targets:
             self.targets[index] = frame_targets(self.sequence.frame(index, self.config.training.precision), self.config)
         return self.targets[index]
@@ -98,7 +98,7 @@ def fresh_state(
     iteration: int = 0,
     lambda_lap: float | None,
 ) -> TrainingState:
-    """A state around given parameters, with zero moments and empty statistics."""
+    """A state of given parameters, with zero moments and empty statistics."""
     adam = adam_state(arrays(gaussians) | trained(frames))
     return TrainingState(gaussians, adam, iteration, rng, empty_statistics(gaussians.count), lambda_lap, frames)
 
@@ -118,8 +118,8 @@ def check_state(state: TrainingState) -> None:
 def save_state(path: Path, state: TrainingState, config: Config) -> None:
     """Write a checkpoint, atomically.
 
-    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (its Gaussian would
-            only vanish from the picture). The previous checkpoint is then intact.
+    Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (the render
+            would merely lack its Gaussian). The previous checkpoint is then intact.
     """
     try:
         check_state(state)

@@ -1,8 +1,8 @@
 """The training: one view an iteration, on the published schedule (specification, equation 6 and B10-B12).
 
-`training_step` takes the steps of `view_gradients` (`fitting/view.py`, where they stand plainly) with the same
-functions; in place of the reverse passes of the time bases and of the Fourier coefficients it calls `optimise`, which
-joins them with their Adam step. No result depends on the number of threads.
+`training_step` computes what `view_gradients` (`fitting/view.py`) spells out, with the same functions. In place of the
+reverse passes of the time bases and of the Fourier coefficients it calls `optimise`, which fuses them with their Adam
+step. No result depends on the number of threads.
 """
 
 import math
@@ -50,7 +50,7 @@ from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, ren
 
 OnIteration = Callable[[dict[str, Any]], None]
 
-PSNR_EVERY = 10  # iterations between training PSNRs in the log: the figure costs a pass over the image
+PSNR_EVERY = 10  # iterations between two training PSNRs in the log, since each costs a pass over the image
 
 
 def train(
@@ -65,7 +65,7 @@ def train(
     """Run to `config.training.iterations`; the state is changed in place and returned.
 
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
-    That pre-training is not checkpointed: interrupted, it starts again and gives the same weight.
+    That pre-training is not checkpointed: after an interruption it starts again and gives the same weight.
     Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite; ValueError naming array
             and index if the state holds a number that is not finite.
     """
@@ -134,7 +134,7 @@ def _weights(state: TrainingState, iteration: int, config: Config) -> LossWeight
 
 
 def _activate_residuals(state: TrainingState, config: Config) -> None:
-    """The spectral residuals begin: zero coefficients, fresh moments, step 0."""
+    """Activate the spectral residuals with zero coefficients, zero moments and step 0."""
     model = config.model
     state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
     for name in ("appearance_coefficients", "motion_coefficients"):
@@ -150,9 +150,9 @@ def _matern_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
 
 
 def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
-    """The statistics that density control goes by."""
+    """Add this view to the statistics of density control."""
     if active:
-        gather_statistics(state.statistics, d_scene.mean2d, d_scene.visible, camera.width, camera.height)
+        gather_statistics(state.statistics, d_scene.d_mean2d, d_scene.visible, camera.width, camera.height)
 
 
 def _optimise(
@@ -164,9 +164,9 @@ def _optimise(
     iteration: int,
     timer: Timer,
 ) -> None:
-    """One Adam step of the Gaussians; the offsets of the next view are taken on the way if its time is known.
+    """One Adam step of the Gaussians, which also computes the offsets of the next view if its time is known.
 
-    It is not before density control, which draws random numbers first, nor after the last iteration.
+    The time is unknown before density control, which draws random numbers first, and after the last iteration.
     """
     config, later = shop.config, None
     if iteration < config.training.iterations and not densify_now(iteration, config):
@@ -187,7 +187,7 @@ def _optimise_frames(
 
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:
-    """Clone, split and prune; moments follow, those of clones and children and all statistics start anew."""
+    """Clone, split and prune. Moments are gathered too; those of clones and children, and all statistics, are zero."""
     result = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
     regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
     state.gaussians, state.statistics = result.gaussians, result.statistics
@@ -203,7 +203,7 @@ def _log_entry(
     state: TrainingState,
     config: Config,
 ) -> dict[str, Any]:
-    """What the log keeps of an iteration. Raises FloatingPointError on a loss that is not finite."""
+    """The log entry of an iteration. Raises FloatingPointError on a loss that is not finite."""
     total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
     if not math.isfinite(total):
         raise FloatingPointError(f"iteration {iteration}, frame {view.index}: loss is {total}; terms {loss.terms}")

@@ -1,11 +1,11 @@
-"""One training view, equation (6), made of the documented pairs only: the page that says what an iteration computes.
+"""One training view, equation (6), made of the documented pairs only: the definition of one iteration.
 
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
 
-In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and its gradient by every array. This
-is what the gradient check checks and the golden objective judges. Training takes the same steps with the same
-functions (`training_step`), but joins the largest reverse passes with the Adam step that follows (`fused/`); one such
-step equals `view_gradients` followed by `adam_update` bit by bit (tested).
+In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and its gradient by every array. The
+gradient check and the golden family `objective` call this function. Training computes the same with the same functions
+(`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`); one such step
+equals `view_gradients` followed by `adam_update` bit by bit (tested).
 """
 
 from typing import NamedTuple
@@ -32,7 +32,7 @@ class ViewGradients(NamedTuple):
     loss: float  # the Matern penalty included
     terms: dict[str, float]  # unweighted; only those evaluated
     gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
-    exposure: Exposure | None  # gradients by the exposure of this frame
+    d_exposure: Exposure | None  # gradients by the exposure of this frame
     rendered: RenderOut  # the images that were compared
 
 
@@ -54,7 +54,7 @@ def view_gradients(
     """Loss and gradients of one view, equation (6), with all components that `gaussians` has.
 
     targets   of the observed frame, see `frame_targets`; `weights` are those in force at this iteration
-    t         normalised time, in [0, 1] meant
+    t         normalised time; any value is allowed, [0, 1] is the sequence
     edges     (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth
     exposure  of this frame, equation (B13); None = none
     raster    None = that of `config`;  degree   active harmonic degree, None = the model's
@@ -75,7 +75,7 @@ def view_gradients(
     gradients, d_offsets = scene_reverse(d_scene, scene_saved)
     if scene_saved.deformation is not None and d_offsets is not None:
         fdm = deformation_reverse(d_offsets, scene_saved.deformation)
-        gradients |= {"fdm_weight": fdm.weight, "fdm_centre": fdm.centre, "fdm_width": fdm.width}
+        gradients |= {"fdm_weight": fdm.d_fdm_weight, "fdm_centre": fdm.d_fdm_centre, "fdm_width": fdm.d_fdm_width}
     if gaussians.motion_coefficients is not None:
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}

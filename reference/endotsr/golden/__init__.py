@@ -1,5 +1,5 @@
-"""The conformance target of ports.
+"""Golden vectors, against which ports are tested.
 
-`judge` compares the outputs of a port with the golden cases and knows nothing of how those are made. `vectors` makes
-them: one module a family, with its cases and the mistakes that they reveal.
+`judge` compares the outputs of a port with the golden cases and is independent of how those are made. `vectors` makes
+them, in one module a family, with its cases and the mistakes that they reveal.
 """

@@ -1,8 +1,8 @@
-"""The gradient checker: is a reverse pass the derivative of its forward pass? For our pairs and for anybody's port.
+"""The gradient checker: whether a reverse pass is the derivative of its forward pass, for registered pairs and ports.
 
-The rule is relative and has no absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient
-against a non-zero difference fails at any magnitude. Whoever cannot tell right from wrong is not believed:
-every probe must also refuse the gradient scaled by 1 + control, otherwise it counts as unresolved.
+The rule is relative and has no absolute floor: |fd - an| <= rtol |an| + error bar of fd. A zero gradient against a
+non-zero difference fails at any magnitude. A probe counts only if it also refuses the gradient scaled by 1 + control;
+otherwise it is unresolved.
 """
 
 import time
@@ -19,12 +19,12 @@ from endotsr.gradcheck.session import Session, norm
 
 
 class Settings(NamedTuple):
-    """What counts as agreement. All numbers are relative.
+    """The criteria of agreement. All numbers are relative.
 
     rtol            allowed |fd - an| / |an| beyond the error bar of the difference
     control         a gradient scaled by 1 + control must be refused by every probe
-    unresolved_cap  largest share of probes that cannot refuse it
-    refused_cap     largest share of probes whose ends take different decisions
+    unresolved_cap  largest fraction of probes that cannot refuse it
+    refused_cap     largest fraction of probes whose ends take different decisions
     """
 
     rtol: float = 1e-7
@@ -111,7 +111,7 @@ def check_function(
     """Check any function against its reverse pass.
 
     forward   inputs -> outputs by name, or one array or number
-    reverse   (inputs, cotangents as `forward` answers) -> gradients by input name, each of the input's shape
+    reverse   (inputs, cotangents in the form of the outputs) -> gradients by input name, each of the input's shape
     inputs    float arrays by name; float64 unless the function computes in float32 (then settings=SINGLE)
     blocks    (input name, mask or index) by block name; None = one block per input
     trace     discrete decisions of the forward pass; a difference across a change of them is refused

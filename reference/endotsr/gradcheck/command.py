@@ -1,4 +1,4 @@
-"""`endotsr gradcheck`: check every registered pair and say so in a table."""
+"""`endotsr gradcheck`: check every registered pair and print a table."""
 
 import sys
 from pathlib import Path
@@ -12,7 +12,7 @@ def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path
 
     names      pair names, as the table shows them
     seed       of the inputs, cotangents and directions; every pair draws its own stream from it
-    json_path  where the JSON report goes; None = nowhere
+    json_path  file of the JSON report; None = no report
     returns    0 when every check passed, else 1
     Raises:    InputError for an unknown name, a seed below 0 or an unwritable file.
     """

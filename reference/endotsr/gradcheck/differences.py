@@ -1,8 +1,8 @@
-"""Derivatives along a line, from function values alone, each with an honest error bar.
+"""Derivatives along a line, from function values alone, each with an error bar.
 
 A `line` is a function of one number h: the outputs at x + h v, every entry already multiplied by its
 cotangent. Its sum is the scalar that is differentiated, but differences are taken entry by entry before
-summing, so that large outputs do not drown small changes. A line may answer None: "refused at this h".
+summing, so that small changes are not lost in large outputs. A line may return None: this h is refused.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,17 +16,17 @@ Line = Callable[[float], NDArray | None]
 
 RATIO = 4.0
 LADDER = tuple(1e-2 * RATIO**-k for k in range(9))  # 1e-2 ... 1.5e-7 of the block's size
-COARSE = (1e-2 * RATIO**2, 1e-2 * RATIO)  # above it, for derivatives that drown in rounding
-SETTLED = 1e-9  # neighbours that agree so well need no further steps
+COARSE = (1e-2 * RATIO**2, 1e-2 * RATIO)  # above it, for derivatives that are lost in rounding
+SETTLED = 1e-9  # relative agreement of neighbours at which no further steps are taken
 
 
 class Difference(NamedTuple):
-    """A derivative and what is known about it.
+    """A derivative and its error bound.
 
     value    the derivative along the line; nan when refused
     error    bound on its error from the agreement of neighbouring steps and from rounding
     step     the finer step of the plateau
-    refused  too few steps with an answer at both ends
+    refused  too few steps with a value at both ends
     """
 
     value: float
@@ -56,9 +56,9 @@ def plateau_difference(line: Line, eps: float = float(np.finfo(np.float64).eps))
     line   h -> weighted outputs, or None where h must not be used; h in units of the block's size
     eps    rounding unit of the outputs
 
-    Walks down a ladder of steps (ratio 4) and stops as soon as neighbours agree to 1e-9. When no neighbours
-    settle, all steps are used, coarser ones too. The error bar is twice the largest of: the disagreement of
-    the best neighbours, the noise seen at finer steps carried to the chosen one, rounding of the outputs.
+    The steps decrease by a ratio of 4 until neighbours agree to 1e-9. If none do, all steps are used, coarser ones
+    too. The error bar is twice the largest of three bounds: the disagreement of the best neighbours, the noise at
+    finer steps extrapolated to the chosen one, and the rounding of the outputs.
     """
     slopes = _slopes(line, LADDER, eps)
     best = _best(slopes)
@@ -83,7 +83,7 @@ def _slopes(line: Line, steps: Sequence[float], eps: float, settle: bool = True)
         ahead = line(step)
         behind = None if ahead is None else line(-step)
         if ahead is None or behind is None:
-            found.clear()  # a refused step lies between: what is coarser saw another branch
+            found.clear()  # a refused step lies between: coarser steps may cross to another branch
             continue
         rounding = eps * float(np.linalg.norm(ahead)) / step
         found.append(_Slope(step, float(np.sum(ahead - behind)) / (2 * step), rounding))
@@ -108,7 +108,7 @@ def _best(slopes: list[_Slope]) -> Difference | None:
     gaps = [abs(b - a) for a, b in pairwise(values)]  # gaps[k] belongs to step k + 2
     k = int(np.argmin(gaps))
     step = slopes[k + 2].step
-    # Truncation shrinks with the step, noise grows as 1/h: finer steps tell how much noise there is here.
+    # Truncation shrinks with the step, noise grows as 1/h: finer steps show how much noise there is here.
     noise = max(gap * slopes[j + 2].step / step for j, gap in enumerate(gaps) if j >= k)
     return Difference(values[k + 1], 2 * max(noise, slopes[k + 2].rounding), step)
 
@@ -126,9 +126,9 @@ class Taylor(NamedTuple):
 
 
 def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER) -> Taylor:
-    """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it stands clear of rounding.
+    """Order of |f(h) - f(0) - h f'(0)| between the two finest steps where it clearly exceeds rounding.
 
-    The remainder of a right derivative falls as h^2 or faster, of a wrong one as h.
+    The remainder of a right derivative falls as h^2 or faster, that of a wrong one as h.
     """
     origin = line(0.0)
     if origin is None:

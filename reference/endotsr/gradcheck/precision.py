@@ -10,7 +10,7 @@ from endotsr.gradcheck.registry import Arrays, Pair
 
 COSINE = 1e-6  # largest 1 - cosine between the two gradients of a block
 RELATIVE = 1e-4  # largest relative L2 distance
-DRAWS = 8  # inputs tried until both precisions take the same decisions
+DRAWS = 8  # largest number of draws until both precisions take the same decisions
 
 
 class BlockPrecision(NamedTuple):
@@ -80,7 +80,7 @@ def _same_decisions(pair: Pair, one: Arrays, two: Arrays) -> bool:
 
 
 def _wrong_types(outputs: Arrays, gradients: Arrays, inputs: Arrays) -> list[str]:
-    """Arrays that left float32. Scalar losses are float64 by convention."""
+    """Arrays that are not float32. Scalar losses are float64 by convention."""
     named = [(f"output {name}", outputs[name]) for name in outputs]
     named += [(f"gradient of {name}", gradients[name]) for name in inputs if np.ndim(inputs[name]) > 0]
     return [

@@ -1,6 +1,6 @@
-"""Where a gradient is probed: directions, block by block.
+"""The directions along which a gradient is probed, block by block.
 
-A whole-vector comparison hides a wrong small block behind a right large one, so every block has its own
+In a comparison of whole vectors a right large block hides a wrong small one, so every block has its own
 directions, in units of the block's own size.
 """
 
@@ -23,7 +23,7 @@ class Block(NamedTuple):
 
 
 class Probe(NamedTuple):
-    """A direction, non-zero in one block (or everywhere for the joint probes). `kind` says how it was drawn."""
+    """A direction, non-zero in one block (or everywhere for the joint probes). `kind` names how it was drawn."""
 
     block: str
     kind: str
@@ -85,7 +85,7 @@ def block_probes(
 
 
 def joint_probes(inputs: Mapping[str, NDArray], rng: np.random.Generator) -> list[Probe]:
-    """Dense directions through all inputs at once: sees what no single block sees."""
+    """Dense directions through all inputs at once, which detect errors that no single block shows."""
     return [
         Probe("(all)", f"dense {k}", {n: rng.standard_normal(v.shape) * _size(v) for n, v in inputs.items()})
         for k in range(2)
@@ -97,7 +97,7 @@ def _size(value: NDArray) -> float:
 
 
 def _downhill(gradient: NDArray, rng: np.random.Generator) -> NDArray:
-    """Random lengths with the gradient's signs: nothing cancels, so that weakly weighted slices are resolved."""
+    """Random magnitudes with the gradient's signs, so that nothing cancels and weakly weighted slices are resolved."""
     coin = rng.choice([-1.0, 1.0], gradient.shape)
     return np.where(gradient == 0, coin, np.sign(gradient)) * rng.uniform(0.5, 1.5, gradient.shape)
 

@@ -1,6 +1,6 @@
-"""Every variant of every stage as a forward/reverse pair: what the gradient checks run, and what the tables list.
+"""Every variant of every stage as a forward/reverse pair, for the gradient checks and the tables.
 
-A pair cannot exist unchecked: `tests/test_conventions.py` asserts that every `<stage>_forward` of the package
+No pair is left unchecked: `tests/test_conventions.py` asserts that every `<stage>_forward` of the package
 is named by a pair that `all_pairs` returns.
 """
 
@@ -18,7 +18,7 @@ Arrays = Mapping[str, NDArray]
 
 
 class Pair(NamedTuple):
-    """One forward pass and its reverse pass, wrapped so that a checker needs to know nothing about them.
+    """One forward pass and its reverse pass, in the form that the checker calls.
 
     name      variant of a stage, or any name for a pair of one's own
     equation  the equation label of the specification ("1" ... "7" for the paper, "B..." for the base model)
@@ -65,7 +65,7 @@ def pair_of(stage: Stage, variant: Variant) -> Pair:
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
         _, saved = stage.forward(whole(inputs), variant.settings)
         found = reverse_pass(cotangents, saved)
-        return {name: np.asarray(found[name]) for name in inputs}
+        return {name: np.asarray(found[f"d_{name}"]) for name in inputs}
 
     def trace(inputs: Arrays) -> Mapping[str, NDArray]:
         assert trace_pass is not None
@@ -105,7 +105,7 @@ def pair_stream(name: str, seed: int) -> np.random.Generator:
 
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
-    """Kernels run on one thread inside: pairs are small, and waking a second thread costs more than it brings."""
+    """Run kernels on one thread within the block, because starting a second thread costs more than small pairs gain."""
     import numba
 
     before = numba.get_num_threads()

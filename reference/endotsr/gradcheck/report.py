@@ -1,4 +1,4 @@
-"""Reports of the gradient checker: a table for a person, JSON for a machine."""
+"""Reports of the gradient checker: a table and JSON."""
 
 import json
 import math
@@ -15,7 +15,7 @@ _RED, _RESET = "\x1b[31m", "\x1b[0m"
 
 
 def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = (), colour: bool = False) -> str:
-    """Aligned plain text: a line per block, below them the pair's float32 line; reasons of failures at the end."""
+    """Aligned plain text: a line per block, then the pair's float32 line; reasons of failures at the end."""
     single = {p.name: p for p in precisions}
     rows: list[tuple[str, ...]] = [HEADER]
     reasons: list[str] = []
@@ -34,7 +34,7 @@ def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] =
 
 
 def summary(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = ()) -> str:
-    """One line: how many pairs, blocks and probes, how many failed, how long it took."""
+    """One line with the numbers of pairs, blocks, probes and failures, and the duration."""
     reports, precisions = list(reports), list(precisions)
     bad = {r.name for r in (*reports, *precisions) if not r.passed}
     probes = sum(block.probes for report in reports for block in report.blocks)
@@ -45,7 +45,7 @@ def summary(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport]
 
 
 def to_json(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport], seed: int) -> str:
-    """Everything that the table shows and every number behind it. Non-finite numbers are written as strings."""
+    """All entries of the table and every number behind them. Non-finite numbers are written as strings."""
     single = {p.name: p for p in precisions}
     pairs = []
     for report in reports:

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from endotsr.gradcheck.registry import Arrays
 
-LINEAR = 1e5  # reverse passes are linear in the cotangents up to so many rounding units
+LINEAR = 1e5  # reverse passes are linear in the cotangents up to this many rounding units
 
 
 class Session:
-    """Inputs, outputs, dense cotangents and gradient of one check, and what was wrong with them already."""
+    """Inputs, outputs, dense cotangents and gradient of one check, and the faults already found in them."""
 
     def __init__(self, forward, reverse, inputs: Arrays, trace, rng: np.random.Generator):
         self.inputs = {name: np.array(value) for name, value in inputs.items()}
@@ -39,7 +39,7 @@ class Session:
         return {"output": np.asarray(answer)} if self.bare else {k: np.asarray(v) for k, v in answer.items()}
 
     def _cotangent(self, output: NDArray) -> NDArray:
-        """Dense, never near zero, scaled so that every output has a say."""
+        """Dense cotangents, never near zero, scaled so that every output contributes."""
         size = float(np.sqrt(np.mean(np.square(output, dtype=np.float64)))) if output.size else 1.0
         draw = self.rng.choice([-1.0, 1.0], output.shape) * self.rng.uniform(0.5, 1.5, output.shape)
         return np.asarray(draw / (size if size > 0 and np.isfinite(size) else 1.0), output.dtype)
@@ -70,7 +70,7 @@ class Session:
         self.gradient = {name: value for name, value in self.gradient.items() if name in self.inputs}
 
     def _check_linear(self) -> None:
-        """Each output's cotangent alone, halved: the parts must add up to half the gradient."""
+        """Check linearity: the gradients of half of each cotangent alone must add up to half the gradient."""
         total = {name: np.zeros(value.shape) for name, value in self.gradient.items()}
         for one in self.cotangents:
             alone = {k: v * v.dtype.type(0.5) if k == one else np.zeros_like(v) for k, v in self.cotangents.items()}

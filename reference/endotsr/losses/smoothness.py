@@ -34,8 +34,8 @@ class SmoothnessSaved(NamedTuple):
 class SmoothnessGrads(NamedTuple):
     """Derivatives of the loss by its two differentiable inputs."""
 
-    rendered: FloatArray  # (C, H, W)
-    rendered_depth: FloatArray  # (H, W)
+    d_rendered: FloatArray  # (C, H, W)
+    d_rendered_depth: FloatArray  # (H, W)
 
 
 def smoothness_forward(
@@ -83,7 +83,7 @@ def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads
             parallel_for(_variation_reverse_kernel, image.shape[0] * image.shape[1], image, saved.mask, weight, d_image)
     twice = depth.dtype.type(2 * float(d_loss) * _smooth_weight(saved.smooth))
     _squared_steps_reverse_kernel(depth, saved.smooth, twice, d_depth)
-    return SmoothnessGrads(rendered=d_rendered, rendered_depth=d_depth)
+    return SmoothnessGrads(d_rendered, d_depth)
 
 
 def _smooth_weight(smooth: BoolArray) -> float:

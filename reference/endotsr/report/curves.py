@@ -1,7 +1,7 @@
 """Charts of a run from its log (one JSON object per line) and its evaluation.
 
-Every chart exists for a light and for a dark page (transparent ground). A key that the log lacks is a curve that
-is not drawn; a chart without any curve is left out.
+Every chart exists for a light and for a dark page (transparent background). A curve whose key is missing in the log is
+not drawn; a chart without any curve is left out.
 """
 
 import json
@@ -26,7 +26,7 @@ class Chart:
 
     title: str
     draw: Callable[[Any, Theme], None]
-    along: str = "iteration"  # what the horizontal axis counts
+    along: str = "iteration"  # unit of the horizontal axis
 
 
 def read_log(path: Path) -> LogEntries:
@@ -102,7 +102,7 @@ def frame_lines(evaluation: dict[str, Any], key: str) -> list[tuple[str, NDArray
 
 
 def chart_png(chart: Chart, theme: str, width: float = 4.4, height: float = 2.75, dots: int = 220) -> bytes:
-    """One chart as a PNG file with a transparent ground, `width` x `height` inches."""
+    """One chart as a PNG file with a transparent background, `width` x `height` inches."""
     figure = new_figure(width, height, constrained=False)
     figure.subplots_adjust(left=0.13, right=0.985, top=0.97, bottom=0.17)
     _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
@@ -147,7 +147,7 @@ def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
 def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
         positive = [{**entry, key: value} for entry in log if (value := _term(entry, key)) is not None and value > 0]
-        if positive:  # a weight that is still zero has no place on a logarithmic axis
+        if positive:  # a weight that is still zero cannot be drawn on a logarithmic axis
             label = "1 − ssim" if key == "ssim" else key
             _curve(axes, positive, key, theme.colours[position], label, raw=False)
     _log_scale(axes, log, TERMS)

@@ -1,4 +1,4 @@
-"""What a report is made from: plain arrays, dictionaries and text. No file, no picture, no HTML here."""
+"""The input of a report: plain arrays, dictionaries and text. This module handles no file, picture or HTML."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -47,7 +47,7 @@ class FreeTable:
 
 @dataclass(frozen=True)
 class ReportData:
-    """All that the page shows. Every part but the title may be empty and is then left out."""
+    """The contents of the page. Every part but the title may be empty and is then left out."""
 
     title: str
     evaluation: dict[str, Any] = field(default_factory=dict)  # metrics.json, see evaluate.py
@@ -59,5 +59,5 @@ class ReportData:
     configuration: str = ""  # TOML
     versions: dict[str, str] = field(default_factory=dict)
     input_hashes: dict[str, str] = field(default_factory=dict)  # file -> SHA-256
-    notes: tuple[str, ...] = ()  # sentences: what the reader assumed and found
+    notes: tuple[str, ...] = ()  # sentences with the assumptions and findings of the reader
     depth_unit: str = "scene units"

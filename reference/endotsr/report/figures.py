@@ -1,7 +1,7 @@
 """Pictures of a run as 8-bit RGB arrays: render / truth / error with a 4x inset, depth in colours, encoders.
 
 Colours come from perceptually uniform maps (error: magma, depth: viridis). Excluded pixels are neutral grey;
-a value that is not a finite number is painted magenta, so that it cannot pass for a dark pixel.
+a value that is not a finite number is painted magenta, so that it cannot be mistaken for a dark pixel.
 matplotlib and Pillow are imported when a picture is made, not before.
 """
 
@@ -21,7 +21,7 @@ DEPTH_MAP = "viridis"
 EXCLUDED = (96, 96, 102)
 NOT_FINITE = (255, 0, 255)
 INSET_FACTOR = 4
-ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few steps, so that similar runs share one scale
+ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few steps, so that similar runs have the same scale
 
 
 class Triptych(NamedTuple):
@@ -34,7 +34,7 @@ class Triptych(NamedTuple):
     column: int  # left edge of the window
     height: int  # a quarter of H, at least 1
     width: int  # a quarter of W, at least 1
-    scale: float  # error that gets the brightest colour, display units [0, 1]
+    scale: float  # error shown in the brightest colour, display units [0, 1]
 
     def window(self, image: ByteImage) -> ByteImage:
         """The part of `image` inside the window, not enlarged."""
@@ -106,7 +106,7 @@ def triptych_picture(panels: Triptych, gap: int = 6) -> ByteImage:
 
 
 def framed(image: ByteImage, panels: Triptych) -> ByteImage:
-    """A copy of `image` with the window's border drawn in white on black, visible on any ground and when shrunk."""
+    """A copy of `image` with the window's border drawn in white on black, visible on any background and when shrunk."""
     out = image.copy()
     thick = max(1, image.shape[1] // 320)
     for grow, colour in ((2 * thick, 0), (thick, 255)):
@@ -163,5 +163,5 @@ def encode(image: ByteImage, kind: str = "png") -> bytes:
 
 
 def data_uri(content: bytes, kind: str) -> str:
-    """The bytes of an image file as an address that needs no other file."""
+    """The bytes of an image file as a data URI."""
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"

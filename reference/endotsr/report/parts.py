@@ -50,12 +50,12 @@ def section(title: str, *content: str, note: str = "") -> str:
 
 
 def details(summary: str, content: str, opened: bool = False) -> str:
-    """A part that a person can fold. Both arguments are HTML already."""
+    """A part that can be folded. Both arguments are HTML already."""
     return f"<details{' open' if opened else ''}><summary>{summary}</summary>{content}</details>"
 
 
 def image(picture: ByteImage, alternative: str, css: str = "") -> str:
-    """An embedded picture with its size, so that the page does not jump while it loads; small ones are lossless."""
+    """An embedded picture with its size, so that the layout is stable while it loads; small ones are lossless."""
     kind = "webp" if picture.size > LOSSLESS_BYTES else "png"
     address = figures.data_uri(figures.encode(picture, kind), kind)
     style = f' class="{css}"' if css else ""
@@ -64,7 +64,7 @@ def image(picture: ByteImage, alternative: str, css: str = "") -> str:
 
 
 def themed_image(light: bytes, dark: bytes, alternative: str) -> str:
-    """A PNG chart in two versions; the page shows the one that fits the reader's colour scheme."""
+    """A PNG chart in two versions; the page shows the one of the reader's colour scheme."""
     return (
         f'<picture><source media="(prefers-color-scheme: dark)" srcset="{figures.data_uri(dark, "png")}">'
         f'<img class="chart" src="{figures.data_uri(light, "png")}" alt="{text(alternative)}"></picture>'

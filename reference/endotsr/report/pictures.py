@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from endotsr.kernels.arrays import FloatArray
 
 DEPTH_LEVELS = 65535
-DEPTH_HEADROOM = 1.5  # over the largest depth prior: renders may lie a little behind it
+DEPTH_HEADROOM = 1.5  # over the largest prior depth, since rendered depth may be a little larger
 
 
 def rgb_bytes(colour: FloatArray) -> NDArray[np.uint8]:
@@ -28,5 +28,5 @@ def depth_step(record: dict[str, Any], depth: FloatArray) -> float:
 
 
 def depth_bytes(depth: FloatArray, step: float) -> NDArray[np.uint16]:
-    """(H, W) scene units as whole steps, clipped to 16 bits; 0 = nothing there."""
+    """(H, W) scene units as whole steps, clipped to 16 bits; 0 = no depth."""
     return np.clip(np.rint(np.nan_to_num(depth) / step), 0, DEPTH_LEVELS).astype(np.uint16)

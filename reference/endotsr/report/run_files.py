@@ -25,7 +25,7 @@ from endotsr.splatting.render import RenderOut
 def write_evaluation(
     folder: RunFolder, sequence: Sequence, metrics: dict[str, Any], held_out: dict[int, RenderOut]
 ) -> None:
-    """Write everything that `endotsr evaluate` leaves in a run folder.
+    """Write all files of `endotsr evaluate` in a run folder.
 
     metrics     of `evaluation.run.measure_run`
     held_out    frame number -> render
@@ -33,7 +33,7 @@ def write_evaluation(
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
     write_json(folder.path / "metrics.json", metrics)
     reached = metrics["run"]["iteration"]
-    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= reached]  # what the checkpoint has seen
+    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= reached]  # those up to the checkpoint
     picture = curves_png(log, metrics)
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))

@@ -1,4 +1,4 @@
-"""The numbers of an evaluated run in words: facts, the table of components, the table on the terminal.
+"""The numbers of an evaluated run as text: facts, the table of components, the table on the terminal.
 
 In: the dictionary of metrics.json. Out: text and plain tables; no file, no HTML.
 """
@@ -14,13 +14,13 @@ TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
 
 
 def iterations(run: dict[str, Any]) -> str:
-    """How far the measured checkpoint is: "6000", or "2000 of 6000, the run is not finished"."""
+    """Iteration of the measured checkpoint: "6000", or "2000 of 6000, the run is not finished"."""
     done, planned = run["iteration"], run["iterations_planned"]
     return f"{done}" if done >= planned else f"{done} of {planned}, the run is not finished"
 
 
 def facts(metrics: dict[str, Any]) -> dict[str, Any]:
-    """What a reader of the report wants to know about the run."""
+    """The facts about the run that the report lists."""
     run = metrics["run"]
     about, machine = run["input"], run["machine"]
     peak, memory = run["peak_memory_bytes"], machine["memory_bytes"]
@@ -73,7 +73,7 @@ def component_table(metrics: dict[str, Any]) -> FreeTable:
         change = None if row is whole else _gain(row, whole)
         rows.append((row["label"], *cells, "" if change is None else f"{change:+.2f} dB"))
     return FreeTable(
-        "Held-out means with one component taken out",
+        "Held-out means without one component",
         ("Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"),
         tuple(rows),
         "The trained model, rendered with the named residual set to zero. Component L, the Laplacian loss, acts in "

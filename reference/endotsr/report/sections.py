@@ -10,7 +10,7 @@ from endotsr.report import parts as parts
 from endotsr.report.data import COLUMNS, FramePictures, ReportData
 from endotsr.report.tables import html_table
 
-OPENED_FRAMES = 3  # the worst frames are unfolded, the others one touch away
+OPENED_FRAMES = 3  # the worst frames are shown unfolded
 
 
 def _mean(data: ReportData, key: str) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def _card(value: str, unit: str, label: str) -> str:
 
 
 def _verdict(data: ReportData) -> str:
-    """The one sentence a reader wants: above or below what needs no model, in tissue PSNR."""
+    """One sentence: the tissue PSNR of the model above or below the best baseline."""
     ours = _mean(data, "held_out").get("psnr_tissue")
     means = _baseline_rows(data)
     rows = [(label, float(mean["psnr_tissue"])) for label, mean in means if mean.get("psnr_tissue") is not None]
@@ -65,7 +65,7 @@ def _verdict(data: ReportData) -> str:
     beaten = sum(ours >= value for _, value in rows)
     return (
         f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the strongest '
-        f"answer that needs no model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB); "
+        f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB); "
         f"it is above {beaten} of {len(rows)} baselines.</p>"
     )
 
@@ -96,7 +96,7 @@ def held_out(data: ReportData) -> str:
         "published rows are quoted, not measured here."
     )
     table = html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
-    return parts.section("Held-out frames against doing without a model", table, _absent_reasons(data), note=note)
+    return parts.section("Held-out frames against baselines without a model", table, _absent_reasons(data), note=note)
 
 
 def _best(rows: list[tuple[str, dict[str, Any], str]], key: str, sign: int) -> float | None:
@@ -212,13 +212,13 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
 
 
 def components(data: ReportData) -> str:
-    """What each component contributed, as tables given with the data."""
+    """Contributions of the components, as tables given with the data."""
     blocks = []
     for entry in data.components:
         rows = [[_free_cell(value, column) for value, column in zip(row, entry.columns)] for row in entry.rows]
         note = f'<p class="note">{parts.text(entry.note)}</p>' if entry.note else ""
         blocks.append(f"<h3>{parts.text(entry.title)}</h3>{note}{html_table(entry.columns, rows)}")
-    return parts.section("What each component contributed", *blocks)
+    return parts.section("Contribution of each component", *blocks)
 
 
 def _free_cell(value: Any, column: str) -> str:
@@ -234,7 +234,7 @@ def the_run(data: ReportData) -> str:
     blocks = [f'<div class="panel"><dl>{facts}</dl></div>' if facts else ""]
     if data.notes:
         lines = "".join(f"<li>{parts.text(note)}</li>" for note in data.notes)
-        blocks.append(parts.details("What was assumed and found", f"<ul>{lines}</ul>"))
+        blocks.append(parts.details("Assumptions and findings of the reader", f"<ul>{lines}</ul>"))
     if data.configuration:
         content = f'<div class="panel"><pre>{parts.text(data.configuration)}</pre></div>'
         blocks.append(parts.details("Configuration (TOML)", content))
@@ -246,7 +246,7 @@ def the_run(data: ReportData) -> str:
 
 
 def footer(data: ReportData) -> str:
-    """What the numbers mean."""
+    """Definitions of the metrics."""
     return (
         "<footer><p>PSNR and SSIM are computed frame by frame and averaged over frames. <em>Full</em>: all pixels, "
         "excluded ones set to zero in render and truth. <em>Tissue</em>: tissue pixels only. <em>8-bit</em>: the "

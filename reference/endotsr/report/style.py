@@ -1,8 +1,8 @@
 """The one style of every chart, drawn with matplotlib on Agg: colours, sizes, axes, files.
 
-Comes in: a matplotlib figure or axes with curves on it. Goes out: the same in this style, or the bytes of a file.
-Equal numbers give equal bytes: no date, no version and no random identifier gets into a picture. Knows nothing of
-what is drawn. matplotlib is imported when a picture is made, not before.
+In: a matplotlib figure or axes with curves on it. Out: the same in this style, or the bytes of a file.
+Equal numbers give equal bytes: a picture holds no date, no version and no random identifier. This module is independent
+of the data drawn. matplotlib is imported when a picture is made, not before.
 """
 
 import io
@@ -13,10 +13,10 @@ from endotsr.runs.files import replace_file
 
 
 class Theme(NamedTuple):
-    """Colours on one ground."""
+    """Colours on one background."""
 
     ink: str  # words and numbers
-    grey: str  # reference lines and what is compared with
+    grey: str  # reference lines and baselines
     faint: str  # grid
     colours: tuple[str, ...]  # of curves, in their order
 
@@ -30,7 +30,7 @@ INK, FAINT = LIGHT.ink, LIGHT.faint
 
 
 class Sizes(NamedTuple):
-    """Heights of letters, points."""
+    """Font sizes, points."""
 
     title: float
     text: float  # labels of axes, numbers, legends
@@ -39,14 +39,14 @@ class Sizes(NamedTuple):
 NORMAL, SMALL = Sizes(11, 9), Sizes(9.5, 8)
 
 DOTS_PER_INCH = 160
-METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # what matplotlib would add by itself
+METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # metadata that matplotlib would add
 HASH_SALT = "endotsr"  # of the names inside an svg file, in place of a random one
 
 
 def new_figure(width: float, height: float, *, constrained: bool = True) -> Any:
-    """A figure of so many inches on white, drawn without a screen.
+    """A figure of the given size in inches on white, drawn without a display.
 
-    constrained   the layout makes room for labels; False leaves the margins to the caller
+    constrained   the layout reserves space for labels; with False the caller sets the margins
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

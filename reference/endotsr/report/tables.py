@@ -1,7 +1,7 @@
-"""Tables from rows of text, in the three forms that are written anywhere: aligned text, Markdown, HTML.
+"""Tables from rows of text in three forms: aligned text, Markdown, HTML.
 
-Comes in: column heads and rows whose cells are text already; for HTML, whose cells are HTML already. Goes out: one
-string. Knows nothing of what a cell means: numbers are formatted by the caller.
+In: column heads, and rows whose cells are text already; for HTML, the cells are HTML already. Out: one string. The
+caller formats the numbers.
 """
 
 import html
@@ -35,7 +35,7 @@ def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def html_table(
     columns: Iterable[str], rows: Iterable[Iterable[str]], classes: Iterable[str] = (), caption: str = ""
 ) -> str:
-    """A table that scrolls sideways on a narrow page; the first column stays in sight (see `report.parts.STYLE`).
+    """A table that scrolls sideways on a narrow page; the first column stays visible (see `report.parts.STYLE`).
 
     columns, caption   text, which is escaped
     rows               cells, which are HTML already

@@ -1,4 +1,4 @@
-"""Quantities in words, the same in every table, message and page."""
+"""Quantities as text, the same in every table, message and page."""
 
 
 def duration(seconds: float) -> str:
@@ -9,5 +9,5 @@ def duration(seconds: float) -> str:
 
 
 def memory(found: int | None) -> str:
-    """Bytes of memory; a system may not tell them."""
+    """Bytes of memory as text; "memory not known" where the system does not report them."""
     return f"{found / 1e9:.2f} GB" if found else "memory not known"

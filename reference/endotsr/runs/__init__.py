@@ -1,8 +1,8 @@
-"""Run folders: what a run writes and remembers, and how it is trained, resumed and read again.
+"""Run folders: the files and records of a run, and how it is trained, resumed and read again.
 
 folder    the folder and its records          log       log.jsonl, cut at the checkpoint when a run is resumed
 files     files replaced whole, or refused    machine   versions, processor, memory, time
-sources   sequences by name: a folder, or `simulated`; the only module that knows both readers and simulator
+sources   sequences by name: a folder, or `simulated`; the only module that imports both readers and simulator
 model     checkpoint -> model or training     training  a training that fills the folder
-stopping  signals, remembered while an iteration finishes
+stopping  signals, deferred while an iteration finishes
 """

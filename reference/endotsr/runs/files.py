@@ -1,4 +1,4 @@
-"""Files that are replaced whole, or refused before the work that would fill them."""
+"""Files that are replaced whole, and checks of output paths before the work begins."""
 
 import contextlib
 import errno
@@ -27,7 +27,7 @@ def refuse_folder(path: Path) -> None:
 
 
 def refuse_unwritable(*files: Path | None) -> None:
-    """Raises InputError if one of the files (None = not asked for) cannot be written; called before the work."""
+    """Raises InputError if one of the files (None = not requested) cannot be written; called before the work."""
     for file in filter(None, files):
         above = file.parent
         if file.is_dir():
@@ -39,7 +39,7 @@ def refuse_unwritable(*files: Path | None) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """JSON with numbers that are not finite as null, replaced whole."""
+    """Write JSON with null for every number that is not finite; the file is replaced whole."""
     text = json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n"
     replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
@@ -47,9 +47,9 @@ def write_json(path: Path, data: Any) -> None:
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step.
 
-    Raises: OSError of the file system, with `path` in place of the temporary name, which nobody gave.
+    Raises: OSError of the file system, with `path` in place of the temporary name.
     """
-    temporary = path.with_name(f".partial-{path.name}")  # keeps the ending, which writers look at
+    temporary = path.with_name(f".partial-{path.name}")  # keeps the ending, by which writers choose the format
     try:
         write(temporary)
         os.replace(temporary, path)
@@ -63,7 +63,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextlib.contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes otherwise."""
+    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails."""
     temporary = path.with_name(f".partial-{os.getpid()}-{path.name}")
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir()
@@ -106,7 +106,7 @@ def finite(data: Any) -> Any:
 
 
 def os_error_line(error: OSError, where: object = None) -> str:
-    """One line for what the file system refused; `where` stands in for a file that the error does not name."""
+    """One line for an error of the file system; `where` is used if the error names no file."""
     place = error.filename or where
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
     reason = "the disk is full" if full else error.strerror or str(error)

@@ -1,4 +1,4 @@
-"""The run folder: everything that says what was run, on what, how it went and what came out.
+"""The run folder: settings, input, log, checkpoint and results of one run.
 
     config.toml      resolved settings; `load_config` reads back an equal Config
     run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
@@ -7,8 +7,8 @@
     checkpoint.npz   the latest checkpoint
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 
-A run folder appears complete under its name or not at all, files are replaced whole, and a log that is resumed
-is cut at the checkpoint. Knows file names and JSON; knows nothing of models or pictures.
+A run folder appears complete under its name or not at all, files are replaced whole, and the log of a resumed run
+is cut at the checkpoint. This module handles file names and JSON; it is independent of models and pictures.
 """
 
 import contextlib
@@ -45,18 +45,18 @@ class RunFolder:
         return load_config(self.path / "config.toml")
 
     def record(self, *needed: str) -> dict[str, Any]:
-        """run.json as it is now. Raises InputError if one of the `needed` keys (`input.source`) is not there."""
+        """run.json, read anew. Raises InputError if one of the `needed` keys (`input.source`) is missing."""
         return read_json(self.path / "run.json", needed)
 
     def sequence_record(self, *needed: str) -> dict[str, Any]:
-        """sequence.json. Raises InputError if one of the `needed` keys is not there."""
+        """sequence.json. Raises InputError if one of the `needed` keys is missing."""
         return read_json(self.path / "sequence.json", needed)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Inside, this process alone trains the run; the system lets go of the lock of a process that was killed.
+        """Hold the lock of the run for the block; the system releases the lock of a process that was killed.
 
-        Raises: InputError if another process holds it. Without effect where the system or the disk knows no locks.
+        Raises: InputError if another process holds it. Without effect where the system or the disk supports no locks.
         """
         with self.log.open("ab") as file:
             _lock(file, self.path)
@@ -81,7 +81,7 @@ def _lock(file: IO[bytes], path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(f"{path}: another process trains this run; let it end, or stop it") from None
+        raise InputError(f"{path}: another process trains this run; wait until it ends, or stop it") from None
     except OSError:
         return
 

@@ -1,4 +1,4 @@
-"""log.jsonl: one line an iteration, cut at the checkpoint when a run goes on."""
+"""log.jsonl: one line an iteration, cut at the checkpoint when a run is resumed."""
 
 import contextlib
 import json
@@ -43,7 +43,7 @@ class RunLog:
         self._end += len(line)
 
     def close(self) -> None:
-        """Close the file; what it could not take is dropped."""
+        """Close the file; lines that could not be written are dropped."""
         with contextlib.suppress(OSError):
             self._file.close()
 

@@ -1,4 +1,4 @@
-"""What a number depends on: versions, processor, memory, the time of day."""
+"""What results and times depend on: versions, processor, memory, the time of day."""
 
 import contextlib
 import datetime
@@ -15,7 +15,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headl
 
 
 def versions() -> dict[str, str]:
-    """Versions of this package, Python and the libraries that numbers depend on."""
+    """Versions of this package, of Python and of the libraries that results depend on."""
     found = {"endotsr": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
@@ -24,7 +24,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores this process may use, memory and system, as far as the system tells."""
+    """Processor, cores this process may use, memory and system, as far as the system reports them."""
     processor = platform.processor() or platform.machine()
     with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
@@ -39,7 +39,7 @@ def machine() -> dict[str, Any]:
 
 
 def peak_memory_bytes() -> int | None:
-    """Largest resident memory of this process so far; None where the system does not tell."""
+    """Largest resident memory of this process so far; None where the system does not report it."""
     try:
         import resource
     except ImportError:

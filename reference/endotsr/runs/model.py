@@ -1,7 +1,7 @@
-"""From a run folder to a model that renders, or to a training that goes on.
+"""From a run folder to a model that renders, or to a training that continues.
 
-A checkpoint is read with the settings of config.toml. Should the two not be of one run (an edited file, a checkpoint
-copied in), the arrays would be read as something they are not, so every setting is compared first.
+A checkpoint is read with the settings of config.toml. If the two are not of one run (an edited file, a checkpoint
+copied in), the arrays would be misread, so every setting is compared first.
 """
 
 import math
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from endotsr.scene.gaussians import Gaussians
     from endotsr.scene.parameters import FrameParameters
 
-CHANGE_NO_NUMBER = {"training.threads", "training.checkpoint_every"}  # may differ from what the checkpoint remembers
+CHANGE_NO_NUMBER = {"training.threads", "training.checkpoint_every"}  # may differ from the checkpoint's
 
 
 class Model(NamedTuple):
-    """What is needed to render."""
+    """Everything that rendering needs."""
 
     gaussians: "Gaussians"
     spectral: Any  # frequencies, atom statistics and penalty weights of the training time stamps
@@ -50,7 +50,7 @@ def load_model(folder: RunFolder) -> Model:
 
 
 def save_training(folder: RunFolder, state: Any, config: Config) -> None:
-    """Put the state of a training in place of the last checkpoint."""
+    """Replace the last checkpoint by the state of a training."""
     from endotsr.fitting.state import save_state
 
     save_state(folder.checkpoint, state, config)
@@ -90,7 +90,7 @@ def _named(settings: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[str, Any]]:
-    """The settings that show in the arrays themselves."""
+    """The settings that can be read from the arrays themselves."""
     from endotsr.fitting.schedules import residuals_active
 
     gaussians, active = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)

@@ -1,4 +1,4 @@
-"""The record of a run as it starts: what run.json says before the first iteration."""
+"""The record of a run at its start: the content of run.json before the first iteration."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from endotsr.runs.machine import machine, now, versions
 def new_record(command: list[str], config: Config, threads: int, source: dict[str, Any]) -> dict[str, Any]:
     """The entries of run.json at the start of a run.
 
-    command   the words that started it
+    command   command line of the run, one string a word
     threads   kernel threads in use
     source    `input_record` of the sequence
     """

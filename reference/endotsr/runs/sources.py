@@ -1,4 +1,4 @@
-"""Where a sequence comes from: a folder, or `simulated`; and what a run folder remembers of it."""
+"""The source of a sequence, a folder or `simulated`, and its record in a run folder."""
 
 import hashlib
 from pathlib import Path
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-SIMULATED = "simulated"  # the word that stands for the embedded sequence; a folder of that name is `./simulated`
+SIMULATED = "simulated"  # names the embedded sequence; a folder of that name is given as `./simulated`
 IN_MEMORY = "arrays in memory"  # the source of a sequence that was passed from Python and not read from files
 ARRAYS = ("images", "masks", "depth", "times")
 
@@ -36,7 +36,7 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
 
 
 def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:
-    """The simulator's settings with what the sequence settings say about scale and split."""
+    """The simulator's settings with the scale and the split of the sequence settings."""
     wanted = config.sequence
     if wanted.frames:
         raise InputError("simulated: --frames selects files of a folder; here --simulator.frames N says how many")
@@ -49,7 +49,7 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
 
 
 def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> dict[str, Any]:
-    """What was read, for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
+    """Record of the input for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
     import numpy as np
 
     digests = {name: _digest(getattr(sequence, name)) for name in ARRAYS}
@@ -87,12 +87,12 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
         if remembered.get(name) != _digest(getattr(sequence, name)):
             raise InputError(
                 f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
-                "a run continues on the input it began with"
+                "a run continues only on the input that it was started on"
             )
 
 
 def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
-    """Where the sequence of a run was, and how it was simulated. Raises InputError if run.json does not say."""
+    """Source and simulator settings of the sequence of a run. Raises InputError if run.json lacks them."""
     record = folder.record("input.source", "input.arrays_sha256")["input"]
     where = str(folder.path / "run.json")
     simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
@@ -100,7 +100,7 @@ def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
 
 
 def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
-    """The sequence that a run was trained on, from where it was or from `source`; it must be the same."""
+    """The sequence that a run was trained on, from its recorded place or from `source`; it must be the same."""
     remembered, simulator = run_source(folder)
     source = source or remembered
     sequence = load_sequence(source, folder.config(), simulator)

@@ -1,11 +1,12 @@
-"""Signals that stop a command: raised as KeyboardInterrupt, and remembered.
+"""Signals that stop a command: each is raised as KeyboardInterrupt and recorded.
 
-Python raises the exception wherever the main thread happens to be. Inside a callback of compiled code (the loader of a
-kernel) the exception cannot be caught: Python drops it there, and the command continues or fails with another error.
-Long work therefore calls `stop_asked` from time to time, and treats an error after a signal as an interruption.
+Python raises the exception at whatever point the main thread has reached. Inside a callback of compiled code (the
+loader of a kernel) the exception cannot be caught: Python drops it there, and the command continues or fails with
+another error. Long work therefore calls `stop_asked` at intervals, and treats an error after a signal as an
+interruption.
 
-Work that must not be lost half-done runs inside `finishing`: there the first signal is only remembered, for PATIENCE
-seconds.
+Work that must not be abandoned half-done runs inside `finishing`, where the first signal is only recorded, for
+PATIENCE seconds.
 """
 
 import _thread
@@ -14,7 +15,7 @@ import signal
 import threading
 from collections.abc import Iterator
 
-PATIENCE = 0.7  # seconds that work inside `finishing` has to end after the first signal
+PATIENCE = 0.7  # seconds after the first signal within which work inside `finishing` must end
 
 _asked = threading.Event()
 _finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blocks, started by the first signal
@@ -22,7 +23,7 @@ _finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blo
 
 @contextlib.contextmanager
 def signals_stop() -> Iterator[None]:
-    """Inside, SIGTERM (a batch system, a shutdown) does what Ctrl-C does: KeyboardInterrupt in the main thread."""
+    """In the block, SIGTERM (a batch system, a shutdown) acts like Ctrl-C: KeyboardInterrupt in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -47,9 +48,9 @@ def signals_stop() -> Iterator[None]:
 
 @contextlib.contextmanager
 def finishing() -> Iterator[None]:
-    """Inside, the first signal raises nothing for PATIENCE seconds; the work there calls `stop_asked`.
+    """In the block, the first signal raises nothing for PATIENCE seconds; the work there calls `stop_asked`.
 
-    After that time, or at a second signal, KeyboardInterrupt is raised as elsewhere.
+    After that time, or at a second signal, KeyboardInterrupt is raised as outside the block.
     """
     clock = threading.Timer(PATIENCE, _thread.interrupt_main)
     clock.daemon = True
@@ -62,5 +63,5 @@ def finishing() -> Iterator[None]:
 
 
 def stop_asked() -> bool:
-    """Whether a signal came since the command began."""
+    """Whether a signal has arrived since the command began."""
     return _asked.is_set()

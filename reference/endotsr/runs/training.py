@@ -1,8 +1,8 @@
 """A training that fills a run folder: started, resumed, logged, saved and stopped without loss.
 
-In: a sequence, settings, and an observer that is told of every iteration. Out: the run folder with log, checkpoints and
-run.json. A signal finishes the current iteration and writes a checkpoint; the errors say how to continue the run.
-Prints nothing itself.
+In: a sequence, settings, and an observer that is called at every iteration. Out: the run folder with log, checkpoints
+and run.json. After a signal the current iteration is finished and a checkpoint is written; the errors say how to
+continue the run. This module prints nothing itself.
 """
 
 import contextlib
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 class RunStopped(InputError):
-    """The file system refused in the middle of a run."""
+    """The file system refused a write in the middle of a run."""
 
 
 class Observer(Protocol):
-    """What is told of a training while it runs."""
+    """Callbacks of a training while it runs."""
 
     def begin(self, start: int) -> None:
         """The training begins after iteration `start`."""
@@ -41,7 +41,7 @@ class Observer(Protocol):
         """The log entry of one iteration."""
 
     def say(self, message: str) -> None:
-        """One line for a person."""
+        """One line of text for the user."""
 
     def close(self) -> None:
         """The training has ended."""
@@ -99,8 +99,8 @@ def train_run(
 ) -> "TrainingState":
     """Train from `state` to the end, with log, checkpoints and observer; returns the last state.
 
-    A signal finishes the current iteration and writes a checkpoint, so that nothing is lost. After a second signal, or
-    an iteration that takes too long, the last checkpoint remains.
+    After a signal the current iteration is finished and a checkpoint is written, so that nothing is lost. After a
+    second signal, or an iteration that takes too long, the last checkpoint remains.
 
     Raises:  KeyboardInterrupt or RunStopped (a full disk) with a line that says how to continue; the last checkpoint
              and the log up to it are whole in both cases. FloatingPointError if the loss is not finite.
@@ -164,10 +164,10 @@ class _Recorder:
         self._folder.update(status="finished", finished=now(), iterations_done=last.iteration, **self._costs())
 
     def stop(self, error: BaseException, state: "TrainingState") -> BaseException:
-        """Save what can be saved and mark the run; returns the error that says how to continue it."""
+        """Save the state if possible and mark the run; returns the error that says how to continue it."""
         if isinstance(error, KeyboardInterrupt) or stop_asked():
             if self._between_iterations:
-                with contextlib.suppress(OSError, KeyboardInterrupt):  # the checkpoint before is still there
+                with contextlib.suppress(OSError, KeyboardInterrupt):  # the previous checkpoint still exists
                     self._observer.say(f"stopping after iteration {state.iteration}, writing a checkpoint")
                     self.on_checkpoint(state)
             self._mark("interrupted")
@@ -183,7 +183,7 @@ class _Recorder:
         return f"{kept}; continue with `endotsr train --out {self._folder.path} --resume`"
 
     def _mark(self, status: str) -> None:
-        with contextlib.suppress(OSError):  # a full disk cannot take the note either
+        with contextlib.suppress(OSError):  # a full disk cannot hold this record either
             self._folder.update(status=status)
 
     def _costs(self) -> dict[str, Any]:

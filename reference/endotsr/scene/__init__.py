@@ -1,1 +1,1 @@
-"""What is fitted: the Gaussians as a structure of arrays, their initialisation and density control."""
+"""The fitted scene: the Gaussians as a structure of arrays, their initialisation and density control."""

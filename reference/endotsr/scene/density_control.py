@@ -1,14 +1,14 @@
 """Density control, equation (B11): add Gaussians where the screen gradient is large, remove those that are faint.
 
-In: Gaussians and gathered screen gradients. Out: new Gaussians, every array gathered by one index, and the plan of
-that gathering, by which the caller gathers whatever else it keeps for every Gaussian. This module knows no
-optimiser, no renderer and no iteration number.
+In: Gaussians and accumulated screen gradients. Out: new Gaussians, every array gathered by one index, and the gather
+plan, by which the caller gathers every other array that has one column per Gaussian. This module is independent of
+optimiser, renderer and iteration number.
 
 Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
 gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
 `dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
-removed. Scales are canonical, not deformed. Children inherit every other array; what an optimiser remembers of a
-Gaussian, it forgets for clones and children (`GatherPlan`).
+removed. Scales are canonical, not deformed. Children inherit every other array. Optimiser moments start at zero for
+clones and children (`GatherPlan`).
 Clones are not split in the same call.
 """
 
@@ -32,24 +32,24 @@ LARGEST_LOG_SCALE = 40.0  # beyond it a semi-axis is cut off before it is expone
 
 
 class DensityStatistics(NamedTuple):
-    """Screen gradients gathered since the last densification; changed in place."""
+    """Screen gradients accumulated since the last densification; changed in place."""
 
     gradient_sum: NDArray[np.float64]  # (N,) sum of gradient norms, loss per NDC unit
     visits: NDArray[np.int64]  # (N,) number of views in which the Gaussian was visible
 
 
 class GatherPlan(NamedTuple):
-    """Where the M new Gaussians come from: survivors first, then the fresh ones (clones and children)."""
+    """Origin of the M new Gaussians: survivors first, then the fresh ones (clones and children)."""
 
     source: IndexArray  # (M,) index among the old Gaussians: itself, or the parent
-    survivors: int  # columns from this one on are fresh
+    survivors: int  # first fresh column; all later ones are fresh too
 
 
 class Densified(NamedTuple):
     """Result of `densify`; counts refer to the Gaussians before it."""
 
     gaussians: Gaussians
-    plan: GatherPlan  # for moments and whatever else has one column per Gaussian
+    plan: GatherPlan  # for moments and all other arrays with one column per Gaussian
     statistics: DensityStatistics  # all zero
     cloned: int
     split: int
@@ -80,7 +80,7 @@ def scene_extent(config: DensityConfig, cameras: Sequence[Camera]) -> float:
     """The extent that separates clones from splits, scene units.
 
     A number is used as it is. `cameras`: 1.1 x the largest distance of a camera from the mean of all cameras.
-    Raises: InputError if `cameras` is asked for and all coincide; extent 0 would split everything and clone nothing.
+    Raises: InputError for `cameras` if all cameras coincide; extent 0 would split everything and clone nothing.
     """
     if config.extent != "cameras":
         return float(config.extent)
@@ -98,14 +98,14 @@ def densify(
     rng: np.random.Generator,
     extent: float,
 ) -> Densified:
-    """Clone, split and prune in one gather; the inputs are left as they are.
+    """Clone, split and prune in one gather; the inputs are not changed.
 
     extent   scene units, see `scene_extent`
     returns  survivors in their old order, then clones, then first children, then second children, the last three
              in the order of their parents; the plan of this order; statistics of zeros
 
-    Edges: never visited -> gradient 0; N = 0 and pruning down to 0 are fine; when `maximum` leaves no room for
-    all, the steepest candidates go first (ties by index).
+    Edges: never visited -> gradient 0; N = 0 and pruning down to 0 are allowed; when `maximum` leaves no room for
+    all, the candidates with the largest gradients are taken first (ties by index).
     Draws: one `rng.standard_normal((2, 3, S))` for S split parents, none if S = 0.
     """
     alive, clone, split = _choose(gaussians, statistics, config, extent)
@@ -125,7 +125,7 @@ def densify(
 def _choose(
     gaussians: Gaussians, statistics: DensityStatistics, config: DensityConfig, extent: float
 ) -> tuple[NDArray[np.bool_], IndexArray, IndexArray]:
-    """Who stays (N,) bool, and the indices of those to clone and to split, ascending."""
+    """Which Gaussians stay (N,) bool, and the indices of those to clone and to split, ascending."""
     if statistics.visits.size != gaussians.count:
         raise ValueError(f"statistics of {statistics.visits.size} for {gaussians.count} Gaussians")
     alive = ~_fainter_than(gaussians.opacity_logit, config.prune_opacity)

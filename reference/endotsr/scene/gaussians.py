@@ -15,13 +15,13 @@ DEFORMATION_CHANNELS = 10
 
 
 class Gaussians(NamedTuple):
-    """Raw (pre-activation) parameters of N Gaussians. A component that is switched off is None: no memory, no work."""
+    """Raw (pre-activation) parameters of N Gaussians. A component that is off is None and costs no memory or time."""
 
     position: FloatArray  # (3, N)  canonical centre mu, scene units
     quaternion: FloatArray  # (4, N)  w, x, y, z; normalised in the forward pass
     log_scale: FloatArray  # (3, N)  natural log of the semi-axes, scene units
     opacity_logit: FloatArray  # (N,)
-    harmonics: FloatArray  # (K, 3, N)  K = (degree + 1)^2; [band, channel, Gaussian]
+    harmonics: FloatArray  # (K, 3, N)  K = (degree + 1)^2; [coefficient, channel, Gaussian]
     fdm_weight: FloatArray | None = None  # (10, B, N)  w of the flexible deformation model
     fdm_centre: FloatArray | None = None  # (10, B, N)  theta, normalised time
     fdm_width: FloatArray | None = None  # (10, B, N)  sigma, normalised time

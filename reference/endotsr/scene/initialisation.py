@@ -5,7 +5,7 @@ frame k (every second frame of clips beyond 150 frames), up to int(other_frame_p
 not seen in the first frame or whose depth moved by more than `motion_threshold`. Held-out frames are never read.
 Pixels of different frames are compared at equal image position, as the published rule does.
 
-In: a `Sequence`. Out: `Gaussians`. This module knows no optimiser.
+In: a `Sequence`. Out: `Gaussians`. This module is independent of the optimiser.
 """
 
 from typing import Any
@@ -39,10 +39,10 @@ def initialise(
     returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
              isotropic scale = root mean squared distance to the three nearest points; FDM weights 0
 
-    Edges:  fewer pixels than asked for -> all of them; fewer than four points -> the neighbours there are; one
-            point or duplicates -> the floor of the squared distance.
+    Edges:  fewer pixels than requested -> all of them; fewer than four points -> the mean over the existing
+            neighbours; one point or duplicates -> the floor of the squared distance.
     Raises: InputError if no training pixel is tissue with depth.
-    Draws:  one `rng.choice` without replacement per visited frame that has more pixels than are wanted.
+    Draws:  one `rng.choice` without replacement per visited frame that has more pixels than requested.
     """
     position, colour = training_points(sequence, config, rng)
     return gaussians_at(position, colour, model, dtype)
@@ -61,7 +61,7 @@ def training_points(
     drawn = [(first, _draw(seen, config.first_frame_points, rng))]
     for k in train[1:]:
         if (k - first - 1) % stride == 0:
-            with np.errstate(invalid="ignore"):  # inf - inf: such pixels are not usable anyway
+            with np.errstate(invalid="ignore"):  # inf - inf: such pixels are excluded anyway
                 moved = np.abs(sequence.depth[k] - sequence.depth[first]) > config.motion_threshold
             wanted = _usable(sequence, k) & (~seen | moved)
             drawn.append((k, _draw(wanted, config.other_frame_points // count, rng)))

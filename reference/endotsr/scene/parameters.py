@@ -1,11 +1,12 @@
 """Parameters that are not per Gaussian: one value for each training frame.
 
 The frame is the LAST axis of every array, as the Gaussian is in `Gaussians`. Density control never touches these
-arrays; the optimiser and the checkpoint know them by field name, beside those of the Gaussians. A parameter that is
+arrays; optimiser and checkpoint hold them by field name, beside those of the Gaussians. A parameter that is
 switched off is None, and a model without any has no `FrameParameters` at all. (A parameter of the whole sequence
 is a field without the frame axis.)
 
-To add one: a field here, its setting and its rate (`learning_rates`), and its forward and reverse pass where it acts.
+A new parameter needs a field here, a setting and a rate (`learning_rates`), and a forward and a reverse pass where it
+acts.
 """
 
 from typing import NamedTuple

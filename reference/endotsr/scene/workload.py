@@ -17,7 +17,7 @@ WIDTH, HEIGHT, FOCAL = 640, 512, 570.0
 SIGMA_PIXELS = {20_000: 3.6, 60_000: 2.4, 150_000: 1.7}
 BORDER = 0.04  # fraction of the picture beyond each border that holds Gaussians too
 OPAQUE_FRACTION = 0.55
-FRAMES = 9  # of the sequence, if nothing else is asked for: frame 1 is held out
+FRAMES = 9  # default number of frames of the sequence: frame 1 is held out
 
 
 def camera(width: int = WIDTH, height: int = HEIGHT) -> Camera:
@@ -64,7 +64,7 @@ def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> G
 
 
 def _facing(rng: np.random.Generator, count: int) -> FloatArray:
-    """Quaternions (4, N): tilted by about 17 degrees around a random axis in the picture plane, after a random spin."""
+    """Quaternions (4, N): a random spin, then a tilt of about 17 degrees about a random axis in the picture plane."""
     tilt, azimuth, spin = rng.normal(0, 0.3, count) / 2, rng.uniform(0, 2 * np.pi, count), rng.uniform(0, np.pi, count)
     cos, sin_x, sin_y = np.cos(tilt), np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)
     w, z = np.cos(spin), np.sin(spin)
@@ -93,7 +93,7 @@ def _normal(
 ) -> FloatArray:
     """Normal numbers about `middle` (one per index of the second axis), a row at a time.
 
-    The memory of a million Gaussians is that of their training, not that of a float64 draft.
+    Drawing by rows avoids a float64 copy of the whole array, so that peak memory is that of the training.
     """
     out = np.empty(shape, dtype)
     for block in out:
@@ -103,7 +103,7 @@ def _normal(
 
 
 def sequence(width: int = WIDTH, height: int = HEIGHT, seed: int = 11, frames: int = FRAMES) -> Sequence:
-    """Frames to compare with: a soft moving pattern with fine texture; an instrument hides one corner."""
+    """Target frames: a smooth moving pattern with fine texture, with one corner covered by an instrument."""
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[0:height, 0:width].astype(np.float64)
     column, row = column * (WIDTH / width), row * (HEIGHT / height)

@@ -27,8 +27,8 @@ class Camera(NamedTuple):
 class CameraGrads(NamedTuple):
     """Derivative of a loss by the camera pose, every entry of the rotation matrix taken as independent."""
 
-    rotation: FloatArray  # (3, 3)
-    translation: FloatArray  # (3,)
+    d_rotation: FloatArray  # (3, 3)
+    d_translation: FloatArray  # (3,)
 
 
 def camera_centre(camera: Camera) -> FloatArray:

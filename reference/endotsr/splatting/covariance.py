@@ -40,8 +40,8 @@ class CovarianceSaved(NamedTuple):
 class CovarianceGrads(NamedTuple):
     """Gradients by the raw parameters."""
 
-    quaternion: FloatArray  # (4, N)
-    log_scale: FloatArray  # (3, N)
+    d_quaternion: FloatArray  # (4, N)
+    d_log_scale: FloatArray  # (3, N)
 
 
 # One Gaussian: the formulas of the specification, each above its reverse.

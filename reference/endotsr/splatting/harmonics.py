@@ -38,10 +38,10 @@ class HarmonicsSaved(NamedTuple):
 class HarmonicsGrads(NamedTuple):
     """Gradients of the colour stage."""
 
-    harmonics: FloatArray  # (K, 3, N); zero above the active degree
-    residual: FloatArray | None  # (3, N), None when there was no residual
-    position: FloatArray  # (3, N) through the view direction
-    centre: FloatArray  # (3,) camera centre
+    d_harmonics: FloatArray  # (K, 3, N); zero above the active degree
+    d_residual: FloatArray | None  # (3, N), None when there was no residual
+    d_position: FloatArray  # (3, N) through the view direction
+    d_centre: FloatArray  # (3,) camera centre
 
 
 # The number of coefficients is known at run time only: the formulas fill rows of a group, one for each Y_k, and the sum

@@ -60,12 +60,12 @@ def footprint(projected: Projected) -> FloatArray:
 
 
 class ProjectionGrads(NamedTuple):
-    """Gradients of the projection. `camera` is None unless it was asked for."""
+    """Gradients of the projection. `d_camera` is None unless it was asked for."""
 
-    position: FloatArray  # (3, N)
-    rotation: FloatArray  # (3, 3, N)
-    scale: FloatArray  # (3, N)
-    camera: CameraGrads | None
+    d_position: FloatArray  # (3, N)
+    d_rotation: FloatArray  # (3, 3, N)
+    d_scale: FloatArray  # (3, N)
+    d_camera: CameraGrads | None
 
 
 def projection_forward(
@@ -139,8 +139,8 @@ def projection_reverse_footprint(
         saved.position, saved.shape.rotation.reshape(9, n), saved.shape.scale, saved.lens, saved.pose, saved.rules,
         saved.projected.visible, saved.projected.determinant, d_mean2d, d_footprint, d_depth, d_out,
     )  # fmt: skip
-    camera = None
+    d_camera = None
     if pose_gradient:
         d_pose = sum_columns(d_out[WITHOUT_POSE:], POSES_PER_SUM)
-        camera = CameraGrads(d_pose[:9].reshape(3, 3), d_pose[9:])
-    return ProjectionGrads(d_out[:3], d_out[6:WITHOUT_POSE].reshape(3, 3, n), d_out[3:6], camera)
+        d_camera = CameraGrads(d_pose[:9].reshape(3, 3), d_pose[9:])
+    return ProjectionGrads(d_out[:3], d_out[6:WITHOUT_POSE].reshape(3, 3, n), d_out[3:6], d_camera)

@@ -62,18 +62,18 @@ class RenderSaved(NamedTuple):
 
 
 class RenderGrads(NamedTuple):
-    """Gradients of one view; `background` and `camera` are None unless requested."""
+    """Gradients of one view; `d_background` and `d_camera` are None unless requested."""
 
-    position: FloatArray
-    quaternion: FloatArray
-    log_scale: FloatArray
-    opacity_logit: FloatArray
-    harmonics: FloatArray
-    residual: FloatArray | None
-    mean2d: FloatArray  # (2, N) dL/d(u, v) per px, for density control
+    d_position: FloatArray
+    d_quaternion: FloatArray
+    d_log_scale: FloatArray
+    d_opacity_logit: FloatArray
+    d_harmonics: FloatArray
+    d_residual: FloatArray | None
+    d_mean2d: FloatArray  # (2, N) dL/d(u, v) per px, for density control
     visible: NDArray[np.bool_]  # (N,) reached at least one pixel box
-    background: FloatArray | None
-    camera: CameraGrads | None
+    d_background: FloatArray | None
+    d_camera: CameraGrads | None
 
 
 def check_finite(arrays: Mapping[str, FloatArray | None]) -> None:
@@ -170,20 +170,20 @@ def render_reverse(
         projection = projection_reverse_footprint(
             d_mean2d, d_footprint, d_z, saved.projection, pose_gradient=pose_gradient
         )
-        covariance = covariance_reverse(Shape(projection.rotation, projection.scale), saved.covariance)
+        covariance = covariance_reverse(Shape(projection.d_rotation, projection.d_scale), saved.covariance)
     return RenderGrads(
-        position=projection.position + harmonics.position,
-        quaternion=covariance.quaternion,
-        log_scale=covariance.log_scale,
-        opacity_logit=d_logit,
-        harmonics=harmonics.harmonics,
-        residual=harmonics.residual,
-        mean2d=d_mean2d,
+        d_position=projection.d_position + harmonics.d_position,
+        d_quaternion=covariance.d_quaternion,
+        d_log_scale=covariance.d_log_scale,
+        d_opacity_logit=d_logit,
+        d_harmonics=harmonics.d_harmonics,
+        d_residual=harmonics.d_residual,
+        d_mean2d=d_mean2d,
         visible=saved.visible,
-        background=compositing.background_gradient(d_colour, composite.out.transmittance)
+        d_background=compositing.background_gradient(d_colour, composite.out.transmittance)
         if background_gradient
         else None,
-        camera=_pose_gradient(projection.camera, harmonics.centre, saved.camera) if pose_gradient else None,
+        d_camera=_pose_gradient(projection.d_camera, harmonics.d_centre, saved.camera) if pose_gradient else None,
     )
 
 
@@ -224,5 +224,5 @@ def _pose_gradient(projection: CameraGrads | None, d_centre: FloatArray, camera:
     translation = np.asarray(camera.translation, d_centre.dtype)
     rotation = np.asarray(camera.rotation, d_centre.dtype)
     return CameraGrads(
-        projection.rotation - np.outer(translation, d_centre), projection.translation - rotation @ d_centre
+        projection.d_rotation - np.outer(translation, d_centre), projection.d_translation - rotation @ d_centre
     )

@@ -34,7 +34,7 @@ IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
 
 
 class CompositeSaved(NamedTuple):
-    """What the reverse pass of a compositor needs, and the gather behind it."""
+    """Inputs of the reverse pass of a compositor and of the gather that follows it."""
 
     compositor: Any  # saved tuple of either compositor
     transmittance: NDArray  # (H, W)
@@ -74,9 +74,9 @@ def _composite_reverse(cotangents: Inputs, saved: CompositeSaved) -> Found:
         conic_epsilon=CONIC_EPSILON if deviations.conic_epsilon else 0.0,
         keep_depth=not deviations.drop_depth_to_z,
     )  # fmt: skip
-    names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth")
-    background = compositing.background_gradient(colour, saved.transmittance)
-    return dict(zip(names, grads)) | {"background": background}
+    names = ("d_mean2d", "d_covariance2d", "d_opacity_logit", "d_colour", "d_depth")
+    d_background = compositing.background_gradient(colour, saved.transmittance)
+    return dict(zip(names, grads)) | {"d_background": d_background}
 
 
 def _composite_trace(inputs: Inputs, settings: Settings, saved: CompositeSaved) -> dict[str, NDArray]:
@@ -134,11 +134,10 @@ def _render(inputs: Inputs, settings: Settings) -> tuple[Found, RenderSaved]:
 def _render_reverse(cotangents: Inputs, saved: RenderSaved) -> Found:
     colour, depth, opacity = (cotangents[name] for name in IMAGES)
     grads = render_reverse(colour, depth, opacity, saved, background_gradient=True, pose_gradient=True)
-    assert grads.camera is not None and grads.background is not None
-    found = {name: getattr(grads, name) for name in (*Scene._fields, "mean2d", "background")}
-    dtype = saved.scene.position.dtype
-    pose_gradient = {"rotation_matrix": grads.camera.rotation, "translation": grads.camera.translation}
-    return found | {name: value.astype(dtype) for name, value in pose_gradient.items()}
+    assert grads.d_camera is not None and grads.d_background is not None
+    found = {f"d_{name}": getattr(grads, f"d_{name}") for name in (*Scene._fields, "mean2d", "background")}
+    dtype, (d_rotation, d_translation) = saved.scene.position.dtype, grads.d_camera
+    return found | {"d_rotation_matrix": d_rotation.astype(dtype), "d_translation": d_translation.astype(dtype)}
 
 
 def _render_trace(inputs: Inputs, settings: Settings, saved: RenderSaved) -> dict[str, NDArray]:
@@ -160,7 +159,7 @@ HARMONICS = {f"harmonics degree {d}": slice(d * d, (d + 1) ** 2) for d in range(
 
 
 def _variants(stage: str) -> tuple[Variant, ...]:
-    """The definition with both presets, and the fast compositor where it answers too."""
+    """The definition with both presets, and the fast compositor where it applies."""
     made = []
     for name, raster in (("exact", EXACT), ("paper", WIDE), ("blocks", WIDE)):
         common = {"raster": raster_dict(raster), "_compositor": "blocks" if name == "blocks" else "definition"}

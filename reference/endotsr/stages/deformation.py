@@ -1,4 +1,4 @@
-"""The stage of the flexible deformation model (B1); one variant a time basis, so that neither can go unchecked."""
+"""The stage of the flexible deformation model (B1); one variant a time basis, so that both are checked."""
 
 from functools import partial
 
@@ -22,8 +22,7 @@ def _deformation(inputs: Inputs, settings: Settings) -> tuple[Found, Deformation
 
 
 def _deformation_reverse(cotangents: Inputs, saved: DeformationSaved) -> Found:
-    grads = deformation_reverse(cotangents["offsets"], saved)
-    return {"fdm_weight": grads.weight, "fdm_centre": grads.centre, "fdm_width": grads.width, "t": grads.t}
+    return deformation_reverse(cotangents["offsets"], saved)._asdict()
 
 
 def _inputs(rng: np.random.Generator, spread: float) -> dict[str, NDArray]:

@@ -31,7 +31,7 @@ def _laplacian(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Laplaci
 
 
 def _laplacian_reverse(cotangents: Inputs, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
-    return {"rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
+    return {"d_rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
 
 
 def _bands(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
@@ -64,7 +64,7 @@ def _kink_distance(rendered: NDArray, masks: SupportMasks) -> float:
 
 def _variant(rule: Upsampling) -> Variant:
     def inputs(rng: np.random.Generator) -> dict[str, NDArray]:
-        """Of 16 draws the one whose valid band differences stay furthest from the kink of |.|."""
+        """The one of 16 draws whose valid band differences are furthest from the kink of |.|."""
         masks = support_masks(tissue_mask(), LEVELS, rule)
         draws = [observed_image() + rng.normal(0.0, 0.3, IMAGE_SHAPE) for _ in range(16)]
         return {"rendered": max(draws, key=lambda rendered: _kink_distance(rendered, masks))}
@@ -124,7 +124,7 @@ STAGES = [
     Stage(
         name="calibration",
         equation="7",
-        text="detail weight from gradient images",
+        text="Laplacian weight from gradient images",
         function="endotsr.equations.calibration.calibrate",
         inputs={"d_photometric": PER_DISPLAY, "d_laplacian": PER_DISPLAY},
         forward=_calibration,

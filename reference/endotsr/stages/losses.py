@@ -25,7 +25,7 @@ PER_DISPLAY, PER_LENGTH = "loss per display unit", "loss per scene unit"
 
 
 def _mask() -> NDArray[np.bool_]:
-    """A tool that reaches in from the right and one excluded pixel alone."""
+    """An instrument that enters from the right, and one isolated excluded pixel."""
     mask = np.ones((HEIGHT, WIDTH), bool)
     mask[2:5, 8:] = False
     mask[7, 2] = False
@@ -49,7 +49,7 @@ def _l1(inputs: Inputs, settings: Settings) -> tuple[Found, MaskedL1Saved]:
 
 
 def _l1_reverse(cotangents: Inputs, saved: MaskedL1Saved) -> Found:
-    return {"rendered": masked_l1_reverse(float(cotangents["loss"]), saved)}
+    return {"d_rendered": masked_l1_reverse(float(cotangents["loss"]), saved)}
 
 
 def _l1_trace(inputs: Inputs, settings: Settings, saved: MaskedL1Saved) -> dict[str, NDArray]:
@@ -72,7 +72,7 @@ def _ssim(inputs: Inputs, settings: Settings) -> tuple[Found, SsimSaved]:
 
 
 def _ssim_reverse(cotangents: Inputs, saved: SsimSaved) -> Found:
-    return {"rendered": masked_ssim_reverse(float(cotangents["ssim"]), saved)}
+    return {"d_rendered": masked_ssim_reverse(float(cotangents["ssim"]), saved)}
 
 
 def _ssim_inputs(rng: Random) -> dict[str, NDArray]:
@@ -89,7 +89,7 @@ def _depth(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[DepthSaved,
 
 
 def _depth_reverse(cotangents: Inputs, saved: tuple[DepthSaved, DepthTarget]) -> Found:
-    return {"rendered_depth": normalised_depth_reverse(float(cotangents["loss"]), saved[0])}
+    return {"d_rendered_depth": normalised_depth_reverse(float(cotangents["loss"]), saved[0])}
 
 
 def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[DepthSaved, DepthTarget]) -> dict[str, NDArray]:

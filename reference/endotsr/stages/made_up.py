@@ -1,4 +1,4 @@
-"""A camera and a few Gaussians that the gradient checks of the rasteriser and of the objective look at."""
+"""A camera and a few Gaussians for the gradient checks of the rasteriser and of the objective."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,8 @@ WIDTH, HEIGHT = 21, 17
 COUNT = 8
 LENS = {"fx": 19.0, "fy": 23.0, "cx": 9.5, "cy": 9.0, "width": WIDTH, "height": HEIGHT}
 # Every visible Gaussian of `raw_gaussians` stays above this alpha at every pixel, or below it at every pixel: no ring
-# of the cutoff crosses the image, so differences see the smooth part. The ring itself is pinned in tests/splatting.
+# of the cutoff crosses the image, so differences are taken on the smooth part. The ring itself is tested in
+# tests/splatting.
 WIDE = PAPER._replace(alpha_cutoff=1e-4)
 AXES = {f"position {axis}": (k, slice(None)) for k, axis in enumerate("xyz")}  # blocks of a position array
 

@@ -30,7 +30,7 @@ from endotsr.stages.requests import Tape, config_of, gaussians_of, model_of, seq
 from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, real_of
 
 RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
-CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent asks for poses only
+CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent reads poses only
 
 
 def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
@@ -68,7 +68,7 @@ def _schedule(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Statistics of some views, then one densification. Indices travel in the harmonics, ones in the first moments."""
+    """Statistics of some views, then one densification. The harmonics hold indices, the first moments ones."""
     config, count = msgspec.convert(settings["density"], DensityConfig), inputs["opacity_logit"].size
     names = ("position", "quaternion", "log_scale", "opacity_logit")
     index = np.arange(float(count))[None, None]

@@ -42,13 +42,13 @@ def _projection(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Projec
 def _projection_reverse(cotangents: Inputs, saved: tuple[Projected, ProjectionSaved]) -> Found:
     d_mean, d_covariance, d_depth = (cotangents[name] for name in ("mean2d", "covariance2d", "depth"))
     grads = projection_reverse(d_mean, d_covariance, d_depth, saved[1], pose_gradient=True)
-    assert grads.camera is not None
+    assert grads.d_camera is not None
     return {
-        "position": grads.position,
-        "rotation": grads.rotation,
-        "scale": grads.scale,
-        "rotation_matrix": grads.camera.rotation,
-        "translation": grads.camera.translation,
+        "d_position": grads.d_position,
+        "d_rotation": grads.d_rotation,
+        "d_scale": grads.d_scale,
+        "d_rotation_matrix": grads.d_camera.d_rotation,
+        "d_translation": grads.d_camera.d_translation,
     }
 
 
@@ -95,7 +95,7 @@ def _harmonics_variant(degree: int) -> Variant:
     count = (degree + 1) ** 2
 
     def inputs(rng: Random) -> dict[str, NDArray]:
-        """Colours on both sides of the clamp at zero, none near it; in degree 0 the direction has no say."""
+        """Colours on both sides of the clamp at zero, none near it; in degree 0 the direction has no effect."""
         made = {
             "harmonics": rng.uniform(-0.2, 0.2, (count, 3, COUNT)) / count,
             "residual": rng.uniform(-0.1, 0.1, (3, COUNT)),

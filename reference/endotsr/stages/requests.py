@@ -1,7 +1,7 @@
 """Readers of requests: from arrays and settings by name to the structures of the package.
 
-A setting that begins with an underscore is not part of a case: `_compositor` chooses which of the two compositors of
-the reference answers, which must not matter.
+A setting that begins with an underscore is not part of a case: `_compositor` chooses between the two compositors of
+the reference, whose results must agree.
 """
 
 from typing import Any
@@ -37,7 +37,7 @@ def raster_of(settings: Settings) -> RasterSettings:
 
 
 def raster_dict(raster: RasterSettings) -> dict:
-    """The other way round."""
+    """The rasteriser settings as settings of a case."""
     return raster._asdict() | {"deviations": raster.deviations._asdict()}
 
 
@@ -47,7 +47,7 @@ def camera_of(inputs: Inputs, settings: Settings) -> Camera:
 
 
 def compositor_of(settings: Settings) -> Compositor:
-    """Which compositor answers; both give the same up to rounding.
+    """The compositor of a request; both give the same result up to rounding.
 
     `blocks` only where it computes these settings.
     Raises: ValueError for any other name.
@@ -105,7 +105,7 @@ def sequence_of(inputs: Inputs, lens: dict[str, float]) -> Sequence:
 
 
 class Tape:
-    """In place of the random generator of a run: frames and split noise come from the inputs, in order."""
+    """A substitute for the random generator of a run: frames and split noise come from the inputs, in order."""
 
     def __init__(self, frames: NDArray, noise: NDArray) -> None:
         self.frames, self.noise = list(map(int, frames)), noise

@@ -46,7 +46,7 @@ def _scene(inputs: Inputs, settings: Settings) -> tuple[Found, SceneSaved]:
 
 
 class ObjectiveSaved(NamedTuple):
-    """What the reverse pass, the further outputs and the trace need."""
+    """Inputs of the reverse pass, of the further outputs and of the trace."""
 
     view: ViewGradients
     targets: Targets
@@ -69,7 +69,7 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, ObjectiveSave
 
 
 def _exposure(inputs: Inputs) -> Exposure | None:
-    """That of the frame, if the request holds one."""
+    """The exposure of the frame, if the request holds one."""
     given = "exposure_log_gain" in inputs
     return Exposure(inputs["exposure_log_gain"], inputs["exposure_bias"]) if given else None
 
@@ -77,9 +77,9 @@ def _exposure(inputs: Inputs) -> Exposure | None:
 def _objective_reverse(cotangents: Inputs, saved: ObjectiveSaved) -> Found:
     """The gradients of the view, times the cotangent of the loss."""
     view, up = saved.view, float(cotangents["objective"])
-    exposure = {} if view.exposure is None else view.exposure._asdict()
-    gradients = view.gradients | {f"exposure_{name}": array for name, array in exposure.items()}
-    return {name: array * array.dtype.type(up) for name, array in gradients.items()}
+    d_exposure = {} if view.d_exposure is None else view.d_exposure._asdict()
+    gradients = view.gradients | {f"exposure_{name}": array for name, array in d_exposure.items()}
+    return {f"d_{name}": array * array.dtype.type(up) for name, array in gradients.items()}
 
 
 def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> Found:
@@ -112,7 +112,7 @@ def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) 
 
 
 def _objective_inputs(rng: np.random.Generator) -> dict[str, NDArray]:
-    """Every component off zero, so that no gradient vanishes for want of a coefficient."""
+    """Every component away from zero, so that no gradient vanishes because a coefficient is 0."""
     scene = raw_gaussians(rng)
     del scene["residual"]
     shape = (10, BASES, COUNT)

@@ -45,8 +45,7 @@ def _dictionary(inputs: Inputs, settings: Settings) -> tuple[Found, DictionarySa
 
 
 def _dictionary_reverse(cotangents: Inputs, saved: DictionarySaved) -> Found:
-    grads = dictionary_reverse(cotangents["phi"], saved)
-    return {"t": grads.t, "omega": grads.omega}
+    return dictionary_reverse(cotangents["phi"], saved)._asdict()
 
 
 def _dictionary_inputs(rng: Random) -> dict[str, NDArray]:
@@ -62,7 +61,7 @@ def _atoms(inputs: Inputs, settings: Settings) -> tuple[Found, NormaliseSaved]:
 
 
 def _atoms_reverse(cotangents: Inputs, saved: NormaliseSaved) -> Found:
-    return {"phi": normalise_reverse(cotangents["phi_bar"], saved)}
+    return {"d_phi": normalise_reverse(cotangents["phi_bar"], saved)}
 
 
 def _statistics(inputs: Inputs, settings: Settings, saved: NormaliseSaved) -> Found:
@@ -131,11 +130,11 @@ def _matern(inputs: Inputs, settings: Settings) -> tuple[Found, MaternSaved]:
 
 
 def _matern_reverse(cotangents: Inputs, saved: MaternSaved) -> Found:
-    return {"motion_coefficients": matern_penalty_reverse(float(cotangents["penalty"]), saved)}
+    return {"d_motion_coefficients": matern_penalty_reverse(float(cotangents["penalty"]), saved)}
 
 
 def _matern_inputs(rng: Random) -> dict[str, NDArray]:
-    # rho spans five decades; this scale lets every atom count alike, so that none is lost in the rounding of another
+    # rho spans five decades; this scale gives all atoms equal weight, so that none is lost in the rounding of another
     rho = matern_weights(frequencies(FREQUENCIES, 1.0, 16.0), LENGTH)
     scale = 0.5 / np.sqrt(np.tile(rho, 2))[:, None]
     return {"motion_coefficients": scale * rng.normal(0.0, 1.0, (3, 2 * FREQUENCIES, GAUSSIANS))}
@@ -154,7 +153,7 @@ STAGES = [
     Stage(
         name="dictionary",
         equation="1",
-        text="atoms at one time and the way back",
+        text="atoms at one time, forward and reverse",
         function="endotsr.equations.dictionary.dictionary_forward",
         inputs={"t": "1", "omega": "cycles per sequence"},
         forward=_dictionary,

@@ -1,4 +1,4 @@
-"""What a stage is: a forward pass, its reverse pass, the arrays that it answers and the inputs it is checked at.
+"""A stage: a forward pass, its reverse pass, the arrays that it returns and the inputs at which it is checked.
 
 The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss by NAME: a
 cotangent where NAME is an output, a gradient where it is an input.
@@ -19,7 +19,7 @@ Blocks = Mapping[str, tuple[str, object]]
 
 
 class Asked(NamedTuple):
-    """An array that a stage answers, and how a golden case judges it."""
+    """An array that a stage returns, and how a golden case judges it."""
 
     level: int
     unit: str = "1"
@@ -68,7 +68,7 @@ class Stage(NamedTuple):
     inputs    unit by name of every array that a request may hold, cotangents apart
     forward   (inputs, settings) -> (outputs that can be differentiated, saved)
     asked     outputs, `extra` outputs and gradients in the order in which they are stored and judged
-    reverse   (cotangents by output name, saved) -> gradients by input name; None = not differentiated
+    reverse   (cotangents by output name, saved) -> gradients, named `d_` and the input; None = not differentiated
     extra     (inputs, settings, saved) -> further outputs, which are not differentiated
     trace     (inputs, settings, saved) -> the discrete decisions of the forward pass (order, contributors, clamps,
               signs); a finite difference across a change of them is refused. None = no decisions
@@ -90,7 +90,7 @@ class Stage(NamedTuple):
     is_loss: bool = False
 
     def compute(self, inputs: Inputs, settings: Settings) -> Outputs:
-        """Everything that can be answered: outputs, and gradients where the request holds every cotangent.
+        """All results of a request: outputs, and gradients where the request holds every cotangent.
 
         returns  arrays by name in C order; may hold more, or fewer, names than `asked`
         """
@@ -101,7 +101,7 @@ class Stage(NamedTuple):
         given = {name: inputs[f"d_{name}"] for name in outputs if f"d_{name}" in inputs}
         cotangents = dict.fromkeys(outputs, np.array(1.0)) | given if self.is_loss else given
         if self.reverse is not None and cotangents.keys() == outputs.keys():
-            found |= {f"d_{name}": value for name, value in self.reverse(cotangents, saved).items()}
+            found |= self.reverse(cotangents, saved)
         return tidy(found)
 
     def checks(self, settings: Settings) -> tuple[str, ...]:
@@ -118,7 +118,7 @@ def real_of(inputs: Inputs) -> np.dtype:
 
 
 def tidy(found: Found) -> Outputs:
-    """Outputs as C-ordered arrays; what is None was not asked for."""
+    """Outputs as C-ordered arrays; None marks an output that was not requested."""
     return {name: np.array(value, order="C") for name, value in found.items() if value is not None}
 
 

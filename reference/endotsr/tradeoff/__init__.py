@@ -1,6 +1,6 @@
-"""What accuracy costs in time: errors against the certified exact renderer, beside seconds and visits.
+"""Accuracy against time: errors against the certified exact renderer, beside seconds and visits.
 
-`scenes` what is rendered; `settings` the dials; `measure` errors and costs of one setting; `certificate` why the
-reference can be trusted; `study` all of it; `front` what is not dominated; `budget` advice; `training` the same for
-fits; `figures` and `page` what a person sees.
+`scenes` are the rendered scenes; `settings` the dials; `measure` gives errors and costs of one setting; `certificate`
+verifies the reference; `study` runs the whole measurement; `front` finds the settings that are not dominated; `budget`
+chooses among them; `training` does the same for fits; `figures` and `page` present the results.
 """

@@ -1,4 +1,4 @@
-"""`--budget`: what a person can afford, in a person's words, and the measured setting that keeps it.
+"""`--budget`: a limit on time or error as text, and the best measured setting within it.
 
 Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), an error (`1/255`, `0.5/255`, `1e-3`, in display units), or a
 training time (`5 min`, `1 h`).
@@ -19,7 +19,7 @@ FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class Budget(NamedTuple):
-    """What may be spent: seconds a frame, a largest error in display units, or seconds of training."""
+    """A limit: seconds per frame, a largest error in display units, or seconds of training."""
 
     kind: Kind
     amount: float
@@ -27,7 +27,7 @@ class Budget(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """A measured setting that keeps a budget."""
+    """A measured setting within a budget."""
 
     point: dict[str, Any]
     lines: list[str]
@@ -58,10 +58,10 @@ def _quotient(numerator: float, denominator: float) -> float:
 
 
 def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
-    """The setting of the front, by time of a frame, that keeps the budget.
+    """The setting of the front, by time of a frame, that is within the budget.
 
-    A time: the most accurate one whose upper quartile keeps it. An error: the fastest one that errs no more.
-    Raises InputError with the reason when none does.
+    For a time, it is the most accurate one whose upper quartile is within the budget; for an error, the fastest one
+    whose largest error is within it. Raises InputError with the reason when none is.
     """
     by_name = {p["name"]: p for p in result["points"]}
     front = [by_name[name] for name in result["fronts"]["forward"]]
@@ -81,7 +81,7 @@ def frame_advice(result: dict[str, Any], budget: Budget) -> Advice:
         if not kept:
             best = min(front, key=lambda p: p["error"]["max"])
             raise InputError(
-                f"--budget {budget.text}: no measured setting errs so little on {where}; the most accurate is "
+                f"--budget {budget.text}: no measured setting reaches this error on {where}; the most accurate is "
                 f"{best['name']} with a largest error of {best['error']['max']:.2g}"
             )
         chosen = min(kept, key=lambda p: p["forward"]["median"])
@@ -100,7 +100,7 @@ def _expectation(point: dict[str, Any]) -> list[str]:
 
 
 def settings_words(setting: dict[str, Any]) -> str:
-    """The options of `endotsr train` that ask for this setting."""
+    """The options of `endotsr train` for this setting."""
     raster = setting["raster"]
     words = [
         f"--raster.alpha-cutoff {raster['alpha_cutoff']:.4g}",

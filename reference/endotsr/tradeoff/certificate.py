@@ -1,11 +1,11 @@
-"""Why the reference can be trusted: the exact path against its own limit, and against 30 decimal digits.
+"""Verification of the reference: the exact path against its own limit, and against 30 decimal digits.
 
-Three statements, each with its figure: the exact path equals a cutoff of 1e-14 (so nothing is lost in a support, a
-stop or a clamp); cutoffs of 1e-12 and 1e-14 agree, so that the limit is reached; and twenty pixels, computed from the
-raw parameters in mpmath by the formulas alone, equal those of the exact path.
+Three statements, each with its figure. The exact path equals a cutoff of 1e-14, so nothing is lost in a support, a
+stop or a clamp. Cutoffs of 1e-12 and 1e-14 agree, so the limit is reached. Twenty pixels, computed from the raw
+parameters in mpmath by the formulas alone, equal those of the exact path.
 
-How far 1e-12 and 1e-14 may differ depends on the scene: by a few 1e-12 on a surface, by tens where hundreds of faint
-Gaussians lie behind each other, each of which loses its rim. The reference itself is a hundred times nearer.
+The difference between 1e-12 and 1e-14 depends on the scene: a few 1e-12 on a surface, and tens of 1e-12 where hundreds
+of faint Gaussians overlap, each of which loses its rim. The reference itself is a hundred times nearer.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from endotsr.tradeoff.settings import CLOSE
 PIXELS = 20
 DIGITS = 30
 LIMIT = 1e-10  # display units, between cutoffs 1e-12 and 1e-14
-ROUNDING = 1e-12  # display units: what float64 may lose over a few thousand Gaussians
+ROUNDING = 1e-12  # display units: rounding of float64 over a few thousand Gaussians
 NEGLIGIBLE = 80.0  # half a squared distance beyond which alpha < 2e-35 is below the digits carried
 
 
@@ -38,7 +38,7 @@ class Certificate(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether every statement does."""
+        """Whether every statement holds."""
         return (
             self.exact_against_1e14 <= ROUNDING
             and self.cut_1e12_against_1e14 <= LIMIT
@@ -94,8 +94,8 @@ def pixels_in_digits(
 
 
 def _candidates(scene: Scene, camera: Camera, settings: RasterSettings, row: int, column: int) -> list[int]:
-    """Gaussians that may matter at a pixel, nearest first: |d|^2 / 2 within `NEGLIGIBLE` of the largest variance that
-    their longest axis can have on the screen."""
+    """Gaussians that may contribute to a pixel, nearest first: |d|^2 / 2 within `NEGLIGIBLE` of the largest variance
+    that their longest axis can have on the screen."""
     x, y, z = camera.rotation @ scene.position + camera.translation[:, None]
     seen = z > settings.near
     x, y, z = x[seen] / z[seen], y[seen] / z[seen], z[seen]

@@ -25,7 +25,7 @@ from endotsr.tradeoff.page import small
 from endotsr.tradeoff.study import cost_of
 
 TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
-FLOOR = 1e-10  # of the error axis, in 1/255: the exact path, with error 0, stands there
+FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
 
 
 def main_figure(result: dict[str, Any]) -> Any:
@@ -40,14 +40,14 @@ def main_figure(result: dict[str, Any]) -> Any:
         axes.set_ylim(FLOOR / 10, 1000)
         low, high = axes.get_xlim()
         axes.set_xlim(low / 4, high * 2)
-    name_axes(left, y="largest error of the image, 1/255", title="What a frame costs in time")
-    name_axes(right, title="and in work that no machine changes")
+    name_axes(left, y="largest error of the image, 1/255", title="Error against time per frame")
+    name_axes(right, title="and against visited pairs")
     place_labels(figure, labels)
     return figure
 
 
 def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
-    """Draws the points; returns what has to be written beside them, presets first."""
+    """Draw the points; returns their labels, presets first."""
     by_name = {p["name"]: p for p in result["points"]}
     factor = _factor(cost)
 
@@ -70,7 +70,7 @@ def _sweep(axes: Any, result: dict[str, Any], cost: str) -> list[Label]:
 
 
 def _short(point: dict[str, Any], cost: str) -> str:
-    """Precision (it costs no visit), cutoff, and what else is coarse."""
+    """Label of a setting: precision (which changes no visit), cutoff, and any other coarse choice."""
     raster, scale = point["setting"]["raster"], point["setting"]["scale"]
     cut, stop = raster["alpha_cutoff"], raster["transmittance_stop"]
     words = [] if cost == "visits" else [point["setting"]["precision"]]
@@ -108,7 +108,7 @@ def dials_figure(result: dict[str, Any], cost: str, error: str = "max") -> Any:
 
 
 def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, error: str) -> list[Label]:
-    """Draws one curve; returns the values to write beside its points."""
+    """Draw one curve; returns the labels of its points."""
     factor = _factor(cost)
     points = [by_name[name] for name in dial["points"].values()]
     terms = cost == "visits" and dial["cost"] == "terms"
@@ -124,7 +124,7 @@ def _dial(axes: Any, dial: dict[str, Any], by_name: dict[str, Any], cost: str, e
 
 
 def _room(axes: Any) -> None:
-    """At least two decades of cost around the points, so that curves can be compared and labels find a place."""
+    """At least two decades of cost around the points, so that curves can be compared and labels fit."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     low, high = axes.get_xlim()
@@ -164,7 +164,7 @@ def _levels(axes: Any, result: dict[str, Any], named: bool = True) -> None:
 
 
 def logarithmic_axes(axes: Any, name: str, sizes: Sizes = NORMAL, title: str = "", log_y: bool = True) -> None:
-    """Logarithmic axes in the common style; `name` stands below."""
+    """Logarithmic axes in the common style; `name` is the label of the cost axis."""
     axes.set_xscale("log")
     if log_y:
         axes.set_yscale("log")

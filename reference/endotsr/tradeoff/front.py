@@ -1,9 +1,9 @@
-"""Which settings are worth having: one is dominated if another costs no more and errs no more, and is not its equal."""
+"""The Pareto front: a setting is dominated if another has no larger cost and error, and one of them is smaller."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-# Presets that are dominated and stay, with the reason. A preset that is dominated and not named here fails a test.
+# Dominated presets that are kept, with the reason. A test fails for a dominated preset that is missing here.
 KEPT = {
     "legacy": "reproduces the released CUDA program, its three-sigma tiles and its gradients, for comparison",
 }
@@ -38,11 +38,11 @@ def dominated_by(point: Ranked, points: Sequence[Ranked]) -> list[str]:
 
 
 def judge_presets(points: Sequence[dict[str, Any]], presets: dict[str, str]) -> dict[str, dict[str, Any]]:
-    """For every preset: by whom it is dominated, and the reason why it stays.
+    """For every preset: the settings that dominate it, and the reason why it is kept.
 
     A preset serves rendering and training, so another setting dominates it only if it visits no more pairs and is no
-    worse in the largest error, the RMS error and every gradient block. Compared within one precision: a visit costs
-    the same arithmetic there.
+    worse in the largest error, the RMS error and every gradient block. The comparison is within one precision, where a
+    visit costs the same arithmetic.
 
     points    entries of `tradeoff.json`
     presets   name -> name of its point

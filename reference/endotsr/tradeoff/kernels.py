@@ -1,7 +1,7 @@
-"""Variants of the compositing kernels that exist for this study alone: other exponentials, other tiles.
+"""Variants of the compositing kernels for this study alone: other exponentials, other tiles.
 
-A variant is the body of the package's kernel, compiled anew with a few of its names bound to other things, so that
-nothing is written twice. Those of the fast path are compiled as the fast path is, with contraction.
+A variant is the body of the package's kernel, compiled again with a few of its names bound to other values, so that
+no code is repeated. Variants of the fast path are compiled like the fast path, with contraction.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from endotsr.splatting import compositing
 from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.tradeoff.settings import Setting
 
-COEFFICIENTS = (1.0,)  # stands for the coefficients of a variant, highest power first
+COEFFICIENTS = (1.0,)  # placeholder for the coefficients of a variant, highest power first
 
 
 def _exp2_polynomial(x):
@@ -39,7 +39,7 @@ def exponential_coefficients(degree: int) -> tuple[float, ...]:
 
 
 def rebound(function: Callable[..., Any], variant: str, **names: Any) -> Callable[..., Any]:
-    """The same body with `names` bound to other values; `variant` tells its compiled form apart in the cache."""
+    """The same body with `names` bound to other values; `variant` identifies its compiled form in the cache."""
     made = types.FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__)
     made.__qualname__ = f"{function.__qualname__}.{variant}"
     made.__module__ = function.__module__
@@ -48,7 +48,7 @@ def rebound(function: Callable[..., Any], variant: str, **names: Any) -> Callabl
 
 @functools.cache
 def _blocks_with_exponential(degree: int) -> dict[str, Any]:
-    """The kernels of the fast path with a polynomial of this degree, by the name they have there."""
+    """The kernels of the fast path with a polynomial of this degree, by their names in the fast path."""
     name, fast = f"degree{degree}", compositing_blocks
     exp2 = jit_inline(rebound(_exp2_polynomial, name, COEFFICIENTS=exponential_coefficients(degree)))
     found = {}
@@ -72,7 +72,7 @@ def _definition_with_tiles(side: int) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def kernels_of(setting: Setting) -> Iterator[None]:
-    """Within the block, rendering uses the kernels that the setting asks for."""
+    """Render with the kernels of the setting within the block."""
     changes: list[tuple[types.ModuleType, dict[str, Any]]] = []
     if setting.exponential is not None:
         changes.append((compositing_blocks, _blocks_with_exponential(setting.exponential)))

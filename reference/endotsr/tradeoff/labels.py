@@ -1,10 +1,10 @@
-"""Names beside points that do not cover each other: each takes the first free place around its point."""
+"""Labels beside points that do not overlap: each is placed at the first free position around its point."""
 
 from typing import Any, NamedTuple
 
 from matplotlib.transforms import Bbox
 
-COINCIDENT = 4.0  # pixels within which points share one label
+COINCIDENT = 4.0  # pixels within which points have one common label
 RADII = (6, 13, 22, 34)  # points of the page
 DIRECTIONS = ((1, 0.5), (-1, -0.5), (1, -0.5), (-1, 0.5), (0, 1), (0, -1))
 
@@ -38,7 +38,7 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
 
 
 def _merged(labels: list[Label]) -> list[Label]:
-    """Labels of one point joined by commas, three or more by their first and last; the first colour has the word."""
+    """Labels of one point joined by commas, three or more by their first and last, in the colour of the first."""
     groups: list[list[Label]] = []
     for label in labels:
         at = label.axes.transData.transform((label.x, label.y))
@@ -81,7 +81,7 @@ def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox]) -> Bbox |
 
 
 def _text_box(text: Any, renderer: Any) -> Bbox:
-    """Where the letters stand, without the line to the point."""
+    """The box of the text, without the line to the point."""
     from matplotlib.text import Text
 
     text.update_positions(renderer)

@@ -1,4 +1,4 @@
-"""One setting on one scene: the image, the gradients, what they cost and how far they are from the reference.
+"""One setting on one scene: image and gradients, their costs and their errors against the reference.
 
 Errors are taken at full resolution in float64. The gradients are those of one fixed linear functional of colour and
 depth with random weights (as the signs of an L1 loss are), so that every setting differentiates the same number.
@@ -26,7 +26,7 @@ WEIGHT_SEED = 5
 
 
 class Prepared(NamedTuple):
-    """A setting applied to a scene: everything that is not paid for in every frame."""
+    """A setting applied to a scene: everything that is computed once, not in every frame."""
 
     scene: StudyScene
     setting: Setting
@@ -38,14 +38,14 @@ class Prepared(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """What a setting computes, at full resolution in float64."""
+    """Image and gradients of a setting, at full resolution in float64."""
 
     colour: FloatArray  # (3, H, W) display units
     gradients: dict[str, FloatArray]  # by block, of the parameters at this moment
 
 
 class Errors(NamedTuple):
-    """How far a frame is from the reference."""
+    """Errors of a frame against the reference."""
 
     max: float  # of the colour, display units
     rms: float
@@ -58,7 +58,7 @@ class Errors(NamedTuple):
 
 
 def prepare(scene: StudyScene, setting: Setting) -> Prepared:
-    """Cast, leave out what the setting leaves out, and make the weights of the functional."""
+    """Cast the scene, drop the terms that the setting leaves out, and draw the weights of the functional."""
     gaussians, spectral = _reduced(scene, setting)
     camera = scaled(scene.camera, setting.scale)
     d_colour, d_depth = _weights(scene)
@@ -111,7 +111,7 @@ def _upsampling(small: int, large: int) -> FloatArray:
 
 
 def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
-    """One frame: the scene at its time, then the picture."""
+    """One frame: the scene at its time, then the render."""
     p, setting = prepared, prepared.setting
     scene, scene_saved = scene_at(p.gaussians, p.spectral, p.scene.model, p.scene.time)
     out, saved = render_forward(scene, p.camera, setting.raster, degree=setting.degree, compositor=setting.compositor)
@@ -119,7 +119,7 @@ def forward(prepared: Prepared) -> tuple[RenderOut, RenderSaved, SceneSaved]:
 
 
 def reverse(prepared: Prepared, saved: RenderSaved, scene_saved: SceneSaved) -> RenderGrads:
-    """The way back to the parameters (that of the FDM belongs to the optimiser's step and is not part of it)."""
+    """The reverse pass to the parameters (that of the FDM is part of the optimiser's step and is left out)."""
     grads = render_reverse(prepared.d_colour, prepared.d_depth, None, saved)
     scene_reverse(grads, scene_saved)
     return grads
@@ -135,7 +135,7 @@ def frame(prepared: Prepared) -> tuple[Frame, int]:
     full, small = prepared.scene.camera, prepared.camera
     if small.height != full.height or small.width != full.width:
         colour = _upsampling(small.height, full.height) @ colour @ _upsampling(small.width, full.width).T
-    found = {name: getattr(grads, name) for name in BLOCKS}
+    found = {name: getattr(grads, f"d_{name}") for name in BLOCKS}
     return Frame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
 
 
@@ -162,7 +162,7 @@ def terms(prepared: Prepared) -> int:
 
 
 def seconds(prepared: Prepared) -> tuple[float, float]:
-    """(forward, forward + reverse) of one frame, by the clock."""
+    """Seconds of one frame: (forward, forward + reverse)."""
     with kernels_of(prepared.setting), threads(prepared.setting.threads):
         began = time.perf_counter()
         _, saved, scene_saved = forward(prepared)
@@ -172,7 +172,7 @@ def seconds(prepared: Prepared) -> tuple[float, float]:
 
 
 class threads:
-    """Within the block, kernels use so many threads (None = as before)."""
+    """Run kernels with this number of threads within the block (None = unchanged)."""
 
     def __init__(self, count: int | None) -> None:
         self._count = count

@@ -1,4 +1,4 @@
-"""What `tradeoff.json` says to a person: three sentences of advice, tables, and a page that needs no other file."""
+"""The results in `tradeoff.json` as three sentences of advice, tables, and a self-contained page."""
 
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,8 @@ from endotsr.tradeoff.measure import LEVELS
 PICTURES = {
     "": "Error of the image against time and against visited pairs. Grey: settings of the joint sweep. "
     "Blue: those that no other dominates. Diamonds: the presets.",
-    "_dials": "Every dial turned alone: largest error of the image against the time of a frame. Grey bars: quartiles.",
-    "_dials_visits": "The same against work that no machine changes.",
+    "_dials": "Every dial varied alone: largest error of the image against the time of a frame. Grey bars: quartiles.",
+    "_dials_visits": "The same against visited pairs, which do not depend on the machine.",
     "_dials_gradients": "The worst gradient block against the time of a frame with its reverse pass.",
 }
 
@@ -29,7 +29,7 @@ def small(number: float) -> str:
 
 
 def milliseconds(seconds: float) -> str:
-    """A time for a person."""
+    """A time in milliseconds as text."""
     return f"{seconds * 1e3:.3g} ms"
 
 
@@ -95,7 +95,7 @@ def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:
 
 
 def front_rows(result: dict[str, Any], cost: str = "forward") -> list[list[str]]:
-    """The settings worth having, cheapest first: name, times, visits, errors."""
+    """The settings that are not dominated, cheapest first: name, times, visits, errors."""
     by_name = {p["name"]: p for p in result["points"]}
     return [_row(by_name[name]) for name in result["fronts"][cost]]
 
@@ -117,14 +117,14 @@ def _row(point: dict[str, Any]) -> list[str]:
 
 
 def preset_lines(result: dict[str, Any]) -> list[str]:
-    """What each preset is worth: on the front, or dominated by what, and why it stays."""
+    """Status of each preset: on the front, or dominated by other settings and kept for a reason."""
     lines = []
     for name, verdict in result["preset_verdicts"].items():
         better, reason = verdict["dominated_by"], verdict["reason"]
         if not better:
             lines.append(f"`{name}`: nothing measured dominates it.")
         else:
-            stays = f" It stays because it {reason}." if reason else " No reason to keep it is listed."
+            stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
             lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
     return lines
 
@@ -134,7 +134,7 @@ def _more(count: int) -> str:
 
 
 def made(result: dict[str, Any]) -> str:
-    """When, on what, how."""
+    """Date, machine, versions and scene of the measurement."""
     m, about = result["machine"], result["scene"]
     return (
         f"Measured {result['date'][:10]} on {result['threads']} threads of {m['processor']} ({m['cores']} cores), "
@@ -144,7 +144,7 @@ def made(result: dict[str, Any]) -> str:
 
 
 def certificate_line(result: dict[str, Any]) -> str:
-    """Why the reference can be trusted, in figures."""
+    """The figures of the certificate."""
     c = result["reference"]["certificate"]
     return (
         f"Reference: differs from a cutoff of 1e-14 by {c['exact_against_1e14']:.1e}, from mpmath (30 digits) at "
@@ -167,7 +167,7 @@ def write_page(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> 
         _pictures(folder, name, [""]),
         "<ol>" + "".join(f"<li>{plain(sentence)}</li>" for sentence in advice(result)) + "</ol>",
         parts.section(
-            "Settings worth having", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
+            "Settings that are not dominated", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
         ),
         parts.section("Presets", "<ul>" + "".join(f"<li>{plain(x)}</li>" for x in preset_lines(result)) + "</ul>"),
         parts.section("Every dial alone", _pictures(folder, name, [e for e in PICTURES if e])),
@@ -176,7 +176,7 @@ def write_page(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> 
         parts.section("All settings", parts.details("Table", html_table(COLUMNS, [_row(p) for p in result["points"]]))),
     ]
     path = folder / f"{name}.html"
-    content = parts.page("What accuracy costs in time", "\n".join(body))
+    content = parts.page("Accuracy against time", "\n".join(body))
     replace_file(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
     return path
 

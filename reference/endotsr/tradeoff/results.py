@@ -27,7 +27,7 @@ class Errors(msgspec.Struct):
 
 
 class Raster(msgspec.Struct):
-    """The rules of compositing of a setting, as far as options name them."""
+    """The compositing rules of a setting that are options of the command line."""
 
     alpha_cutoff: float
     transmittance_stop: float
@@ -36,7 +36,7 @@ class Raster(msgspec.Struct):
 
 
 class Setting(msgspec.Struct):
-    """What was chosen."""
+    """The chosen setting."""
 
     raster: Raster
     precision: str
@@ -54,13 +54,13 @@ class Point(msgspec.Struct):
 
 
 class Front(msgspec.Struct):
-    """Names of the points that no other beats."""
+    """Names of the points that no other dominates."""
 
     forward: Annotated[list[str], msgspec.Meta(min_length=1)]
 
 
 class Scene(msgspec.Struct):
-    """What was rendered."""
+    """The rendered scene."""
 
     name: str
     gaussians: int
@@ -69,7 +69,7 @@ class Scene(msgspec.Struct):
 
 
 class Measurement(msgspec.Struct):
-    """The keys of tradeoff.json that a budget looks at."""
+    """The keys of tradeoff.json that a budget reads."""
 
     scene: Scene
     points: list[Point]
@@ -81,7 +81,7 @@ class Measurement(msgspec.Struct):
 
 
 class Milestone(msgspec.Struct):
-    """What a training had reached."""
+    """State and quality of a training at a milestone."""
 
     iteration: int
     seconds: float
@@ -97,7 +97,7 @@ class Training(msgspec.Struct):
 
 
 class Trainings(msgspec.Struct):
-    """The keys of training.json that a budget looks at."""
+    """The keys of training.json that a budget reads."""
 
     sequence: str
     iterations: int
@@ -106,9 +106,9 @@ class Trainings(msgspec.Struct):
 
 
 def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[str, Any]:
-    """A measurement that was written before.
+    """An existing measurement.
 
-    needed   the keys that must be there, with their types; None = a file of the study's own format will do
+    needed   the required keys with their types; None = only the format of the file is checked
     Raises:  InputError if it cannot be read, is of another format, or lacks a key.
     """
     try:

@@ -1,4 +1,4 @@
-"""What is rendered: one moment of a simulated scene, of a trained run, or of a file of Gaussians."""
+"""The rendered scene: one moment of a simulated scene, of a trained run, or of a file of Gaussians."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     frame = int(record["test_index"][len(record["test_index"]) // 2])
     try:
         noise = sensor_noise(load_run_sequence(folder))
-    except InputError:  # the pictures are elsewhere: the line is left out
+    except InputError:  # the pictures are not available: the noise is left out
         noise = None
     return StudyScene(
         Path(path).resolve().name,

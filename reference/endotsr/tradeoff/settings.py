@@ -1,7 +1,7 @@
-"""The dials: what can be set between exact and fast, which values are measured, and what is left out and why.
+"""The dials between exact and fast: their measured values, and what is left out and why.
 
-Each dial is turned alone, from settings that are accurate in everything else; a joint sweep then turns the three that
-matter together.
+Each dial is varied alone, with accurate values for everything else; a joint sweep then varies the three most important
+ones together.
 """
 
 import itertools
@@ -29,11 +29,11 @@ class Setting(NamedTuple):
 
 
 class Dial(NamedTuple):
-    """One setting turned, the others held."""
+    """One setting varied, the others fixed."""
 
     name: str
     title: str
-    cost: str  # what the machine-independent chart counts: `visits` or `terms`
+    cost: str  # machine-independent cost: `visits` or `terms`
     values: dict[str, Setting]  # by label, from accurate to fast
     lossless: bool = False  # must not change a bit of the image
 
@@ -60,7 +60,7 @@ OMITTED = {
 
 
 def dials(degree: int, bases: int, frequencies: int, near: float) -> list[Dial]:
-    """All dials that a scene has, each turned from `ACCURATE`.
+    """All dials that apply to a scene, each varied from `ACCURATE`.
 
     degree, bases, frequencies   of the trained scene; 0 bases or frequencies: it has no such component
     near                         near plane, scene units
@@ -109,7 +109,7 @@ def joint(degree: int, near: float) -> dict[str, Setting]:
 
 
 def presets(degree: int, near: float) -> dict[str, Setting]:
-    """The presets of the rasteriser in the precision that each is meant for."""
+    """The presets of the rasteriser, each in its intended precision."""
     precisions: dict[str, Precision] = {"exact": "float64", "paper": "float32", "legacy": "float32"}
     return {
         name: Setting(precision, PRESETS[name]._replace(near=near), degree) for name, precision in precisions.items()

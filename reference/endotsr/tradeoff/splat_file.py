@@ -1,4 +1,4 @@
-"""Gaussians from a splat file, and a camera that shows them.
+"""Gaussians from a splat file, and a camera that has them in view.
 
 `.ply`  as trained splats are commonly stored: binary little-endian vertices with x y z, scale_0..2 (logarithms),
         rot_0..3 (w x y z), opacity (logit), f_dc_0..2 and, for higher degrees, f_rest_* (all of red, then green, blue)
@@ -108,7 +108,7 @@ def _ply_vertices(path: Path) -> NDArray[np.void]:
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:
-    """Looks along +z at the middle of the positions, from where all but a few per cent of them are in the picture."""
+    """A camera along +z towards the middle of the positions, with all but a few per cent of them in the picture."""
     low, high = np.quantile(position.astype(np.float64), [0.02, 0.98], axis=1)
     reach = max(float((high - low)[:2].max()) / 2, 1e-6)
     distance = MARGIN * 2 * FOCAL * reach + float(high[2] - low[2]) / 2

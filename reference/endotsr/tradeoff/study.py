@@ -25,11 +25,11 @@ EXACT_PAIRS = 150e6  # Gaussians x pixels up to which the reference is the exact
 SLOW_DIALS = ("support", "exponential", "tile")  # they need the path `definition`
 COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}
 
-Progress = Callable[[int], None]  # so many steps are done
+Progress = Callable[[int], None]  # called with the number of completed steps
 
 
 class Plan:
-    """Every setting once, under a name, however many dials share it.
+    """Every setting once, under a name, even if several dials contain it.
 
     wanted   names of the dials to measure, `joint` for the sweep; None = all. The presets always are.
     """
@@ -73,7 +73,7 @@ def exact_is_possible(scene: StudyScene) -> bool:
 
 
 def reference_setting(scene: StudyScene) -> Setting:
-    """What the errors are measured against."""
+    """The setting against which errors are measured."""
     if exact_is_possible(scene):
         return presets(scene.degree, scene.near)["exact"]
     return Setting(raster=CLOSE._replace(near=scene.near, alpha_cutoff=1e-14), degree=scene.degree)
@@ -93,7 +93,7 @@ def run_study(
     repeats   timed frames of every setting, after one that warms up
     wanted    dials to measure (`joint` names the sweep); None = all
     images    folder to keep the image and the gradients of every setting in, or None
-    begin     is told the number of steps once, `step` how many were done
+    begin     is called once with the number of steps, `step` with the number of completed ones
     returns   tradeoff.json without date and machine (`described` adds them)
     """
     plan = Plan(scene, wanted)
@@ -167,7 +167,7 @@ def _keep(folder: Path, name: str, found: Frame) -> None:
 def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np.float64]:
     """(settings, repeats, 2) seconds.
 
-    All settings once, then all again: a busy minute of the machine spreads over all.
+    All settings are timed once, then all again, so that a disturbance of the machine affects all of them alike.
     """
     times = np.empty((len(prepared), repeats, 2))
     for repeat in range(repeats):
@@ -194,7 +194,7 @@ def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> lis
 
 
 def _omitted(scene: StudyScene) -> dict[str, str]:
-    """What is not measured, and why."""
+    """Dials that are not measured, with the reason."""
     if exact_is_possible(scene):
         return OMITTED
     pairs = f"{scene.gaussians.count} Gaussians on {scene.camera.width}x{scene.camera.height} pixels"

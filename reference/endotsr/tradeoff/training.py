@@ -1,8 +1,8 @@
-"""What a minute of training buys: held-out quality against seconds and iterations, one setting changed at a time.
+"""Held-out quality against training seconds and iterations, with one setting changed at a time.
 
-Every configuration is one training, measured at milestones on the way; the clock stands still while it is measured.
-The schedule of the learning rates spans the whole training, so a milestone is what that training had reached by then;
-a training that was planned shorter ends a little higher.
+Every configuration is one training that is measured at milestones; the evaluation time is not counted. The schedule of
+the learning rates spans the whole training, so a milestone shows an unfinished training; a shorter training of that
+length ends with a slightly higher quality.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ from endotsr.tradeoff.results import FORMAT, read_result
 
 METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips")
 MILESTONES = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # fractions of the iterations
-LPIPS_FROM = 1 / 2  # it takes as long as all other metrics several times over
+LPIPS_FROM = 1 / 2  # it takes several times as long as all other metrics together
 PROBE_WARM, PROBE = 5, 15  # iterations
 GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
 
@@ -39,7 +39,7 @@ class Configuration(NamedTuple):
     """One training of the study."""
 
     name: str
-    dial: str  # title of the question it answers
+    dial: str  # title of the question that it answers
     changes: dict[str, dict[str, Any]]  # settings that differ from the base
     cost: float  # estimated seconds over those of the base; plans the study, enters no result
 
@@ -58,7 +58,7 @@ def _plain(value: Any) -> str:
 
 
 def configurations(base: Config) -> list[Configuration]:
-    """The base first, then the cheap and telling ones, so that a study that is cut short has answered something."""
+    """The base first, then the cheap and informative ones, so that a shortened study gives the main results."""
     first, other = base.initialisation.first_frame_points, base.initialisation.other_frame_points
 
     def points(factor: float) -> dict[str, dict[str, Any]]:
@@ -92,7 +92,7 @@ def changed(base: Config, configuration: Configuration) -> Config:
 def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights: LpipsWeights | None) -> int:
     """Length of every training so that all of them, measured at their milestones, take about `seconds`.
 
-    Takes a few iterations and one evaluation to see what they cost here.
+    A few iterations and one evaluation are timed first.
     """
     shop, state = workshop(sequence, base), new_training(sequence, base)
     for _ in range(PROBE_WARM):
@@ -114,9 +114,9 @@ def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights
 def measured(
     state: TrainingState, config: Config, sequence: Sequence, full: Sequence, weights: LpipsWeights | None
 ) -> dict[str, float | None]:
-    """Held-out means at full size, whatever size was trained on.
+    """Held-out means at full size, independent of the image scale of the training.
 
-    sequence   what was trained on: its training times define the atoms
+    sequence   sequence of the training; its training times define the atoms
     full       the frames that are predicted
     """
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
@@ -186,12 +186,12 @@ def run_training_study(
     """Train every configuration that the time allows, writing `file` after each; those it holds already are kept.
 
     load         settings -> sequence, which depends on the image scale
-    iterations   of every training; None = as many as fill the minutes (a study that goes on keeps its number)
+    iterations   of every training; None = as many as fit the minutes (a resumed study keeps its number)
     returns      training.json
     """
     full = load(base)
     result = _begun(file, base, full, name, minutes, iterations, weights)
-    file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a sequence that is refused leaves nothing
+    file.parent.mkdir(parents=True, exist_ok=True)  # only now, so that a refused sequence leaves no file
     base = with_iterations(base, result["iterations"])
     done = {entry["name"]: entry for entry in result["configurations"]}
     left = [c for c in configurations(base) if c.name not in done]

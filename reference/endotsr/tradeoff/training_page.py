@@ -1,4 +1,4 @@
-"""What `training.json` says to a person: a table of decibels by minute, and held-out quality against time."""
+"""The results in `training.json`: a table of PSNR by minute, and held-out quality against time."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ ALONG = {"seconds": "minutes of training", "iteration": "iterations"}
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
-    """For a terminal: every training at its end beside the base, then what each further stretch of time bought."""
+    """Text for the terminal: the final state of every training beside the base, then the gain of each interval."""
     rows = training_rows(result)
     lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
     lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
@@ -22,7 +22,7 @@ def training_lines(result: dict[str, Any]) -> list[str]:
 
 
 def summary(result: dict[str, Any]) -> list[str]:
-    """How far chance goes, and which trainings were beaten by one that was both faster and better by more than that."""
+    """The variation by rounding alone, and the trainings that a faster one exceeded by more than that variation."""
     ends = {c["name"]: (c["seconds"], c["milestones"][-1]["psnr_full"]) for c in result["configurations"]}
     if "base" not in ends or None in [psnr for _, psnr in ends.values()]:
         return []
@@ -79,9 +79,9 @@ def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def gain_by_minute(states: list[dict[str, Any]], least: float = 0.3, stretch: float = 1.5) -> list[str]:
-    """Along the best states: when it was reached, by which training, and what each minute before it gained.
+    """The best states: time, training, and gain per minute since the state before.
 
-    least, stretch   a state is told if it is so many dB better, and so many times later, than the one told before
+    least, stretch   a state is listed if it is `least` dB better and `stretch` times later than the last listed one
     """
     lines: list[str] = []
     before: dict[str, Any] | None = None
@@ -126,7 +126,7 @@ def training_figure(result: dict[str, Any], along: str, metrics: dict[str, str])
 
 
 def _line(axes: Any, configuration: dict[str, Any], colour: str, along: str, metric: str) -> Label:
-    """Draws one curve; returns its name at its end."""
+    """Draw one curve; returns the label at its end."""
     rows = [r for r in configuration["milestones"] if r[metric] is not None]
     xs = [r[along] / (60 if along == "seconds" else 1) for r in rows]
     ys = [r[metric] for r in rows]
@@ -135,7 +135,7 @@ def _line(axes: Any, configuration: dict[str, Any], colour: str, along: str, met
 
 
 def _room(panels: Any) -> None:
-    """Plain numbers along the common axis, and a place for the names at the right."""
+    """Set plain numbers along the common axis, and space for the labels at the right."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     low, high = panels[0].get_xlim()

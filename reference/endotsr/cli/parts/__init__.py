@@ -1,1 +1,1 @@
-"""What several commands use: options, progress, stop signals."""
+"""Helpers of several commands: options, progress, stop signals."""

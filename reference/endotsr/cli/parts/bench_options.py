@@ -1,4 +1,4 @@
-"""What each measurement of `endotsr bench` can be told."""
+"""The options of each measurement of `endotsr bench`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,10 +32,10 @@ class IterationOptions:
 
 @dataclass
 class StagesOptions:
-    """Time every stage of an iteration, beside the limit that the measured peaks of this machine set it."""
+    """Time every stage of an iteration, beside its limit from the measured peaks of this machine."""
 
     gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
-    """numbers of Gaussians of the common workload; none with an empty list, beside --scenes"""
+    """numbers of Gaussians of the common workload; may be empty with --scenes"""
     scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
     """trained scenes (npz) to time as well"""
     precisions: tuple[Precision, ...] = ("float32", "float64")
@@ -56,7 +56,7 @@ class StagesOptions:
 
 @dataclass
 class ScalingOptions:
-    """Cost against each size alone, with fitted exponents, and memory a Gaussian."""
+    """Measure cost against each size alone, with fitted exponents, and memory per Gaussian."""
 
     axes: tuple[Literal["gaussians", "pairs", "pixels", "bases", "frequencies", "frames"], ...] = (
         "gaussians", "pairs", "pixels", "bases", "frequencies", "frames",
@@ -72,7 +72,7 @@ class ScalingOptions:
 
 @dataclass
 class PeersOptions:
-    """gsplat's pure-torch reference on the same arrays in the same run: time, ratio, agreement. Needs torch."""
+    """Compare with gsplat's pure-torch reference on the same arrays in the same run. Needs torch."""
 
     gaussians: tuple[int, ...] = (60_000,)
     """numbers of Gaussians of the common workload"""
@@ -88,7 +88,7 @@ class PeersOptions:
 
 @dataclass
 class StartOptions:
-    """Seconds from the call to the end of the first iteration: without compiled kernels, and with them."""
+    """Time from the call to the end of the first iteration, without compiled kernels and with them."""
 
     repeats: int = 3
     """warm starts"""
@@ -98,7 +98,7 @@ class StartOptions:
 
 @dataclass
 class AllOptions:
-    """Start, stages, peers and scaling in one go, on a machine without other work: JSON files and pictures in --out."""
+    """Run start, stages, peers and scaling on an otherwise idle machine; write JSON files and pictures to --out."""
 
     out: Path
     """folder for the results"""

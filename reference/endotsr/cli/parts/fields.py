@@ -24,7 +24,7 @@ METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}
 
 @dataclass(frozen=True)
 class Option:
-    """How a field appears on the command line, beside its type: `Annotated[Path, Option("RUN", positional=True)]`."""
+    """Command-line attributes of a field besides its type: `Annotated[Path, Option("RUN", positional=True)]`."""
 
     metavar: str = ""  # the value in the help; empty = derived from the type
     positional: bool = False  # given without a name
@@ -51,7 +51,7 @@ class Field:
 
     @property
     def off(self) -> str:
-        """The option that switches a switch off: `--model.no-appearance`."""
+        """The option that turns a switch off: `--model.no-appearance`."""
         section, dot, key = self.name.removeprefix("--").rpartition(".")
         return f"--{section}{dot}no-{key}"
 
@@ -123,7 +123,7 @@ def _split_note(annotated: Any) -> tuple[Option, Any]:
 
 
 def _metavar(kind: Any) -> str:
-    """What stands for the value in the help: `FLOAT`, `{quartic,gaussian}`, `{FLOAT,auto}`, `INT ...`."""
+    """The metavar of the value in the help: `FLOAT`, `{quartic,gaussian}`, `{FLOAT,auto}`, `INT ...`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _metavar(arguments[0])

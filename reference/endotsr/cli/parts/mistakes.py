@@ -1,4 +1,4 @@
-"""Words that a command does not know: one line that names the likely option, or the settings of the section."""
+"""Errors for unknown words of a command line: one line with the likely option, or the settings of the section."""
 
 import difflib
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from endotsr.cli.parts.fields import Field
 from endotsr.errors import InputError
 
-LIKE_ENOUGH = 0.7  # fraction of common letters from which an option is offered instead
+LIKE_ENOUGH = 0.7  # fraction of common letters from which an option is suggested
 LAST_NAME_ONLY = 0.95  # factor for a setting named without its section: an option of that name is the likelier one
 MOST_OFFERED = 3
 
@@ -31,7 +31,7 @@ def option_names(fields: list[Field]) -> list[str]:
 
 
 def _unknown_key(fields: list[Field], option: str) -> str:
-    """What is unknown in a dotted option, and the keys of its section; "" without a dot or without sections."""
+    """The unknown part of a dotted option and the keys of its section; "" without a dot or without sections."""
     keys: dict[str, Any] = {}
     for field in (field for field in fields if not field.positional):
         tree = keys
@@ -53,7 +53,7 @@ def _unknown_key(fields: list[Field], option: str) -> str:
 
 
 def _similar(option: str, names: list[str]) -> list[str]:
-    """The options most like the one that was given; a setting is also found by its name without the section."""
+    """The options most similar to the given one; a setting is also found by its name without the section."""
     likeness = {}
     for name in names:
         last = "--" + name.removeprefix("--").rpartition(".")[2]

@@ -33,7 +33,7 @@ SHORT_NAMES = {
 
 @dataclass
 class Sources:
-    """Where the settings of a run start from."""
+    """The sources of the settings of a run."""
 
     preset: Literal["paper", "sharp", "demo"] | None = None
     config: Path | None = None
@@ -65,9 +65,9 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
 
 
 def asked_settings(words: list[str], kept: Config) -> Config:
-    """The settings `kept` of a run, with what TOML file, `--iterations` and `--schedule` of the command line ask for.
+    """The settings `kept` of a run, changed by the TOML file, `--iterations` and `--schedule` of the command line.
 
-    Every other setting stays as the run has it, so that only what was asked for can differ from the run.
+    Every other setting is that of the run, so that only explicit changes can differ from the run.
     """
     base, _ = base_settings(words)
     sources = parse_known(Sources, words)

@@ -43,7 +43,7 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
 
 
 def parse_known(options: type[T], words: list[str]) -> T:
-    """These options alone, out of words that hold others too. Raises InputError for a value that is not allowed."""
+    """These options alone, from words with other options too. Raises InputError for a value that is not allowed."""
     fields = fields_of(options)
     return _built(options, fields, _given(fields, words)[0], None)
 
@@ -54,7 +54,7 @@ def _given(fields: list[Field], words: list[str]) -> tuple[dict[tuple[str, ...],
     parser = _parser(fields)
     try:
         found, unknown = parser.parse_known_intermixed_args(_plain_words(fields, words))
-    except argparse.ArgumentError as error:  # the only one that remains: too few values
+    except argparse.ArgumentError as error:  # the only remaining error: too few values
         field = next(f for f in fields if f.name == error.argument_name)
         raise InputError(f"{field.name}: missing value {field.metavar}") from None
     given = {field.path: _value(field, vars(found)[path]) for path, field in by_path.items() if path in vars(found)}
@@ -114,7 +114,7 @@ def _is_negative(word: str) -> bool:
 
 
 def _value(field: Field, found: Any) -> Any:
-    """What argparse found for an option (words, or True or False for a switch), in the type of the option."""
+    """The value that argparse found (words, or True or False for a switch), converted to the type of the option."""
     if field.switch:
         return found
     words = [found] if field.count == 1 else found
@@ -128,7 +128,7 @@ def _value(field: Field, found: Any) -> Any:
 
 
 def converted(kind: Any, word: str) -> Any:
-    """A word as a value of a type, limits not checked. Raises ValueError if it is none."""
+    """A word converted to a type; limits are not checked. Raises ValueError if the word is no such value."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return converted(arguments[0], word)

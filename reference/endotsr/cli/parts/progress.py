@@ -7,7 +7,7 @@ from typing import Any
 
 from endotsr.report.words import duration
 
-QUIET_SECONDS = 30.0  # between lines when nobody watches a terminal
+QUIET_SECONDS = 30.0  # between lines if the standard error is not a terminal
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
 
 
@@ -30,7 +30,7 @@ class Progress:
             self._bar = tqdm(total=self._total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25)
 
     def update(self, entry: dict[str, Any]) -> None:
-        """Take in the log entry of one iteration."""
+        """Show the log entry of one iteration."""
         for name, memory in MEMORY.items():
             value = entry.get(name)
             if value is not None and math.isfinite(value):
@@ -58,7 +58,7 @@ class Progress:
             print(message, flush=True)
 
     def close(self) -> None:
-        """Leave the bar as it is and go to the next line."""
+        """End the line of the bar."""
         if self._bar is not None:
             self._bar.close()
 
@@ -78,7 +78,7 @@ class StepBar:
         return self
 
     def begin(self, steps: int) -> None:
-        """The number of steps is known."""
+        """Set the number of steps."""
         from tqdm import tqdm
 
         self._bar = tqdm(total=steps, desc=self._name, disable=None, dynamic_ncols=True)
@@ -86,7 +86,7 @@ class StepBar:
             print(f"{self._name}: {steps} steps", flush=True)
 
     def step(self, count: int = 1) -> None:
-        """So many more are done."""
+        """Advance by a number of completed steps."""
         self._bar.update(count)
 
     def say(self, message: str) -> None:

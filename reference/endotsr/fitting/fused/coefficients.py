@@ -1,8 +1,8 @@
 """Fast path of training: the reverse pass of a Fourier residual and its Adam step in one sweep.
 
 Both residuals are sums over atoms, so the gradient of a coefficient is the outer product atom x gradient of its sum,
-(3, 2F, N) numbers made of 3 N and 2F. Here it exists for one piece of one row at a time, with the share of the
-spectral penalty already added. The arithmetic is that of `spread`, `matern_penalty_reverse` and `adam_update`, in the
+(3, 2F, N) numbers made of 3 N and 2F. Here it exists for one piece of one row at a time, with the gradient of the
+Matérn penalty already added. The arithmetic is that of `spread`, `matern_penalty_reverse` and `adam_update`, in the
 same order: the results are equal bit by bit (tested).
 """
 

@@ -1,8 +1,8 @@
 """Fast path of training: the reverse pass of the deformation, its Adam step and the next forward pass in one sweep.
 
 The gradient of the FDM is (3, 10, B, N), three quarters of all gradients, and is needed once. Here it exists
-for one piece of one row at a time, in the second-level cache. The curves of the next iteration are taken there as well,
-from the numbers just changed: the arrays need not come from memory a second time. The arithmetic is that of
+for one piece of one row at a time, in the second-level cache. The offsets of the next iteration are computed there as
+well, from the updated numbers, so that the arrays are not read from memory a second time. The arithmetic is that of
 `deformation_reverse`, `adam_update` and `deformation_forward`, in the same order: all results are equal bit by bit
 (tested).
 """
@@ -31,10 +31,10 @@ def deformation_adam_step(
     """Update the FDM arrays held in `saved`, and their moments in `state`, in place.
 
     d_offsets  (10, N) gradient of the loss by the offsets
-    saved      from `deformation_forward`; its weight, centre and width ARE the parameters
+    saved      from `deformation_forward`; its weight, centre and width are the parameters themselves
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
-    ahead      normalised time for which the offsets of the new arrays are wanted
+    ahead      normalised time at which the offsets of the updated arrays are computed; None = not computed
     returns    those offsets, (10, N); None without `ahead`
 
     The gradient by t is not formed.
@@ -82,7 +82,7 @@ def _step(
     first, last, weight, centre, width, t, quartic, d_offsets, m_w, m_m, m_s, v_w, v_m, v_s,
     rate, root, beta1, beta2, epsilon, ahead, offsets,
 ):  # fmt: skip
-    """Each task owns one piece of one channel, of all nine arrays; `offsets` has no columns where none are wanted."""
+    """Each task owns one piece of one channel, of all nine arrays; `offsets` has no columns if none are computed."""
     bases, count = weight.shape[1:]
     pieces = (count + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE
     time, time_ahead = weight.dtype.type(t), weight.dtype.type(ahead)

@@ -1,8 +1,8 @@
 """One Adam step of everything that is trained, from the gradients by the deformed scene.
 
-Where the gradient of an array is much larger than what it is made of (time bases, Fourier coefficients), the reverse
-pass and the step are one sweep, and the gradient is never stored. The sweep over the time bases takes the curves of
-the next iteration as well.
+Where the gradient of an array is much larger than its factors (time bases, Fourier coefficients), the reverse pass and
+the step are one sweep, and the gradient is never stored. The sweep over the time bases also computes the offsets of
+the next iteration.
 """
 
 from endotsr.config import Config
@@ -33,12 +33,12 @@ def optimise(
 ) -> OffsetsAhead | None:
     """Change the Gaussians and their moments in place.
 
-    saved   of `scene_at`, for these very Gaussians
+    saved   of `scene_at`, for the same Gaussians
     grads   gradients by the deformed scene
     back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
     rates   learning rate of every array
     next_time  normalised time of the next iteration, if it is known
-    timer   told of the stages "FDM" and "Adam"
+    timer   records the stages "FDM" and "Adam"
     returns    offsets of the FDM at that time, for `scene_at`; None if unknown, or without an FDM
     """
     o = config.optimiser
@@ -47,30 +47,30 @@ def optimise(
     def step_deformation() -> OffsetsAhead | None:
         if saved.deformation is None:
             return None
-        assert back.offsets is not None
+        assert back.d_offsets is not None
         fdm_rates = {name: rates[name] for name in FDM_FIELDS}
-        offsets = deformation_adam_step(back.offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
+        offsets = deformation_adam_step(back.d_offsets, saved.deformation, adam, fdm_rates, *settings, next_time)
         if next_time is None or offsets is None:
             return None
         return OffsetsAhead(saved.deformation.weight, next_time, offsets)
 
     def step_appearance() -> None:
         if saved.appearance is not None:
-            assert grads.residual is not None
+            assert grads.d_residual is not None
             coefficients, atoms, _ = saved.appearance
-            d_argument = argument_gradient(grads.residual, saved.appearance)
+            d_argument = argument_gradient(grads.d_residual, saved.appearance)
             coefficients_adam_step(
                 d_argument, atoms, None, coefficients, adam, "appearance_coefficients", rates, *settings
             )
 
     def step_motion() -> None:
         if saved.motion is not None:
-            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.position
+            (coefficients, atoms), weight, sums = saved.motion, config.loss.lambda_msp, grads.d_position
             rho, dtype = spectral.rho, coefficients.dtype
             shrink = penalty_factors(weight, rho, gaussians.count, dtype) if weight > 0 else None
             coefficients_adam_step(sums, atoms, shrink, coefficients, adam, "motion_coefficients", rates, *settings)
 
-    ahead, *_ = parallel_calls(  # arrays of their own; the longest sweep first
+    ahead, *_ = parallel_calls(  # independent arrays; the longest sweep is listed first
         timed(timer, "FDM", step_deformation),
         timed(timer, "Adam", step_appearance),
         timed(timer, "Adam", step_motion),

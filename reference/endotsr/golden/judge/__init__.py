@@ -1,4 +1,4 @@
-"""The judge of ports: reads golden cases and the outputs of a port, and answers with verdicts.
+"""The judge of ports: reads golden cases and the outputs of a port, and returns verdicts.
 
-Nothing in this room knows the method: it imports NumPy, msgspec and its own modules only.
+This package is independent of the method: it imports NumPy, msgspec and its own modules only.
 """

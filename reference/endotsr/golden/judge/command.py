@@ -1,4 +1,4 @@
-"""The door of a command: requests that a port answers, the call of its command, and the folders of one call."""
+"""Ports as commands: the requests for a port, the call of its command, and the folders of one call."""
 
 import os
 import shlex
@@ -20,7 +20,7 @@ def clear_kept(root: Path) -> None:
     """Remove what an earlier `golden run --keep` left in this folder, so that old outputs are never judged.
 
     The folders named in KEPT are removed if the requests among them are of the form that `write_requests` gives.
-    Raises: InputError if one of the names is taken by anything else; nothing is removed then.
+    Raises: InputError if one of the names belongs to anything else; nothing is removed then.
     """
     taken = [path for path in (root / name for name in KEPT) if os.path.lexists(path)]
     if not taken:
@@ -40,7 +40,7 @@ def clear_kept(root: Path) -> None:
 
 
 def write_requests(golden: Golden, folder: Path, precision: Precision, level: int) -> None:
-    """The cases without their answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
+    """Write the cases without their answers: requests.json, <family>/<case>/request.json and inputs/*.npy."""
     wanted = [case for case in golden.cases if case.level <= level]
     for case in wanted:
         root = folder / case.family / case.case
@@ -66,15 +66,15 @@ def write_requests(golden: Golden, folder: Path, precision: Precision, level: in
 
 
 def refuse_command(command: str) -> None:
-    """Raises InputError if a port's command does not say where {requests} and {outputs} go."""
+    """Raises InputError if a port's command lacks {requests} or {outputs}."""
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
 
 
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
-    """Call the port's command once; returns a note when it failed. No shell is involved.
+    """Call the port's command once, without a shell; returns a note when it failed.
 
-    Raises: InputError if the command names no {requests} or {outputs}, or cannot be started.
+    Raises: InputError if the command lacks {requests} or {outputs}, or cannot be started.
     """
     refuse_command(command)
     outputs.mkdir(parents=True, exist_ok=True)

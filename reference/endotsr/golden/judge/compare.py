@@ -1,4 +1,4 @@
-"""Distances between arrays in units of a scale, and whether a rule allows them; the maker of the vectors asks too."""
+"""Distances between arrays in units of a scale, and whether a rule allows them; also used to make the vectors."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -83,7 +83,7 @@ def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdi
 
 
 def misses(verdicts: Iterable[tuple[int, bool]]) -> tuple[int, ...]:
-    """Outputs that did not pass, counted by level, from (level, passed): the least is the answer that a port meant."""
+    """Numbers of outputs that did not pass, by level, from (level, passed); the least selects the answer of a port."""
     counts = [0] * len(LEVELS)
     for level, passed in verdicts:
         counts[level] += not passed

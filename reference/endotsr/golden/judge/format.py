@@ -1,4 +1,4 @@
-"""What the files of `golden/` look like, as typed structures: the only way in and out for JSON."""
+"""The format of the files of `golden/` as typed structures, through which all JSON is read and written."""
 
 import json
 from pathlib import Path

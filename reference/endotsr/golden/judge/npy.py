@@ -1,7 +1,7 @@
-"""Reading and writing of .npy files without trust: nothing is evaluated, nothing is unpickled, sizes are checked first.
+"""Reading and writing of untrusted .npy files: nothing is evaluated or unpickled, and sizes are checked first.
 
 A header is matched by one regular expression; the file must be a regular file of exactly the length that dtype and
-shape ask for. numpy.load is not used anywhere in this package room.
+shape require. numpy.load is not used anywhere in this package.
 """
 
 import math
@@ -28,11 +28,11 @@ _HEADER = re.compile(
 
 
 class Refused(Exception):
-    """A file that is not a plain array; the message says why."""
+    """A file that is not a plain array; the message states the reason."""
 
 
 class Header(NamedTuple):
-    """What the header of a .npy file says."""
+    """The header of a .npy file."""
 
     offset: int
     dtype: str
@@ -69,7 +69,7 @@ def read_plain(path: Path, root: Path | None = None, largest: int = LARGEST) -> 
 
 
 def read_text(path: Path, root: Path, largest: int = LONGEST_HEADER) -> str:
-    """A small UTF-8 text, with the same caution. Raises Refused."""
+    """A small UTF-8 text, with the same checks. Raises Refused."""
 
     def read(handle: int) -> str:
         _check_regular(handle)
@@ -147,6 +147,6 @@ def npy_bytes(array: NDArray) -> bytes:
 
 
 def write_npy(path: Path, array: NDArray) -> None:
-    """Write `npy_bytes`, folders included."""
+    """Write `npy_bytes`, and create missing folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(npy_bytes(array))

@@ -1,4 +1,4 @@
-"""The third door: a port in Python, one pytest test a case, with a file of known failures that the port owns."""
+"""Ports in Python: one pytest test a case, with a file of known failures that belongs to the port."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ def door(
     """A parametrised test function; assign it to a name that begins with `test`.
 
     answer          (operation, inputs, settings) -> outputs by name; None skips an operation that is not ported.
-                    Inputs are in the asked precision and may be changed
+                    Inputs are in the requested precision and may be changed
     known_failures  text file of the port, one family/case a line; a listed case must fail
     Raises:         InputError if the golden folder cannot be used or a listed case does not exist.
     """
@@ -51,7 +51,7 @@ def door(
 
 
 def answered(golden: Golden, case: Case, answer: Answer, precision: Precision, level: int) -> CaseReport | None:
-    """The verdict on what a port answers to one case; None if it does not know the operation."""
+    """The verdict on the answer of a port to one case; None if the operation is not ported."""
     found = answer(case.operation, in_precision(golden.inputs(case), precision), dict(case.settings))
     if found is None:
         return None
@@ -63,7 +63,7 @@ def answered(golden: Golden, case: Case, answer: Answer, precision: Precision, l
 
 
 def explain(report: CaseReport) -> str:
-    """Title, refused outputs, and the mistakes it looks like or was made for."""
+    """Title, refused outputs, the mistakes that they resemble, and the mistakes that the case was made for."""
     lines = [f"{report.name}: {report.title}"]
     lines += [f"  {o.name}: {o.reason} {list(o.index) or ''}" for o in report.outputs if o.status != "passed"]
     if report.looks_like:

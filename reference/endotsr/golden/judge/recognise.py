@@ -1,4 +1,4 @@
-"""From refused outputs to the mistakes that they look like, by the fingerprints that each case keeps."""
+"""From refused outputs to the mistakes that they resemble, by the fingerprints stored in each case."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from endotsr.golden.judge.compare import fingerprint
 from endotsr.golden.judge.format import Case
 from endotsr.golden.judge.store import Golden
 
-NEAR = 0.02  # of the way from right to wrong: a fingerprint this close to that of a mistake is that mistake
+NEAR = 0.02  # fraction of the way from right to wrong within which a fingerprint counts as that of a mistake
 
 
 class Suspect(msgspec.Struct, kw_only=True):
@@ -26,7 +26,7 @@ class Suspect(msgspec.Struct, kw_only=True):
 
 
 def recognise(case: Case, name: str, got: NDArray, expected: NDArray, looks: dict[str, float]) -> None:
-    """Mistakes of the case whose fingerprint this output has, with how far off it is."""
+    """Mistakes of the case whose fingerprint this output has, with the distance from that fingerprint."""
     finite = bool(np.isfinite(got.astype(np.float64)).all())
     for flag, mistake in case.mistakes.items():
         if mistake.output != name:

@@ -1,4 +1,4 @@
-"""What the judge says, as text, JSON and one self-contained HTML page with difference images."""
+"""The report of the judge as text, JSON and one self-contained HTML page with difference images."""
 
 import base64
 import html

@@ -1,4 +1,4 @@
-"""The folder `golden/`: where it is, how it is read and checked."""
+"""The folder `golden/`: finding, reading and checking it."""
 
 import functools
 import hashlib
@@ -38,7 +38,7 @@ class Golden(NamedTuple):
 
 @functools.cache
 def _loaded(path: Path) -> NDArray:
-    """Read once; the array cannot be written to."""
+    """The array of a file, read once and read-only."""
     return read_plain(path)
 
 
@@ -48,7 +48,7 @@ def in_precision(inputs: Mapping[str, NDArray], precision: str) -> dict[str, NDA
 
 
 def golden_folder(given: Path | None = None) -> Path:
-    """The folder named, else `golden/` of the source tree, else of the working folder."""
+    """The named folder, else `golden/` of the source tree, else `golden/` of the working folder."""
     places = [given] if given else [Path(__file__).parents[4] / "golden", Path("golden")]
     for place in places:
         if (place / "VERSION").is_file():

@@ -1,4 +1,4 @@
-"""The judge: a folder of outputs against the golden cases. Every state of the folder leads to a verdict."""
+"""The judge: compares a folder of outputs with the golden cases. Every state of the folder leads to a verdict."""
 
 from pathlib import Path
 from typing import Literal
@@ -47,7 +47,7 @@ class CaseReport(msgspec.Struct, kw_only=True):
 
 
 class Report(msgspec.Struct, kw_only=True):
-    """Everything the judge says."""
+    """The report of the judge."""
 
     version: str
     precision: str
@@ -72,7 +72,7 @@ class Report(msgspec.Struct, kw_only=True):
 def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None) -> Report:
     """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
 
-    again   a second folder of the same port: level 5 then also asks for the same bits everywhere
+    again   a second folder of the same port: level 5 then also requires the same bits everywhere
     """
     without, notes = declared(golden, outputs)
     reports = [
@@ -92,7 +92,7 @@ def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]
     try:
         lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
     except Refused as refusal:
-        return (), [] if str(refusal) == "missing" else [f"{NOT_PORTED}: {refusal}; every operation is asked for"]
+        return (), [] if str(refusal) == "missing" else [f"{NOT_PORTED}: {refusal}; every operation is judged"]
     named = {line.split("#")[0].strip() for line in lines} - {""}
     known = dict.fromkeys(case.operation for case in golden.cases)
     unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - set(known))]
@@ -124,7 +124,7 @@ def conclude(
 
 
 def without_claim(report: Report, reasons: list[str]) -> None:
-    """Take the claim away: a port that fails has none, whatever it wrote before it failed."""
+    """Remove the claim, because a port that fails has none, even if it wrote outputs before it failed."""
     report.notes += reasons
     report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
 

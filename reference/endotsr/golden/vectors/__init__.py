@@ -1,1 +1,1 @@
-"""How golden cases are made: one module a family, which holds its cases and its wrong ports side by side."""
+"""Makers of the golden cases: one module a family, which holds its cases and its wrong ports."""

@@ -126,7 +126,7 @@ def _no_background(request: Request) -> dict[str, NDArray]:
 
 
 def _own_colour_only(request: Request) -> dict[str, NDArray]:
-    """Gradient of alpha as if nothing were behind a Gaussian and the background were black."""
+    """Gradient of alpha without the Gaussians behind, on a black background."""
     count = request.inputs["opacity_logit"].size
     gradient = np.zeros(count)
     for i in range(count):

@@ -74,7 +74,7 @@ def _on_the_cutoff() -> Spec:
 
 
 def _one_on_the_cutoff() -> Spec:
-    """One decision that rounding may take either way, and with it the whole answer, gradients included."""
+    """One decision that rounding may take either way and that determines the whole answer, gradients included."""
     inputs, settings = screen_inputs(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0), raster_settings(PAPER)
     one = (slice(None), 1)
     inputs["mean2d"] = changed(inputs["mean2d"], one, [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")
@@ -125,7 +125,7 @@ def _stop_after(request: Request) -> dict[str, NDArray] | None:
 
 
 def _skips(request: Request) -> dict[str, NDArray] | None:
-    """Leaves out the Gaussian that would stop the pixel and goes on; flat images only."""
+    """Leaves out the Gaussian that would stop the pixel and continues; flat images only."""
     raster, i = request.settings["raster"], request.inputs
     if i["covariance2d"].min(axis=1)[0] < 1e5:
         return None

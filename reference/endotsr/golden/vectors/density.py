@@ -1,8 +1,8 @@
 """Family `density`: density control (B11), the statistics of some views and one densification.
 
-Raw parameters, screen gradients and visibility by view, the noise of splits and camera poses come in. The cases fix who
-is pruned, cloned and split and in which order the new Gaussians follow, who wins when there is no room for all, the
-extent of moving cameras, and which side of a threshold its own value is on.
+Raw parameters, screen gradients and visibility by view, the noise of splits and camera poses come in. The cases fix
+which Gaussians are pruned, cloned and split, in which order the new Gaussians follow, which candidates are taken when
+there is no room for all, the extent of moving cameras, and on which side of a threshold its own value lies.
 """
 
 from typing import Any
@@ -169,7 +169,7 @@ def _interleaved(request: Request) -> dict[str, NDArray]:
 
 
 def _first_candidates(request: Request) -> dict[str, NDArray] | None:
-    """The first candidates are densified, whatever their gradient."""
+    """The first candidates are densified, independent of their gradient."""
     alive = ~request.right["pruned"]
     candidates = alive & (request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"])
     room = request.settings["density"]["maximum"] - alive.sum()

@@ -1,4 +1,4 @@
-"""`endotsr golden generate`: computes all cases anew and compares them with the folder; writes only when told."""
+"""`endotsr golden generate`: recomputes all cases and compares them with the folder; writes only with --write."""
 
 import functools
 import shutil
@@ -27,7 +27,7 @@ def solve_all() -> list[Solved]:
 
 
 def check(folder: Path, *, bitwise: bool = True) -> tuple[list[str], str]:
-    """What differs from the folder, one line each, and one line of summary.
+    """Differences from the folder, one line each, and one line of summary.
 
     On the machine class that wrote the folder every file must have its bits. Elsewhere, and with `bitwise` off,
     expected values must agree within their float64 tolerance; settings, titles and flags must be the same.
@@ -76,7 +76,7 @@ def moved(folder: Path, one: Solved) -> list[str]:
 
 
 def write(folder: Path) -> list[str]:
-    """Replace the generated files; returns what moved."""
+    """Replace the generated files; returns one line for each change."""
     solved = solve_all()
     version = (folder / "VERSION").read_text().strip()
     lines = [line for one in solved for line in moved(folder, one)]

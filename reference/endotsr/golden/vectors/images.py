@@ -20,7 +20,7 @@ def tissue(height: int, width: int, rows: int, columns: int) -> Made:
 
 
 def tool_mask() -> Made:
-    """A tool that reaches in from the right, and one excluded pixel alone."""
+    """An instrument that enters from the right, and one isolated excluded pixel."""
     mask = np.ones((HEIGHT, WIDTH), bool)
     mask[2:5, 8:] = False
     mask[7, 2] = False

@@ -1,4 +1,4 @@
-"""What a golden case is before its answers are computed: inputs with their recipes, settings, the mistakes it shows.
+"""A golden case before its answers are computed: inputs with their recipes, settings, and the mistakes it reveals.
 
 Every array has its own seed, the text "family/case/array" (a draw number may follow). The top 24 bits of a word of
 `judge.words`, over 2^24, are a number in [0, 1). Every real number that leaves this module is a float32 number, so that
@@ -66,7 +66,7 @@ class Spec(NamedTuple):
     settings: dict[str, Any]
     inputs: dict[str, Made]
     still: tuple[str, ...] = ()  # inputs that are at a tie or kink: not perturbed when spreads are measured
-    without: tuple[str, ...] = ()  # outputs that this case does not ask for
+    without: tuple[str, ...] = ()  # outputs that this case does not request
     flip_budget: int = 0  # pixels of an image that may flip, for a case that is on the cutoff
     own: tuple[str, ...] = ()  # outputs for which the oracle has no answer here: the truth is the reference
     either: tuple[dict[str, Any], ...] = ()  # settings with which the reference gives the other legal answers

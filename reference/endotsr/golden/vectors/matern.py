@@ -43,7 +43,7 @@ def cases() -> list[Spec]:
 
 
 def _weighted(density: Callable[[float, NDArray], NDArray]) -> Wrong:
-    """Answers with weights rho(l, angular frequency), whatever their normalisation."""
+    """Answers with weights rho(l, angular frequency) of any normalisation."""
 
     def wrong(request: Request) -> dict[str, Any]:
         length, omega = request.settings["correlation_length"], request.inputs["omega"].astype(float)

@@ -2,7 +2,7 @@
 
 A moving scene, an observed image with mask, prior depth and edges, and the weights of the terms come in. The cases are
 the presets, the other up-sampling rule, a pyramid level without valid pixels, and a rigid scene without components.
-`determinism` asks for the same objective twice: the bits must be equal.
+`determinism` requests the same objective twice: the bits must be equal.
 """
 
 from collections.abc import Callable, Mapping

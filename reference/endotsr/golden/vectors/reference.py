@@ -19,19 +19,19 @@ from endotsr.stages.stage import Inputs, Outputs, Stage
 
 
 def reference(operation: Stage, inputs: Inputs, settings: dict, precision: str, compositor: Compositor) -> Outputs:
-    """The reference's own answer in one precision; compositor `blocks` takes its fast compositing where it can."""
+    """The reference's own answer in one precision; compositor `blocks` uses fast compositing where it applies."""
     return operation.compute(in_precision(inputs, precision), settings | {"_compositor": compositor})
 
 
 def stored(array: NDArray) -> NDArray:
-    """As it stands in a file: float64, 64-bit integers, booleans."""
+    """The array with the dtype of the files: float64, 64-bit integers or booleans."""
     if array.dtype.kind == "f":
         return np.asarray(array, np.float64)
     return array if array.dtype.kind in "bu" else array.astype(np.int64)
 
 
 def answer_requests(requests: Path, outputs: Path) -> int:
-    """The reference as a port: reads a folder of requests alone, writes outputs. Returns how many cases."""
+    """The reference as a port: reads a folder of requests alone and writes outputs. Returns the number of cases."""
     try:
         head = read_struct(requests / "requests.json", Requests)
         for name in head.cases:
@@ -54,9 +54,9 @@ def answer_all(golden: Golden, outputs: Path, precision: Precision) -> int:
 
 
 def answer_wrongly(golden: Golden, outputs: Path, wrong_port: WrongPort, *, spoiled_only: bool = False) -> int:
-    """The outputs of a wrong port in float64; returns how many cases it spoils. Right answers are the expected ones.
+    """Write the outputs of a wrong port in float64; returns the number of spoiled cases. All others are as expected.
 
-    spoiled_only   write no case that the mistake leaves alone
+    spoiled_only   write only the cases that the mistake changes
     """
     operations, spoiled = all_operations(), 0
     for case in golden.cases:

@@ -1,7 +1,7 @@
-"""The families of golden cases, and what they hold: operations, cases without answers, wrong ports.
+"""The families of golden cases and their contents: operations, cases without answers, wrong ports.
 
-A family module has three names: OPERATIONS (the operations that its cases ask for), cases() and WRONG_PORTS. A wrong
-port stands beside the rule that it breaks; where it spoils cases of later families too, it names their operations.
+A family module has three names: OPERATIONS (the operations of its cases), cases() and WRONG_PORTS. A wrong port is
+defined in the family of the rule that it breaks; if it also spoils cases of later families, it names their operations.
 """
 
 import importlib

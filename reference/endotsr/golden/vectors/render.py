@@ -1,8 +1,8 @@
 """Family `render`: one view of deformed Gaussians, (B2) to (B5) together, with every gradient.
 
 Raw parameters, a pose, a background and gradients by the three images come in. The cases are the presets and degrees,
-then scenes that break a port: the near plane, needles, a zero quaternion, equal depths, centres beside the image, no
-Gaussian at all, and which Gaussians count as visible.
+then scenes that reveal mistakes of ports: the near plane, needles, a zero quaternion, equal depths, centres beside the
+image, no Gaussian at all, and which Gaussians count as visible.
 """
 
 from collections.abc import Callable
@@ -150,7 +150,7 @@ def _inverse_matrix(screen: Screen, n: int, dx: NDArray, dy: NDArray) -> NDArray
 
 
 def _single_precision(textbook_determinant: bool) -> Wrong:
-    """Composites in float32 and loses digits; its inputs are rounded, so that all machines lose the same."""
+    """Composites in float32 and loses digits; its inputs are rounded, so that all machines lose the same digits."""
 
     def wrong(request: Request) -> dict[str, NDArray] | None:
         raster, i = raster_of(request.settings), request.inputs

@@ -14,7 +14,7 @@ from endotsr.golden.vectors.wrong import Request, WrongPort, answer
 from endotsr.splatting.render import Compositor
 from endotsr.stages.stage import Asked, Inputs, Outputs, Stage
 
-MARGIN = 10.0  # a mistake counts as caught when it is this many tolerances large
+MARGIN = 10.0  # size in tolerances from which a mistake counts as detected
 SAFETY = {"float64": 64.0, "float32": 16.0}  # tolerance over measured spread
 FLOOR = {"float64": 1e-12, "float32": 4e-6}
 STEP = {"float64": 2.0**-52, "float32": 2.0**-23}
@@ -129,7 +129,7 @@ def _spreads(
     kinds = {name: asked[name].scale if asked[name].scale in ("max", "last") else "max" for name in asked}
 
     def off(run: Outputs) -> dict[str, float]:
-        """Distances from the nearest of the legal answers."""
+        """Distances from the nearest legal answer."""
         tries = [{name: largest(run[name], answer[name], kinds[name]) for name in asked} for answer in answers]
         return min(tries, key=lambda sizes: max(sizes.values()))
 
@@ -172,7 +172,7 @@ def _mistakes(
     spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
     asked: dict[str, Asked], wrong_ports: dict[str, WrongPort],
 ) -> dict[str, Mistake]:  # fmt: skip
-    """What every wrong port does to this case, as far as it shows."""
+    """The visible effect of every wrong port on this case."""
 
     def run(arrays: Inputs, settings) -> Outputs:
         return reference(operation, arrays, dict(settings), "float64", "definition")

@@ -1,7 +1,7 @@
 """Family `training`: calibration and twenty iterations, everything together.
 
-First Gaussians, a short clip, the order of frames and the noise of splits come in. One case, in which everything
-happens: two densifications, the activation of both residuals, the ramp of the Laplacian weight, two degrees.
+First Gaussians, a short clip, the order of frames and the noise of splits come in. One case covers every event of a
+training: two densifications, the activation of both residuals, the ramp of the Laplacian weight, two degrees.
 """
 
 import msgspec
@@ -95,7 +95,7 @@ def cases() -> list[Spec]:
     return [Spec("training", "twenty_iterations", "training", title, flags, settings, inputs)]
 
 
-# ---- mistakes; `schedule` has those that it shows alone ----
+# ---- mistakes; those that `schedule` reveals are in that family ----
 
 WRONG_PORTS = [
     WrongPort("skipped_step_when_densifying", "No optimiser step when densifying", "skipped; right: taken",

@@ -1,7 +1,7 @@
-"""Wrong ports: each makes one mistake that people make, everywhere it can be made, and is right otherwise.
+"""Wrong ports: each makes one plausible mistake wherever it applies, and is right otherwise.
 
-A wrong port is a function of a request, the reference and the right answer. From these the golden cases learn how large
-a mistake is and what its fingerprint is; the judge must refuse every one of them and say which it is.
+A wrong port is a function of a request, the reference and the right answer. Its answers give the size and the
+fingerprint of the mistake in each golden case. The judge must refuse every wrong port and name its mistake.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ Run = Callable[[Inputs, Settings], Outputs]
 
 
 class Request(NamedTuple):
-    """What a wrong port is asked, and how it may be answered rightly."""
+    """The request of a case for a wrong port, with the reference and the right answer."""
 
     inputs: Inputs
     settings: Settings
@@ -32,7 +32,7 @@ class WrongPort(NamedTuple):
 
     flag: str  # the name of the mistake
     title: str
-    wrong: str  # what is done, and what would be right
+    wrong: str  # the wrong rule and the right one
     apply: Mapping[str, Wrong]  # by operation; None from the function = this case is not touched
 
 
@@ -49,7 +49,7 @@ def answer(wrong_port: WrongPort, operation: str, request: Request) -> Outputs |
     return {name: made.get(name, right).astype(right.dtype) for name, right in request.right.items()}
 
 
-# ---- ways to be wrong that many families use ----
+# ---- mistakes that occur in many families ----
 
 
 def setting(**changes: Any) -> Wrong:
@@ -94,7 +94,7 @@ def swapped(change: Callable[[dict[str, NDArray]], Mapping[str, NDArray]]) -> Wr
 
 
 def output(**changes: Callable[[NDArray], NDArray]) -> Wrong:
-    """Changes outputs after the fact."""
+    """Changes the outputs of a right answer."""
 
     def wrong(request: Request) -> Outputs:
         return {name: change(request.right[name]) for name, change in changes.items() if name in request.right}
@@ -108,7 +108,7 @@ def scaled(factor: float, *names: str) -> Wrong:
 
 
 def only(wrong: Wrong, *names: str) -> Wrong:
-    """Of a wrong answer these outputs; the others stay right."""
+    """These outputs of a wrong answer; the others stay right."""
 
     def limited(request: Request) -> Mapping[str, Any] | None:
         found = wrong(request)

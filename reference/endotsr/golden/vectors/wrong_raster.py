@@ -1,7 +1,7 @@
-"""Wrong ports of the rasteriser share these: gradients of another preset, and a compositor written out in NumPy.
+"""Common parts of the wrong ports of the rasteriser: gradients of another preset, and a compositor in plain NumPy.
 
-The compositor draws one Gaussian after the other on all pixels. It is told how the distance of a pixel is computed and
-which pixels a Gaussian reaches, so that a mistake in one of them leaves everything else right.
+The compositor draws one Gaussian after the other on all pixels. The distance of a pixel and the support of a Gaussian
+are arguments, so that a mistake in one of them leaves everything else right.
 """
 
 from typing import Any, NamedTuple
