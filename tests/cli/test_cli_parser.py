@@ -122,7 +122,7 @@ def test_help_shows_every_option_with_its_text_in_the_width_of_the_terminal(widt
 
 def test_help_names_sections_limits_and_defaults():
     page = help_page(TrainOptions, fields_of(TrainOptions, TrainOptions()), "train", 120)
-    assert "\nmodel: What the model is made of." in page
+    assert "\nmodel: Components and sizes of the model." in page
     assert "\nsimulator.noise: Sensor noise in the picture.\n" in page
     assert "(a number > 0; default: 0.3)" in page
     assert "(default: true)" in page

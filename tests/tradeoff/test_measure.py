@@ -158,7 +158,7 @@ def test_gradients_at_half_size_are_those_of_the_same_functional():
     setting = ACCURATE._replace(scale=0.5, degree=0)
     ready = prepare(scene, setting)
     _, saved, scene_saved = forward(ready)
-    gradient = reverse(ready, saved, scene_saved).harmonics[0]
+    gradient = reverse(ready, saved, scene_saved).d_harmonics[0]
     step = np.random.default_rng(0).normal(size=gradient.shape)
 
     def functional(sign):
