@@ -57,7 +57,7 @@ def warm(sequence, config, iterations):
 def plain_step(state, shop):
     """The documented gradients of the next view, then Adam; the state is changed in place."""
     config, iteration = shop.config, state.iteration + 1
-    index, t = next_view(state.rng, shop.sequence, config.training)
+    index, t, _ = next_view(state.rng, shop.sequence, config.training)
     column = int(np.flatnonzero(shop.sequence.train_index == index)[0])
     loss, o = config.loss, config.optimiser
     weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)
