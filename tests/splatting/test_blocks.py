@@ -50,7 +50,7 @@ from endotsr.splatting.records import (
     log_opacity,
     pack_records,
 )
-from endotsr.splatting.render import Scene, choose_compositor
+from endotsr.splatting.render import Scene, choose_compositor, render_forward
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
 BACKGROUND = np.array([0.9, 0.1, 0.4])
@@ -248,6 +248,21 @@ def test_auto_takes_the_fast_path_exactly_where_it_computes_the_settings():
         with pytest.raises(ValueError, match="definition"):
             choose_compositor(settings, "blocks")
     assert choose_compositor(PAPER, "definition") == "definition"
+
+
+KEPT = {
+    "auto": compositing_blocks.BlocksSaved,
+    "blocks": compositing_blocks.BlocksSaved,
+    "definition": compositing.CompositeSaved,
+}
+
+
+@pytest.mark.parametrize("compositor, kind", KEPT.items(), ids=list(KEPT))
+def test_the_render_is_made_by_the_chosen_compositor(compositor, kind):
+    """Both give the same image up to rounding, so only what they keep tells them apart."""
+    scene = screen_scene(CAMERA, 30.2, 20.7, 3.0, 6.0, 0.5, rgb_for(1, 1))
+    _, saved = render_forward(scene, CAMERA, PAPER, degree=0, compositor=compositor)
+    assert type(saved.composite) is kind
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
