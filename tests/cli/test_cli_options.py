@@ -3,7 +3,8 @@
 import pytest
 from tiny import assert_refused
 
-from endotsr.cli.parts.options import base_settings, parse, with_short_names
+from endotsr.cli.parts.options import base_settings, with_short_names
+from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config
 from endotsr.errors import InputError

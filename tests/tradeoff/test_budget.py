@@ -3,7 +3,8 @@
 import pytest
 from made_up import moving_scene
 
-from endotsr.cli.parts.options import base_settings, parse
+from endotsr.cli.parts.options import base_settings
+from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.errors import InputError
 from endotsr.fitting.model import raster_settings

@@ -6,7 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from endotsr.cli.parts.options import base_settings, parse
+from endotsr.cli.parts.options import base_settings
+from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.config import DEMO, InitialisationConfig, with_iterations
 from endotsr.errors import InputError

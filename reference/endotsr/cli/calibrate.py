@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.options import differences, parse, with_short_names
+from endotsr.cli.parts.options import differences, with_short_names
+from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json

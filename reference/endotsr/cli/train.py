@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.options import asked_settings, base_settings, differences, parse, with_short_names
+from endotsr.cli.parts.options import asked_settings, base_settings, differences, with_short_names
+from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
 from endotsr.config import PAPER, PRESETS, Config
 from endotsr.errors import InputError

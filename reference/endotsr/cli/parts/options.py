@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from endotsr.cli.parts.parser import parse, parse_known
+from endotsr.cli.parts.parser import parse_known
 from endotsr.config import (
     MILESTONES,
     Config,
@@ -18,8 +18,6 @@ from endotsr.config import (
     with_iterations,
 )
 from endotsr.errors import InputError
-
-__all__ = ["asked_settings", "base_settings", "differences", "parse", "with_short_names"]
 
 # Options that are a setting under a shorter name.
 SHORT_NAMES = {
