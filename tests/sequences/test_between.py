@@ -93,6 +93,8 @@ def test_flows_that_disagree_are_no_target():
     motion = motion_between(flows, 0.5)
     assert not motion.consistent[24:36, 40:50].any()
     assert motion.consistent[60:, :].all()
+    mask = frame_between(two_frames(4.0), 0, 1, 0.5, flows).mask
+    assert not mask[24:36, 40:50].any() and mask[60:].all()
 
 
 @pytest.mark.parametrize("covered", [0, 1])

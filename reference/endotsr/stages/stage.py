@@ -122,11 +122,6 @@ def tidy(found: Found) -> Outputs:
     return {name: np.array(value, order="C") for name, value in found.items() if value is not None}
 
 
-def in_precision(inputs: Inputs, precision: str) -> dict[str, NDArray]:
-    """Real inputs in the given precision (exact: they are float32 numbers), others as they are."""
-    return {name: np.array(a, precision) if a.dtype.kind == "f" else np.array(a) for name, a in inputs.items()}
-
-
 def split_blocks(parts: Mapping[str, Mapping[str, object]]) -> Callable[[Inputs], Blocks]:
     """Blocks (index by block name) of some inputs by name; each other input is one block."""
 

@@ -20,7 +20,6 @@ T = TypeVar("T")
 MAGIC = b"\x93NUMPY"
 LONGEST_HEADER = 4096
 LARGEST = 1 << 28  # bytes of an array that is read
-KINDS = {"real": "f", "integer": "iu", "boolean": "b"}
 _HEADER = re.compile(
     r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), "
     r"'shape': \(((?:\d{1,12},? ?){0,8})\),? ?\}\s*"
