@@ -152,6 +152,10 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     """colour residual A, times `deformation`, decaying"""
     final_factor: Positive = 0.01
     """final / initial rate of the decaying groups"""
+    annealed_factor: Annotated[float, msgspec.Meta(gt=0, le=1)] = 1.0
+    """final / initial rate of opacity, scale, rotation and harmonics, which are constant before; 1 = not annealed"""
+    annealing_from: Count = 4500
+    """last iteration with the constant rates"""
     restart_residual_schedule: bool = True
     """residual rates decay over the steps that remain after activation"""
     beta1: Fraction = 0.9
@@ -250,6 +254,7 @@ SHARP = Config(
 MILESTONES = {
     "loss": ("smoothness_from", "laplacian_from", "laplacian_full"),
     "density": ("start", "until"),
+    "optimiser": ("annealing_from",),
     "training": ("residual_activation", "harmonics_interval"),
 }
 

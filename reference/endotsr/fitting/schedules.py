@@ -38,6 +38,13 @@ def residual_decay(iteration: int, config: Config) -> float:
     return exponential_decay(iteration - start, config.training.iterations - start, 1.0, config.optimiser.final_factor)
 
 
+def annealing(iteration: int, config: Config) -> float:
+    """Factor on the rates that do not decay: 1 up to `annealing_from`, then exponentially to `annealed_factor`."""
+    o = config.optimiser
+    steps = config.training.iterations - o.annealing_from
+    return exponential_decay(iteration - o.annealing_from, steps, 1.0, o.annealed_factor)
+
+
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
 
@@ -45,20 +52,21 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
-    harmonics         constant; degree 0 and the higher degrees have their own rate
+    harmonics         constant up to `annealing`; degree 0 and the higher degrees have their own rate
+    quaternion, log_scale, opacity_logit    constant up to `annealing`
     fdm_weight        the position channels have the extra `deformation_position_factor`
     exposure_*        decay like `position`
     *_coefficients    their factor x deformation rate x `residual_decay`
     """
     o = config.optimiser
     decay = exponential_decay(iteration, config.training.iterations, 1.0, o.final_factor)
-    deformation = o.deformation * decay
+    deformation, constant = o.deformation * decay, annealing(iteration, config)
     rates: dict[str, Rate] = {
         "position": o.position * decay,
-        "quaternion": o.rotation,
-        "log_scale": o.scale,
-        "opacity_logit": o.opacity,
-        "harmonics": ((slice(0, 1), o.harmonics_base), (slice(1, None), o.harmonics_rest)),
+        "quaternion": o.rotation * constant,
+        "log_scale": o.scale * constant,
+        "opacity_logit": o.opacity * constant,
+        "harmonics": ((slice(0, 1), o.harmonics_base * constant), (slice(1, None), o.harmonics_rest * constant)),
         "fdm_weight": (
             (POSITION_CHANNELS, deformation * o.deformation_position_factor),
             (slice(POSITION_CHANNELS.stop, DEFORMATION_CHANNELS), deformation),
