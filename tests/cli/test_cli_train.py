@@ -70,6 +70,10 @@ def test_metrics_stand_alone(finished_run):
     assert set(metrics["baselines"]) == {"temporal_mean", "nearest_frame", "two_neighbours", "flow_interpolation"}
     assert metrics["run"]["iteration"] == LAST and metrics["run"]["settings"]["model"]["beta"] == 0.3
     assert [row["label"].split()[0] for row in metrics["components"]] == ["the", "rendered", "rendered"]
+    assert metrics["cross_fade"]["mean"]["psnr_tissue"] > 5
+    assert metrics["cross_fade"]["mean"] != metrics["held_out"]["mean"]
+    motion = metrics["trajectories"]
+    assert motion["unit"] == "mm" and 0 < motion["scene_units"] < 10 and motion["motion_pixels"] > 0
 
 
 def test_equal_settings_give_equal_runs_for_any_number_of_threads(finished_run, tmp_path):

@@ -106,6 +106,20 @@ def test_every_embedded_picture_can_be_decoded(page):
         assert b"http" not in base64.b64decode(content)  # writers like to sign their files with an address
 
 
+@pytest.mark.parametrize("faded, said", [(29.0, "1.25 dB above"), (31.0, "0.75 dB below")])
+def test_the_page_says_whether_the_motion_carries_information(faded, said):
+    evaluation = made_up_data().evaluation
+    ours = evaluation["held_out"]["mean"]["psnr_tissue"]
+    row = {"label": "Blend of its own renders", "mean": metrics(faded) | {"psnr_tissue": ours - 30.25 + faded}}
+    motion = {"scene_units": 0.25, "pixels": 0.5, "motion_scene_units": 1.0, "motion_pixels": 2.0, "unit": "mm"}
+    words = " ".join(
+        Reader(report_html(made_up_data(evaluation=evaluation | {"cross_fade": row, "trajectories": motion}))).words
+    )
+    assert "Blend of its own renders" in words and said in words
+    assert ("carries information" if faded < 30.25 else "does not carry information") in words
+    assert "mean trajectory error 0.250 mm (0.50 px), where the tissue moves 1.000 mm (2.00 px)" in words
+
+
 def test_tables_hold_the_numbers(page):
     words = " ".join(Reader(page).words)
     for word in ("This model", "Blend of two", "Temporal mean", "As published", "39.34", "30.25", "32.05", "0.9671"):

@@ -10,9 +10,12 @@ from typing import Any
 
 import msgspec
 
+from endotsr.evaluation.baselines import neighbours
 from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.evaluation.trajectories import TruePositions, trajectory_error
 from endotsr.fitting.model import render_at, without
+from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.model import Model
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
@@ -26,6 +29,7 @@ PUBLISHED = {
     }
 }
 COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, translation residual"}
+CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
 Render = Callable[..., RenderOut]
@@ -37,12 +41,14 @@ def measure_run(
     record: dict[str, Any],
     weights: LpipsWeights | None = None,
     published: tuple[dict[str, Any], ...] = (),
+    true_positions: TruePositions | None = None,
 ) -> tuple[dict[str, Any], dict[int, RenderOut]]:
     """metrics.json of a model, and the renders of the held-out frames by frame number.
 
-    record       run.json of the run
-    weights      None: the LPIPS values are None
-    published    rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
+    record          run.json of the run
+    weights         None: the LPIPS values are None
+    published       rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
+    true_positions  of a simulated sequence: the motion is measured too
     """
 
     def render(index: int, taken_out: str = "") -> RenderOut:
@@ -52,10 +58,29 @@ def measure_run(
 
     held_out = {int(i): render(int(i)) for i in sequence.test_index}
     metrics = evaluate_model(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
+    metrics["cross_fade"] = _cross_fade(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
+    motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
+    metrics["trajectories"] = None if motion is None else motion._asdict() | {"unit": sequence.unit}
     metrics["components"] = _components(model, sequence, render, metrics["held_out"]["mean"])
     metrics["published"] = list(published)
     metrics["run"] = _about_run(record, model)
     return metrics, held_out
+
+
+def _cross_fade(
+    sequence: Sequence, render: Callable[[int], FloatArray], weights: LpipsWeights | None
+) -> dict[str, Any]:
+    """Held-out metrics of the blend of the model's own renders at the two neighbouring training times.
+
+    A model that is no better than this has fitted its training frames, and its motion carries nothing between them.
+    """
+
+    def blend(index: int) -> FloatArray:
+        near = neighbours(sequence, index)
+        before, after = render(near.before), render(near.after)
+        return before + before.dtype.type(near.fraction) * (after - before)
+
+    return {"label": CROSS_FADE} | evaluate_frames(sequence, sequence.test_index, blend, weights).as_dict()
 
 
 def _components(model: Model, sequence: Sequence, render: Render, full: dict[str, Any]) -> list[dict[str, Any]]:

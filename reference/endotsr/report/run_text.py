@@ -44,7 +44,7 @@ def facts(metrics: dict[str, Any]) -> dict[str, Any]:
 def held_out_table(metrics: dict[str, Any]) -> str:
     """The held-out means of model, baselines and published figures as text."""
     rows = [("this model", metrics["held_out"]["mean"])]
-    rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
+    rows += [(entry["label"], entry["mean"]) for entry in (metrics["cross_fade"], *metrics["baselines"].values())]
     rows += [(entry["label"], entry) for entry in metrics["published"]]
     columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
     width = max(len(label) for label, _ in rows)
@@ -55,6 +55,8 @@ def held_out_table(metrics: dict[str, Any]) -> str:
         lines.append(" ".join([f"{label:<{width}}", *cells]))
     inside = metrics["training"]["mean"].get("psnr_tissue")
     lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
+    if motion := metrics["trajectories"]:
+        lines.append(trajectory_sentence(motion))
     if frames := left_out(metrics):
         lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
     if metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
@@ -62,6 +64,15 @@ def held_out_table(metrics: dict[str, Any]) -> str:
     if metrics["lpips_reason"]:
         lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")
     return "\n".join(lines)
+
+
+def trajectory_sentence(motion: dict[str, Any]) -> str:
+    """The error of the motion beside the motion itself."""
+    return (
+        f"True motion: mean trajectory error {motion['scene_units']:.3f} {motion['unit']} "
+        f"({motion['pixels']:.2f} px), where the tissue moves {motion['motion_scene_units']:.3f} {motion['unit']} "
+        f"({motion['motion_pixels']:.2f} px)."
+    )
 
 
 def component_table(metrics: dict[str, Any]) -> FreeTable:

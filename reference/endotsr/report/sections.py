@@ -8,6 +8,7 @@ from endotsr.evaluation.evaluate import left_out
 from endotsr.report import curves, figures
 from endotsr.report import parts as parts
 from endotsr.report.data import COLUMNS, FramePictures, ReportData
+from endotsr.report.run_text import trajectory_sentence
 from endotsr.report.tables import html_table
 
 OPENED_FRAMES = 3  # the worst frames are shown unfolded
@@ -75,6 +76,8 @@ def held_out(data: ReportData) -> str:
     rows: list[tuple[str, dict[str, Any], str]] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
+    if faded := data.evaluation.get("cross_fade"):
+        rows.append((faded["label"], faded["mean"], ""))
     rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
     rows += [(str(row.get("label", "published")), row, "reference") for row in data.reference_rows]
     columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
@@ -139,7 +142,23 @@ def temporal_gap(data: ReportData) -> str:
         "A model that reproduces its training frames better than the frames between them is limited by time, "
         "not by capacity: the difference is the temporal gap."
     )
-    return parts.section("Temporal gap", pair, note=note)
+    return parts.section("Temporal gap", pair, _motion(data), note=note)
+
+
+def _motion(data: ReportData) -> str:
+    """Whether the motion of the model carries information: against its own cross-fade, and against the truth."""
+    sentences = []
+    faded = ((data.evaluation.get("cross_fade") or {}).get("mean") or {}).get("psnr_tissue")
+    ours = _mean(data, "held_out").get("psnr_tissue")
+    if faded is not None and ours is not None:
+        word, what = ("above", "carries") if ours > faded else ("below", "does not carry")
+        sentences.append(
+            f"On held-out tissue the model is {abs(ours - faded):.2f} dB {word} the blend of its own renders at the "
+            f"two neighbouring training times: its motion {what} information between the training frames."
+        )
+    if motion := data.evaluation.get("trajectories"):
+        sentences.append(trajectory_sentence(motion))
+    return "".join(f"<p>{parts.text(sentence)}</p>" for sentence in sentences)
 
 
 def _chart(chart: curves.Chart) -> str:

@@ -1,6 +1,7 @@
 """The source of a sequence, a folder or `simulated`, and its record in a run folder."""
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from endotsr.splatting.camera import Camera
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from endotsr.kernels.arrays import FloatArray
 
 SIMULATED = "simulated"  # names the embedded sequence; a folder of that name is given as `./simulated`
 IN_MEMORY = "arrays in memory"  # the source of a sequence that was passed from Python and not read from files
@@ -106,6 +109,16 @@ def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
     sequence = load_sequence(source, folder.config(), simulator)
     check_same_input(folder, sequence, source)
     return sequence
+
+
+def true_positions_of(folder: RunFolder) -> "Callable[[int, int], FloatArray] | None":
+    """The true motion of the sequence of a run, if it is simulated; see `SimulatedSequence.true_positions`."""
+    source, simulator = run_source(folder)
+    if source != SIMULATED:
+        return None
+    from endotsr.simulator.simulate import simulate
+
+    return simulate(simulated_settings(simulator, folder.config())).true_positions
 
 
 def sequence_record(sequence: Sequence) -> dict[str, Any]:

@@ -43,12 +43,14 @@ class SimulatedSequence:
         """World position at normalised time t of material points: (2, ...) mm to (3, ...) mm."""
         return surface_point(self.truth.surface, material, t)
 
+    def true_positions(self, source: int, target: int) -> NDArray[np.floating]:
+        """World position (3, H, W), mm, at the time of frame `target` of what the pixels of frame `source` show."""
+        return self.surface_point(self.truth.material_coordinates[source], float(self.sequence.times[target]))
+
     def true_flow(self, source: int, target: int) -> NDArray[np.floating]:
         """Motion in pixels (2, H, W), x first, of the tissue at every pixel of frame `source` to frame `target`."""
         camera = self.sequence.cameras[target]
-        material = self.truth.material_coordinates[source]
-        point = self.surface_point(material, float(self.sequence.times[target]))
-        seen = to_camera(camera, point)
+        seen = to_camera(camera, self.true_positions(source, target))
         u = camera.fx * seen[0] / seen[2] + camera.cx - (np.arange(camera.width) + 0.5)
         v = camera.fy * seen[1] / seen[2] + camera.cy - (np.arange(camera.height) + 0.5)[:, None]
         return np.stack([u, v])

@@ -1,0 +1,99 @@
+"""The motion of a model against the true motion of the tissue, which a simulated sequence knows.
+
+The model moves the point that is seen at pixel p of the frame at t_0 to the time t by the displacement of its
+Gaussians, averaged with the weights w_k with which they are composited at p:
+
+    D(p, t) = sum_k w_k(p) (mu_k(t) - mu_k(t_0)) / sum_k w_k(p)
+
+The error at p is the length of D(p, t) - (X(t) - X(t_0)), with the true position X of the material point that is seen
+at p. The depth of the render has no part in it: a model that is right about depth and does not move is wrong here.
+
+In: a model, a sequence and the true positions. Out: means over pixels, reference frames and times.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.evaluation.evaluate import training_sample
+from endotsr.fitting.model import raster_settings, scene_at
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.constants import Y00
+from endotsr.runs.model import Model
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import Scene, render_forward
+
+TruePositions = Callable[[int, int], FloatArray]
+"""(reference frame, frame) -> (3, H, W): where the points seen at the pixels of the first are at the second."""
+
+LEAST_OPACITY = 1e-6  # of a pixel; a pixel with less shows no Gaussian, and the model predicts no motion there
+
+
+class TrajectoryError(NamedTuple):
+    """Means over the tissue pixels of the reference frames and over all frames of the sequence."""
+
+    scene_units: float  # length of the error
+    pixels: float  # length of the error in the picture, px
+    motion_scene_units: float  # length of the true displacement: the error of a model that does not move
+    motion_pixels: float  # the same in the picture, px
+
+
+def displacement(scene: Scene, moved: Scene, camera: Camera, model: Model) -> FloatArray:
+    """Displacement D of what every pixel shows, from a scene to the same Gaussians at another time.
+
+    scene, moved  the Gaussians at the time of the picture and at the other time; N each
+    camera        of the picture
+    returns       (3, H, W) scene units, world axes
+
+    The displacements are rendered as colours: scaled to [-1/2, 1/2], because B4 adds 1/2 and clips at 0.
+    """
+    moves = moved.position - scene.position
+    largest = float(np.abs(moves).max(initial=0.0))
+    if largest == 0.0:
+        return np.zeros((3, camera.height, camera.width), moves.dtype)
+    harmonics = (moves * (0.5 / (largest * Y00)))[None].astype(moves.dtype)
+    shown = scene._replace(harmonics=np.ascontiguousarray(harmonics), residual=None)
+    rendered, _ = render_forward(shown, camera, raster_settings(model.config), degree=0)
+    seen = rendered.opacity > LEAST_OPACITY
+    mean = rendered.colour / np.where(seen, rendered.opacity, 1)
+    return np.where(seen, (mean - 0.5) * (2.0 * largest), 0)
+
+
+def trajectory_error(
+    model: Model, sequence: Sequence, true_positions: TruePositions, references: Iterable[int] | None = None
+) -> TrajectoryError | None:
+    """The errors of the model's motion from the reference frames to all frames; None without a tissue pixel.
+
+    true_positions  of the simulator
+    references      frames; default: every sixth training frame
+    """
+    chosen = training_sample(sequence) if references is None else [int(i) for i in references]
+    scenes = [scene_at(model.gaussians, model.spectral, model.config.model, float(t))[0] for t in sequence.times]
+    found = [
+        _lengths(model, sequence, scenes, true_positions, reference, frame)
+        for reference in chosen
+        for frame in range(sequence.count)
+        if frame != reference
+    ]
+    pairs = np.concatenate(found, axis=1) if found else np.empty((4, 0))
+    return TrajectoryError(*(float(value) for value in pairs.mean(axis=1))) if pairs.size else None
+
+
+def _lengths(
+    model: Model, sequence: Sequence, scenes: list[Scene], true_positions: TruePositions, reference: int, frame: int
+) -> FloatArray:
+    """(4, tissue pixels of the reference frame): the lengths that `TrajectoryError` names."""
+    tissue, camera = sequence.masks[reference], sequence.cameras[frame]
+    start, truth = (true_positions(reference, i)[:, tissue] for i in (reference, frame))
+    moves = displacement(scenes[reference], scenes[frame], sequence.cameras[reference], model)[:, tissue]
+    place, still, moved = (_pixel(camera, point) for point in (truth, start, start + moves))
+    lengths = (start + moves - truth, moved - place, truth - start, place - still)
+    return np.stack([np.sqrt(np.square(vector).sum(axis=0)) for vector in lengths])
+
+
+def _pixel(camera: Camera, points: FloatArray) -> FloatArray:
+    """(3, P) world positions to (2, P) pixels."""
+    seen = camera.rotation @ points + np.asarray(camera.translation)[:, None]
+    return np.stack([camera.fx * seen[0] / seen[2] + camera.cx, camera.fy * seen[1] / seen[2] + camera.cy])
