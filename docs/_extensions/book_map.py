@@ -57,6 +57,13 @@ UNDIFFERENTIATED = {
         "none: dense optical flow is an estimate, and a port may take any",
         "none: it is an option of training that is not part of the paper",
     ),
+    "b15": Undifferentiated(
+        ("endotsr.sequences.tracks.follow", "endotsr.scene.tracked_motion.with_tracked_motion"),
+        "it comes before training",
+        "tests/scene/test_tracked_motion.py",
+        "none: dense optical flow is an estimate, and a port may take any",
+        "none: it is an option of training that is not part of the paper",
+    ),
     "m1": Undifferentiated(
         ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",

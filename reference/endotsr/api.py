@@ -33,6 +33,7 @@ from endotsr.config import (
     SequenceConfig,
     checked,
     config_from_dict,
+    lengthened,
     read_toml,
     refuse_unknown_keys,
     with_iterations,
@@ -164,6 +165,7 @@ def train(
     source, simulator = (sequence.source, sequence.simulator) if loaded else (sources.IN_MEMORY, SimulatorSettings())
     if loaded:
         config = msgspec.structs.replace(config, sequence=sequence.settings)
+    config = lengthened(config, len(sequence.train_index))
     state = new_training(sequence, config)
     about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)

@@ -198,6 +198,10 @@ class InitialisationConfig(Section, frozen=True, kw_only=True):
     """number of pixels drawn from the other training frames together"""
     motion_threshold: Positive = 40.0
     """a pixel of another frame counts as moved when its depth differs by more, scene units"""
+    motion: Literal["none", "flow"] = "none"
+    """motion at the start: none, or coefficients of S that are fitted to the points' tracks along optical flow"""
+    motion_flow: Literal["dis", "farneback", "deepflow", "tvl1", "rlof"] = "dis"
+    """method of the optical flow of the tracks"""
 
 
 class TrainingConfig(Section, frozen=True, kw_only=True):
@@ -205,6 +209,8 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
 
     iterations: PositiveCount = 6000
     """number of iterations; each renders one view"""
+    visits_per_frame: Count = 0
+    """least number of iterations per training frame; stretches a run whose length is that of its preset"""
     residual_activation: Count = 3000
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
@@ -246,8 +252,10 @@ PAPER = Config()
 SHARP = Config(
     preset="sharp",
     model=ModelConfig(initial_width=0.05),
-    loss=LossConfig(ssim_weight=0.2, lambda_lap="auto"),
-    training=TrainingConfig(bridge_fraction=1.0),
+    loss=LossConfig(ssim_weight=0.2, lambda_lap=1.2),
+    optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),
+    initialisation=InitialisationConfig(motion="flow"),
+    training=TrainingConfig(bridge_fraction=0.7, bridge_target="flow", visits_per_frame=128),
 )
 
 # Milestones of the schedule, by section: they stretch with the length of the run.
@@ -272,14 +280,27 @@ def with_iterations(config: Config, iterations: int) -> Config:
     return msgspec.structs.replace(config, **changed)
 
 
+def lengthened(config: Config, training_frames: int) -> Config:
+    """The schedule stretched to `visits_per_frame` iterations for every training frame.
+
+    Edges: a run that is longer already, or whose length is not that of its preset, stays as it is: the length that a
+           user asks for is kept, and a second call changes nothing.
+    """
+    training, wanted = config.training, config.training.visits_per_frame * training_frames
+    if training.iterations != PRESETS[config.preset].training.iterations or wanted <= training.iterations:
+        return config
+    return with_iterations(config, wanted)
+
+
+DEMO = with_iterations(SHARP, 1500)
 DEMO = msgspec.structs.replace(
-    with_iterations(PAPER, 600),
+    DEMO,
     preset="demo",
-    # wide time bases and bridged times suit its 24 frames; the number of points suits its 160x128 pixels
-    model=ModelConfig(initial_width=0.1),
-    initialisation=InitialisationConfig(first_frame_points=6000, other_frame_points=1500),
+    # points and threshold suit its 160x128 pixels
+    density=msgspec.structs.replace(DEMO.density, gradient_threshold=4e-4),
+    initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
+    training=msgspec.structs.replace(DEMO.training, visits_per_frame=0),
 )
-DEMO = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0))
 PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
 
 

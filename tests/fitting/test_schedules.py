@@ -3,8 +3,18 @@
 import msgspec
 import pytest
 
-from endotsr.config import PAPER, Config, LossConfig, ModelConfig, OptimiserConfig, with_iterations
+from endotsr.config import (
+    PAPER,
+    SHARP,
+    Config,
+    LossConfig,
+    ModelConfig,
+    OptimiserConfig,
+    lengthened,
+    with_iterations,
+)
 from endotsr.fitting import schedules
+from endotsr.fitting.schedules import learning_rates
 
 
 def changed(section: str, **values) -> Config:
@@ -109,3 +119,34 @@ def test_position_channels_of_the_deformation_can_have_an_extra_factor():
     rates = schedules.learning_rates(1, config)
     (_, position), (_, rest) = rates["fdm_weight"]
     assert position == pytest.approx(10 * rest)
+
+
+def test_annealed_rates_are_constant_and_then_fall_to_their_factor():
+    config = changed("optimiser", annealed_factor=0.05, annealing_from=4000)
+    before, middle, end = (learning_rates(i, config) for i in (4000, 5000, 6000))
+    paper = learning_rates(6000, PAPER)
+    for name in ("quaternion", "log_scale", "opacity_logit"):
+        assert before[name] == paper[name]
+        assert end[name] == pytest.approx(0.05 * paper[name]) and middle[name] == pytest.approx(0.05**0.5 * paper[name])
+    assert [rate for _, rate in end["harmonics"]] == pytest.approx([0.05 * rate for _, rate in paper["harmonics"]])
+    assert {name: end[name] for name in ("position", "fdm_weight", "fdm_centre")} == {
+        name: paper[name] for name in ("position", "fdm_weight", "fdm_centre")
+    }
+
+
+def test_tracked_motion_is_trained_from_the_first_iteration_at_a_constant_rate_until_the_activation():
+    config = changed("initialisation", motion="flow")
+    first, last, later = (learning_rates(i, config)["motion_coefficients"] for i in (1, 3000, 4500))
+    assert first == last == pytest.approx(1.6e-4) and later < last
+    assert "appearance_coefficients" not in learning_rates(3000, config)
+    without = msgspec.structs.replace(config, model=msgspec.structs.replace(config.model, spectral_motion=False))
+    assert "motion_coefficients" not in learning_rates(1, without)
+
+
+def test_a_run_of_the_presets_length_follows_the_number_of_frames():
+    assert lengthened(SHARP, 55).training.iterations == 55 * 128
+    assert lengthened(SHARP, 55) == with_iterations(SHARP, 55 * 128)
+    assert lengthened(lengthened(SHARP, 55), 70) == lengthened(SHARP, 55)
+    assert lengthened(SHARP, 20) is SHARP and lengthened(PAPER, 10_000) is PAPER
+    asked = with_iterations(SHARP, 300)
+    assert lengthened(asked, 55) is asked

@@ -37,14 +37,14 @@ RESIDUALS = ("appearance_coefficients", "motion_coefficients")
 FDM = ("fdm_weight", "fdm_centre", "fdm_width")
 
 
-def settings(iterations=LENGTH, optimiser=None, loss=None, training=None, **model):
+def settings(iterations=LENGTH, optimiser=None, loss=None, training=None, motion="none", **model):
     loss = {"smoothness_from": 10, "laplacian_from": 15, "laplacian_full": 30} | (loss or {})
     return Config(
         model=ModelConfig(**({"bases": 5, "frequencies": 3, "initial_width": 0.1} | model)),
         loss=LossConfig(**loss),
         optimiser=OptimiserConfig(**(optimiser or {})),
         density=DensityConfig(start=10, interval=10, until=45),
-        initialisation=InitialisationConfig(first_frame_points=250, other_frame_points=60),
+        initialisation=InitialisationConfig(first_frame_points=250, other_frame_points=60, motion=motion),
         training=TrainingConfig(
             iterations=iterations,
             residual_activation=ACTIVATED,
@@ -275,6 +275,29 @@ def test_automatic_weight_is_deterministic_and_equals_the_same_number_given(sequ
     monkeypatch.setattr(trainer, "calibrated_weight", forbidden)
     resumed, _ = run(sequence, automatic, loaded)
     assert_same(resumed, state)
+
+
+# --- tracked motion ---
+
+
+def test_tracked_motion_is_trained_from_the_start_and_keeps_its_moments_at_the_activation(sequence, tmp_path):
+    config = settings(iterations=ACTIVATED + 5, motion="flow")
+    start = new_training(sequence, config)
+    assert np.abs(start.gaussians.motion_coefficients).max() > 0 and start.gaussians.appearance_coefficients is None
+    states = []
+    state, log = run(sequence, config, checkpoints=states)
+    assert state.adam.step["motion_coefficients"] == ACTIVATED + 5 and state.adam.step["appearance_coefficients"] == 5
+    assert log[0]["matern_penalty"] > 0
+    save_state(tmp_path / "run.npz", states[0], config)
+    resumed, _ = run(sequence, config, state_from_checkpoint(load_checkpoint(tmp_path / "run.npz"), config))
+    assert states[0].iteration < ACTIVATED
+    assert_same(resumed, state)
+
+
+def test_without_component_s_nothing_is_tracked(sequence, monkeypatch):
+    monkeypatch.setattr("endotsr.scene.initialisation.follow", forbidden)
+    config = settings(iterations=3, motion="flow", spectral_motion=False)
+    assert new_training(sequence, config).gaussians.motion_coefficients is None
 
 
 # --- offsets taken ahead ---

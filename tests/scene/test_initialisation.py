@@ -54,7 +54,7 @@ def project(camera, position):
 def test_points_project_to_their_pixel_centres_with_its_colour_and_depth():
     sequence = make()
     sequence.depth[0] = 40.0 + np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH)
-    position, colour = points(sequence, first_frame_points=10, other_frame_points=0)
+    position, colour, _ = points(sequence, first_frame_points=10, other_frame_points=0)
     u, v, z = project(sequence.cameras[0], position)
     column, row = np.floor(u).astype(int), np.floor(v).astype(int)
     np.testing.assert_allclose(u - column, 0.5, atol=1e-11)
@@ -68,7 +68,7 @@ def test_fields_at_the_start():
     sequence = make()
     config = InitialisationConfig(first_frame_points=20)
     gaussians = initialise(sequence, config, MODEL, np.random.default_rng(0))
-    _, colour = training_points(sequence, config, np.random.default_rng(0))
+    colour = training_points(sequence, config, np.random.default_rng(0)).colour
     assert all(a is None or (a.dtype == np.float32 and a.flags.c_contiguous) for a in gaussians)
     np.testing.assert_array_equal(gaussians.quaternion, np.tile([[1], [0], [0], [0]], (1, 20)))
     np.testing.assert_allclose(1 / (1 + np.exp(-gaussians.opacity_logit)), 0.1, rtol=1e-6)
@@ -100,7 +100,7 @@ def test_other_frames_give_moved_or_newly_visible_pixels_only():
     sequence.depth[2, 3, 3] = np.nextafter(np.float32(90.0), np.float32(91.0))  # moved by just more than 40
     sequence.depth[2, 3, 4] = 90.0  # moved by exactly the threshold: not moved
     sequence.masks[3, 0, 0] = False
-    position, _ = points(sequence, first_frame_points=1, other_frame_points=5000)
+    position, _, _ = points(sequence, first_frame_points=1, other_frame_points=5000)
     u, v, _ = project(sequence.cameras[0], position)
     pixels = list(zip(np.floor(v).astype(int).tolist(), np.floor(u).astype(int).tolist(), strict=True))
     assert pixels[1:] == [(0, 0), (0, 1), (3, 3), (0, 1), (0, 0), (0, 1)]  # frames 2, 3, 4
@@ -110,7 +110,7 @@ def test_counts_are_those_of_the_published_rule():
     """n = 10: int(33 / 10) = 3 a frame; held-out frames give none."""
     sequence = make(count=10, test=(1, 9))
     sequence.depth[1:] = 200.0
-    position, _ = points(sequence, first_frame_points=7, other_frame_points=33)
+    position, _, _ = points(sequence, first_frame_points=7, other_frame_points=33)
     assert position.shape == (3, 7 + 3 * 7)
 
 
@@ -118,7 +118,7 @@ def test_every_second_frame_of_long_clips():
     for count, visited in ((150, 149), (151, 75)):
         sequence = make(count=count, test=())
         sequence.depth[1:] = 200.0
-        position, _ = points(sequence, first_frame_points=1, other_frame_points=count)
+        position, _, _ = points(sequence, first_frame_points=1, other_frame_points=count)
         assert position.shape[1] == 1 + visited
 
 
@@ -139,7 +139,7 @@ def test_seed_decides():
 def test_hard_I1_fewer_pixels_than_asked_for_gives_all():
     sequence = make()
     sequence.masks[:, 2:] = False
-    position, _ = points(sequence)
+    position, _, _ = points(sequence)
     assert position.shape == (3, 2 * WIDTH)
 
 
@@ -211,4 +211,6 @@ def test_settings_of_the_paper():
         "first_frame_points": 35_000,
         "other_frame_points": 5_000,
         "motion_threshold": 40.0,
+        "motion": "none",
+        "motion_flow": "dis",
     }

@@ -8,7 +8,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import asked_settings, base_settings, differences, with_short_names
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
-from endotsr.config import PAPER, PRESETS, Config
+from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.simulator.settings import SimulatorSettings
@@ -102,6 +102,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     config, source = _settings(options), options.sequence
     refuse_existing(options.out)
     sequence = load_sequence(source, config, options.simulator)
+    config = lengthened(config, len(sequence.train_index))
     _say_settings(config, schedule_note)
     _say_sequence(source, sequence)
     threads = use_threads(config.training.threads)

@@ -28,6 +28,12 @@ def residuals_activate(iteration: int, config: Config) -> bool:
     return residuals_active(iteration, config) and not residuals_active(iteration - 1, config)
 
 
+def motion_active(iteration: int, config: Config) -> bool:
+    """Whether the spectral motion is trained at this iteration: tracked motion (B15) from the first one on."""
+    tracked = config.model.spectral_motion and config.initialisation.motion != "none"
+    return tracked or residuals_active(iteration, config)
+
+
 def residual_decay(iteration: int, config: Config) -> float:
     """Factor on the residual rates, from 1 to `final_factor`.
 
@@ -76,9 +82,10 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     }
     if config.model.exposure:
         rates["exposure_log_gain"] = rates["exposure_bias"] = o.exposure * decay
+    residual = o.deformation * residual_decay(iteration, config)
     if residuals_active(iteration, config):
-        residual = o.deformation * residual_decay(iteration, config)
         rates["appearance_coefficients"] = residual * o.appearance_factor
+    if motion_active(iteration, config):
         rates["motion_coefficients"] = residual * o.spectral_motion_factor
     return rates
 

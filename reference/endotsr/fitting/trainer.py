@@ -139,7 +139,7 @@ def _activate_residuals(state: TrainingState, config: Config) -> None:
     state.gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
     for name in ("appearance_coefficients", "motion_coefficients"):
         array = getattr(state.gaussians, name)
-        if array is not None:
+        if array is not None and name not in state.adam.first:  # tracked motion has its moments from the start
             add_array(state.adam, name, array)
 
 

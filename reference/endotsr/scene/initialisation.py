@@ -8,17 +8,21 @@ Pixels of different frames are compared at equal image position, as the publishe
 In: a `Sequence`. Out: `Gaussians`. This module is independent of the optimiser.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from endotsr.config import InitialisationConfig, ModelConfig
+from endotsr.equations.dictionary import frequencies
+from endotsr.equations.matern import matern_weights
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians
+from endotsr.scene.tracked_motion import with_tracked_motion
 from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.tracks import follow
 from endotsr.splatting.camera import backproject
 
 START_OPACITY = 0.1
@@ -37,21 +41,35 @@ def initialise(
     """Gaussians at the start of training, spectral residuals not yet allocated.
 
     returns  positions on the pixels' rays at prior depth, colour of the pixel, opacity 0.1, unit quaternion,
-             isotropic scale = root mean squared distance to the three nearest points; FDM weights 0
+             isotropic scale = root mean squared distance to the three nearest points; FDM weights 0;
+             motion coefficients of the tracks (B15) if the settings say so
 
     Edges:  fewer pixels than requested -> all of them; fewer than four points -> the mean over the existing
             neighbours; one point or duplicates -> the floor of the squared distance.
     Raises: InputError if no training pixel is tissue with depth.
     Draws:  one `rng.choice` without replacement per visited frame that has more pixels than requested.
     """
-    position, colour = training_points(sequence, config, rng)
-    return gaussians_at(position, colour, model, dtype)
+    points = training_points(sequence, config, rng)
+    gaussians = gaussians_at(points.position, points.colour, model, dtype)
+    if config.motion == "none" or not model.spectral_motion:
+        return gaussians
+    tracks = follow(sequence, points.start, points.position, config.motion_flow)
+    times = sequence.times[sequence.train_index].astype(np.float64)
+    omega = frequencies(model.frequencies, model.frequency_min, model.frequency_max)
+    rho = matern_weights(omega, model.correlation_length)
+    return with_tracked_motion(gaussians, times, tracks.position, tracks.followed, omega, rho)
 
 
-def training_points(
-    sequence: Sequence, config: InitialisationConfig, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """World positions (3, N), scene units, and display colours (3, N) in [0, 1] of the drawn pixels, float64."""
+class TrainingPoints(NamedTuple):
+    """Pixels of training frames, lifted by their prior depth; float64."""
+
+    position: FloatArray  # (3, N) scene units, world axes
+    colour: FloatArray  # (3, N) display units [0, 1]
+    start: NDArray[np.intp]  # (N,) place of the pixel's frame in `train_index`
+
+
+def training_points(sequence: Sequence, config: InitialisationConfig, rng: np.random.Generator) -> TrainingPoints:
+    """The drawn pixels of all visited frames, frame by frame."""
     train = [int(k) for k in sequence.train_index]
     if not train:
         raise InputError("sequence: no training frame to initialise from")
@@ -68,7 +86,9 @@ def training_points(
     if not any(pixels.size for _, pixels in drawn):
         raise InputError("sequence: no pixel of the training frames is tissue with depth > 0; check masks and depth")
     points = [_lift(sequence, k, pixels) for k, pixels in drawn]
-    return np.concatenate([p for p, _ in points], axis=1), np.concatenate([c for _, c in points], axis=1)
+    position, colour = (np.concatenate(parts, axis=1) for parts in zip(*points))
+    start = np.repeat([train.index(k) for k, _ in drawn], [pixels.size for _, pixels in drawn])
+    return TrainingPoints(position, colour, start)
 
 
 def _usable(sequence: Sequence, k: int) -> NDArray[np.bool_]:
@@ -129,12 +149,12 @@ def squared_neighbour_distance(position: FloatArray) -> FloatArray:
     return (distance**2).mean(axis=1)
 
 
-def activate_residuals(gaussians: Gaussians, frequencies: int, appearance: bool, spectral_motion: bool) -> Gaussians:
-    """The same Gaussians with zero residual coefficients (3, 2 F, N) for the components that are on.
+def activate_residuals(gaussians: Gaussians, count: int, appearance: bool, spectral_motion: bool) -> Gaussians:
+    """The same Gaussians with zero residual coefficients (3, 2 count, N) for the components that are on.
 
     Zero coefficients render the same picture bit by bit. Arrays that exist already are kept.
     """
-    shape = (3, 2 * frequencies, gaussians.count)
+    shape = (3, 2 * count, gaussians.count)
     dtype = gaussians.position.dtype
     colour, motion = gaussians.appearance_coefficients, gaussians.motion_coefficients
     if appearance and colour is None:

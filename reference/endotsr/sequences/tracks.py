@@ -1,0 +1,138 @@
+"""Trajectories of tissue points over the training frames, followed along dense optical flow (specification B15).
+
+A point starts at a pixel of a training frame and is followed to the later and to the earlier training frames, one
+after another. While it is *followed*, its pixel moves by the flow between the two frames, and its position is that
+pixel lifted by the prior depth. It is lost where it leaves the picture or the tissue, where the flows there and back
+disagree, or where the depth jumps. A lost point moves with the followed points around it, weighted by distance, and is
+followed again where that leads to a tissue pixel at the depth it is expected at.
+
+Comes in: a sequence and the points' pixels. Goes out: a position at every training frame. No held-out picture is read.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.between import CONSISTENT, TOLERANCE, WHOLE, flows_between
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera, backproject
+
+BoolArray = NDArray[np.bool_]
+
+DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface
+NEIGHBOURS = 8  # followed points that a lost point moves with
+FEWEST = 16  # followed points; with fewer, a lost point stays where it is
+
+
+class Tracks(NamedTuple):
+    """Positions of P points at the n training frames."""
+
+    position: FloatArray  # (n, 3, P) scene units, world axes
+    followed: BoolArray  # (n, P) False: the position is that of the points around it
+
+
+class _Points(NamedTuple):
+    """The points at one training frame."""
+
+    position: FloatArray  # (3, P)
+    followed: BoolArray  # (P,)
+
+
+def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, method: str = "dis") -> Tracks:
+    """The points at every training frame.
+
+    start     (P,) place of each point's training frame in `train_index`
+    position  (3, P) scene units: where the point is at that frame, which shows it
+    method    of the optical flow, see `opencv.dense_flow`
+
+    Edges:   one training frame: the positions are those given. A sequence that does not move: likewise, to rounding
+             and to the noise of the prior depth.
+    """
+    train = [int(i) for i in sequence.train_index]
+    count, last = position.shape[1], len(train) - 1
+    out = Tracks(np.empty((last + 1, 3, count)), np.zeros((last + 1, count), bool))
+    for place in range(last + 1):
+        begins = start == place
+        out.position[place][:, begins], out.followed[place, begins] = position[:, begins], True
+    flows = [flows_between(sequence, a, b, method) for a, b in zip(train, train[1:])]
+    for way in (1, -1):
+        for place in range(last) if way > 0 else range(last, 0, -1):
+            flow = flows[place] if way > 0 else flows[place - 1][::-1]
+            known = start <= place if way > 0 else start >= place
+            here = _Points(out.position[place][:, known], out.followed[place, known])
+            there = _step(sequence, (train[place], train[place + way]), here, flow)
+            out.position[place + way][:, known], out.followed[place + way, known] = there
+    return out
+
+
+def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: tuple[FloatArray, FloatArray]) -> _Points:
+    """The points at the second frame."""
+    source, target = (sequence.cameras[i] for i in frames)
+    pixel, depth = _project(source, here.position)
+    moved = pixel + _sampled(flows[0], pixel)
+    apart = moved + _sampled(flows[1], moved) - pixel
+    lengths = np.square(moved - pixel).sum(axis=0)
+    agree = np.square(apart).sum(axis=0) <= 2 * CONSISTENT * lengths + TOLERANCE
+    found, at = _lifted(sequence, frames[1], moved)
+    followed = here.followed & agree & _near(at, _project(target, here.position)[1], 2 * DEPTH_JUMP)
+    position = np.where(followed, found, here.position)
+    lost = ~followed
+    if lost.any() and np.count_nonzero(followed) >= FEWEST:
+        position[:, lost] += _motion_around(here.position, position, followed, lost)
+    _refind(sequence, frames[1], position, followed, lost)
+    return _Points(position, followed)
+
+
+def _motion_around(before: FloatArray, after: FloatArray, followed: BoolArray, lost: BoolArray) -> FloatArray:
+    """(3, lost) mean displacement of the nearest followed points, weighted by their inverse distance."""
+    from scipy.spatial import KDTree
+
+    distance, nearest = KDTree(before[:, followed].T).query(before[:, lost].T, k=NEIGHBOURS)
+    weight = 1.0 / (distance + 1e-3 * distance.max(initial=1e-12))
+    motion = (after - before)[:, followed][:, nearest]
+    return (motion * weight).sum(axis=2) / weight.sum(axis=1)
+
+
+def _refind(sequence: Sequence, frame: int, position: FloatArray, followed: BoolArray, lost: BoolArray) -> None:
+    """Follow lost points again, in place, that are where the frame shows tissue at their depth."""
+    pixel, depth = _project(sequence.cameras[frame], position[:, lost])
+    found, at = _lifted(sequence, frame, pixel)
+    again = _near(at, depth, DEPTH_JUMP / 4)
+    places = np.flatnonzero(lost)[again]
+    position[:, places], followed[places] = found[:, again], True
+
+
+def _near(depth: FloatArray, expected: FloatArray, fraction: float) -> BoolArray:
+    return (depth > 0) & (np.abs(depth - expected) <= fraction * np.abs(expected))
+
+
+def _project(camera: Camera, position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Column and row (2, P), 0 = centre of the first pixel, and depth (P,)."""
+    seen = camera.rotation @ position + np.asarray(camera.translation)[:, None]
+    depth = np.where(seen[2] > 0, seen[2], np.nan)
+    u, v = camera.fx * seen[0] / depth + camera.cx, camera.fy * seen[1] / depth + camera.cy
+    return np.nan_to_num(np.stack([u, v]) - 0.5, nan=-1e6), seen[2]
+
+
+def _sampled(planes: FloatArray, pixel: FloatArray) -> FloatArray:
+    """(C, H, W) bilinearly at (2, P) columns and rows; outside, the nearest border value. (C, P)."""
+    height, width = planes.shape[-2:]
+    x, y = np.clip(pixel[0], 0, width - 1), np.clip(pixel[1], 0, height - 1)
+    left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    across, down = x - left, y - top
+    upper = planes[:, top, left] * (1 - across) + planes[:, top, right] * across
+    lower = planes[:, bottom, left] * (1 - across) + planes[:, bottom, right] * across
+    return upper * (1 - down) + lower * down
+
+
+def _lifted(sequence: Sequence, frame: int, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """World positions (3, P) of pixels at the prior depth of a frame, and that depth (P,); 0 = not tissue, or none."""
+    camera, prior = sequence.cameras[frame], sequence.depth[frame].astype(np.float64)
+    usable = (sequence.masks[frame] & (prior > 0)).astype(np.float64)
+    whole, depth = _sampled(np.stack([usable, prior]), pixel)
+    inside = (pixel >= 0).all(axis=0) & (pixel[0] <= camera.width - 1) & (pixel[1] <= camera.height - 1)
+    depth = np.where(inside & (whole > WHOLE), depth, 0.0)
+    return backproject(camera, pixel[0], pixel[1], depth), depth
