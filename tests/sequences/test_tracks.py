@@ -43,7 +43,7 @@ def test_points_follow_the_tissue_forwards_and_backwards(breathing, place):
     error = np.linalg.norm(found.position - true, axis=1)
     assert moved > 0.5 and error[found.followed].mean() < 0.15 * moved
     assert found.followed.mean() > 0.8
-    np.testing.assert_array_equal(found.position[place], position)
+    np.testing.assert_array_equal(found.position[place], position.astype(np.float32))
 
 
 def test_points_of_different_frames_do_not_affect_one_another_while_all_are_followed():
@@ -134,4 +134,12 @@ def test_one_training_frame_needs_no_flow(monkeypatch, breathing):
     only = dataclasses.replace(sequence, train_index=sequence.train_index[:1])
     position, *_ = lifted(sequence, 0)
     found = follow(only, np.zeros(position.shape[1], int), position)
-    np.testing.assert_array_equal(found.position, position[None])
+    np.testing.assert_array_equal(found.position, position[None].astype(np.float32))
+
+
+def test_flows_that_are_not_kept_are_made_again(breathing, monkeypatch):
+    position, *_ = lifted(breathing.sequence, 4)
+    start = np.full(position.shape[1], 4)
+    kept = follow(breathing.sequence, start, position)
+    monkeypatch.setattr(tracks, "KEPT_PAIRS", 1)
+    np.testing.assert_array_equal(follow(breathing.sequence, start, position).position, kept.position)

@@ -9,6 +9,7 @@ followed again where that leads to a tissue pixel at the depth it is expected at
 Comes in: a sequence and the points' pixels. Goes out: a position at every training frame. No held-out picture is read.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -23,13 +24,14 @@ BoolArray = NDArray[np.bool_]
 
 DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface
 NEIGHBOURS = 8  # followed points that a lost point moves with
+KEPT_PAIRS = 64  # flows of so many pairs of frames are kept for the way back; those of a longer clip are made again
 FEWEST = 16  # followed points; with fewer, a lost point stays where it is
 
 
 class Tracks(NamedTuple):
     """Positions of P points at the n training frames."""
 
-    position: FloatArray  # (n, 3, P) scene units, world axes
+    position: FloatArray  # (n, 3, P) float32, scene units, world axes
     followed: BoolArray  # (n, P) False: the position is that of the points around it
 
 
@@ -52,14 +54,14 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, me
     """
     train = [int(i) for i in sequence.train_index]
     count, last = position.shape[1], len(train) - 1
-    out = Tracks(np.empty((last + 1, 3, count)), np.zeros((last + 1, count), bool))
+    out = Tracks(np.empty((last + 1, 3, count), np.float32), np.zeros((last + 1, count), bool))
     for place in range(last + 1):
         begins = start == place
         out.position[place][:, begins], out.followed[place, begins] = position[:, begins], True
-    flows = [flows_between(sequence, a, b, method) for a, b in zip(train, train[1:])]
+    flows = lru_cache(KEPT_PAIRS)(lambda place: flows_between(sequence, train[place], train[place + 1], method))
     for way in (1, -1):
         for place in range(last) if way > 0 else range(last, 0, -1):
-            flow = flows[place] if way > 0 else flows[place - 1][::-1]
+            flow = flows(place) if way > 0 else flows(place - 1)[::-1]
             known = start <= place if way > 0 else start >= place
             here = _Points(out.position[place][:, known], out.followed[place, known])
             there = _step(sequence, (train[place], train[place + way]), here, flow)
@@ -70,7 +72,7 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, me
 def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: tuple[FloatArray, FloatArray]) -> _Points:
     """The points at the second frame."""
     source, target = (sequence.cameras[i] for i in frames)
-    pixel, depth = _project(source, here.position)
+    pixel, _ = _project(source, here.position)
     moved = pixel + _sampled(flows[0], pixel)
     apart = moved + _sampled(flows[1], moved) - pixel
     lengths = np.square(moved - pixel).sum(axis=0)
