@@ -266,21 +266,19 @@ class Run:
         """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
 
         lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
-        returns   the keys of metrics.json that `evaluate_model` lists. For example
+        returns   the keys of metrics.json that `measure_model` lists. For example
                   result["held_out"]["mean"]["psnr_tissue"], in dB; a metric without a finite value is None
 
         Raises: InputError if the sequence or the weights cannot be used.
         """
-        from endotsr.evaluation.evaluate import evaluate_model
+        from endotsr.evaluation.run import measure_model
         from endotsr.evaluation.lpips import load_lpips_weights
 
         weights = load_lpips_weights(None if lpips is None else Path(lpips))
-        sequence = self.sequence
-
-        def render_frame(index: int):
-            return self.render(float(sequence.times[index]), sequence.cameras[index]).colour
-
-        return evaluate_model(sequence, render_frame, weights)
+        sequence, about = self.sequence, self.record["input"]
+        simulator = checked(about.get("simulator", {}), SimulatorSettings, "run.json", "input.simulator.")
+        truth = sources.true_positions_of(str(about["source"]), simulator, self.config)
+        return measure_model(self.model, sequence, weights, truth)[0]
 
     def resume(self, on_iteration: OnIteration | None = None, on_message: OnMessage = print) -> "Run":
         """Train on to the planned number of iterations; returns this run. A finished run stays as it is.

@@ -53,10 +53,10 @@ def evaluate_run(
     from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.model import load_model
-    from endotsr.runs.sources import true_positions_of
+    from endotsr.runs.sources import run_source, true_positions_of
 
     weights = load_lpips_weights(lpips)
-    model, truth = load_model(folder), true_positions_of(folder)
+    model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
     metrics, held_out = measure_run(model, sequence, folder.record(), weights, published, truth)
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))

@@ -43,12 +43,30 @@ def measure_run(
     published: tuple[dict[str, Any], ...] = (),
     true_positions: TruePositions | None = None,
 ) -> tuple[dict[str, Any], dict[int, RenderOut]]:
-    """metrics.json of a model, and the renders of the held-out frames by frame number.
+    """metrics.json of a run, and the renders of the held-out frames by frame number.
 
     record          run.json of the run
     weights         None: the LPIPS values are None
     published       rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
     true_positions  of a simulated sequence: the motion is measured too
+    """
+    metrics, held_out = measure_model(model, sequence, weights, true_positions)
+    metrics["published"] = list(published)
+    metrics["run"] = _about_run(record, model)
+    return metrics, held_out
+
+
+def measure_model(
+    model: Model,
+    sequence: Sequence,
+    weights: LpipsWeights | None = None,
+    true_positions: TruePositions | None = None,
+) -> tuple[dict[str, Any], dict[int, RenderOut]]:
+    """The part of metrics.json that needs no run folder, and the renders of the held-out frames.
+
+    returns  the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at the
+             neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`, or None;
+             `components`, the means with one residual left out
     """
 
     def render(index: int, taken_out: str = "") -> RenderOut:
@@ -62,8 +80,6 @@ def measure_run(
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
     metrics["trajectories"] = None if motion is None else motion._asdict() | {"unit": sequence.unit}
     metrics["components"] = _components(model, sequence, render, metrics["held_out"]["mean"])
-    metrics["published"] = list(published)
-    metrics["run"] = _about_run(record, model)
     return metrics, held_out
 
 

@@ -111,14 +111,15 @@ def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
     return sequence
 
 
-def true_positions_of(folder: RunFolder) -> "Callable[[int, int], FloatArray] | None":
-    """The true motion of the sequence of a run, if it is simulated; see `SimulatedSequence.true_positions`."""
-    source, simulator = run_source(folder)
+def true_positions_of(
+    source: str, simulator: SimulatorSettings, config: Config
+) -> "Callable[[int, int], FloatArray] | None":
+    """The true motion of a sequence, if it is simulated; see `SimulatedSequence.true_positions`."""
     if source != SIMULATED:
         return None
     from endotsr.simulator.simulate import simulate
 
-    return simulate(simulated_settings(simulator, folder.config())).true_positions
+    return simulate(simulated_settings(simulator, config)).true_positions
 
 
 def sequence_record(sequence: Sequence) -> dict[str, Any]:

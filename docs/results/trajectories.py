@@ -1,0 +1,102 @@
+"""Train presets on simulated scenes whose true motion is known, over seeds, and write the table of the errors.
+
+    python docs/results/trajectories.py [--seeds 3] [--iterations 1500] [--table]
+
+Every scene is trained with `paper` and `sharp`, both stretched to the same number of iterations and with the points of
+`demo`. The result is docs/results/trajectories.json; the table stands in docs/results/README.md between the
+`trajectories:start` and `trajectories:end` marks. --table writes the table of the last result again.
+"""
+
+import argparse
+import json
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import endotsr
+from endotsr.config import DEMO
+from endotsr.report.tables import markdown
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine
+
+FOLDER = Path(__file__).parent
+START, END = "<!-- trajectories:start (made by docs/results/trajectories.py) -->", "<!-- trajectories:end -->"
+SCENES: dict[str, dict[str, Any]] = {
+    "demo": {},
+    "pull and breath": {
+        "frames": 40, "seed": 7, "width": 192, "height": 144,
+        "pulsation": {"on": False}, "brightening": {"on": False}, "pull": {"amplitude": 7.0},
+    },
+}  # fmt: skip
+PRESETS = ("paper", "sharp")
+SHOWN = (
+    ("scene_units", "trajectory error, mm", 3),
+    ("pixels", "trajectory error, px", 2),
+    ("psnr_tissue", "held-out PSNR tissue, dB", 2),
+    ("cross_fade", "blend of its own renders, dB", 2),
+    ("flow", "optical flow, dB", 2),
+)
+
+
+def measured(scene: dict[str, Any], preset: str, seed: int, iterations: int) -> dict[str, float]:
+    """Train one preset on one scene, and measure it."""
+    sequence = endotsr.load_sequence("simulated", simulator=scene)
+    points = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
+    threshold = {"gradient_threshold": DEMO.density.gradient_threshold}
+    config = endotsr.make_config(
+        preset, iterations=iterations, training={"seed": seed}, initialisation=points, density=threshold
+    )
+    metrics = endotsr.train(sequence, config, on_message=lambda text: None).evaluate()
+    return metrics["trajectories"] | {
+        "psnr_tissue": metrics["held_out"]["mean"]["psnr_tissue"],
+        "cross_fade": metrics["cross_fade"]["mean"]["psnr_tissue"],
+        "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
+    }
+
+
+def table(result: dict[str, Any]) -> str:
+    """Mean and standard deviation over the seeds, and what the tissue itself moves."""
+    rows = []
+    for scene, presets in result["scenes"].items():
+        for preset, runs in presets.items():
+            cells = [_over(np.array([run[key] for run in runs]), digits) for key, _, digits in SHOWN]
+            rows.append([f"{scene}, `{preset}`", f"{runs[0]['motion_scene_units']:.3f}", *cells])
+    about = (
+        f"Mean ± standard deviation over {result['seeds']} seeds, {result['iterations']} iterations; "
+        f"{result['machine']['processor']}, {result['date']}."
+    )
+    return (
+        markdown(["Scene and preset", "the tissue moves, mm", *(label for _, label, _ in SHOWN)], rows) + "\n\n" + about
+    )
+
+
+def _over(values: np.ndarray, digits: int) -> str:
+    return f"{values.mean():.{digits}f} ± {values.std(ddof=1) if values.size > 1 else 0:.{digits}f}"
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--iterations", type=int, default=1500)
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args()
+    file = FOLDER / "trajectories.json"
+    if not options.table:
+        scenes = {
+            name: {p: [measured(scene, p, s, options.iterations) for s in range(options.seeds)] for p in PRESETS}
+            for name, scene in SCENES.items()
+        }
+        about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
+        write_json(file, about | {"machine": machine(), "scenes": scenes})
+    page = FOLDER / "README.md"
+    head, _, rest = page.read_text(encoding="utf-8").partition("<!-- trajectories:start")
+    tail = rest.partition(END)[2]
+    text = table(json.loads(file.read_text(encoding="utf-8")))
+    page.write_text(f"{head}{START}\n{text}\n{END}{tail}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
