@@ -271,8 +271,8 @@ class Run:
 
         Raises: InputError if the sequence or the weights cannot be used.
         """
-        from endotsr.evaluation.run import measure_model
         from endotsr.evaluation.lpips import load_lpips_weights
+        from endotsr.evaluation.run import measure_model
 
         weights = load_lpips_weights(None if lpips is None else Path(lpips))
         sequence, about = self.sequence, self.record["input"]
