@@ -53,9 +53,10 @@ def evaluate_run(
     from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.model import load_model
+    from endotsr.runs.records import REPORTED
 
     weights = load_lpips_weights(lpips)
-    metrics, held_out = measure_run(load_model(folder), sequence, folder.record(), weights, published)
+    metrics, held_out = measure_run(load_model(folder), sequence, folder.record(*REPORTED), weights, published)
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))
     print(f"report: {folder.path / 'report.html'}", flush=True)
