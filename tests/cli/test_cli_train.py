@@ -423,6 +423,7 @@ def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypat
 def test_damaged_checkpoint_is_one_line(damage, finished_run, tmp_path, capsys):
     out = tmp_path / "run"
     shutil.copytree(finished_run, out)
+    (out / "checkpoint.previous.npz").unlink()
     file = out / "checkpoint.npz"
     file.write_bytes(file.read_bytes()[:5000] if damage == "truncated" else b"PK not really")
     for words in (resume(out), ["evaluate", str(out)], ["render", str(out), "--out", str(tmp_path / "pictures")]):

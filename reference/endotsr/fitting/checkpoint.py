@@ -96,9 +96,11 @@ def save_checkpoint(
             os.fsync(file.fileno())
         _keep_previous(path)
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):  # of a folder that has vanished
             temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
+            error.filename = str(path)
         raise
     _sync_folder(path.parent)
 

@@ -174,11 +174,11 @@ class _Recorder:
                     self.on_checkpoint(state)
             self._mark("interrupted")
             return KeyboardInterrupt(self._advice())
+        if not self._folder.path.is_dir():
+            return RunStopped(f"{self._folder.path}: the run folder has vanished, and what was trained is lost")
         self._mark("failed")
         if isinstance(error, Diverged):
             return self._dumped(error, state)
-        if isinstance(error, OSError) and not self._folder.path.is_dir():
-            return RunStopped(f"{self._folder.path}: the run folder has vanished; what was trained is lost")
         if isinstance(error, OSError):
             return RunStopped(f"{os_error_line(error, self._folder.path)}; {self._advice()}")
         return error
