@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
 from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.png import LARGEST_FILE, pixels_only
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -49,12 +50,11 @@ def check_png_bytes(data: bytes, name: object) -> None:
         kind = data[position + 4 : position + 8]
         end = position + 12 + length
         if end > len(data):
-            raise InputError(
-                f"{name}: truncated PNG: chunk {kind.decode('latin-1')} needs {end} bytes, the file has {len(data)}"
-            )
+            shown = plain_line(kind.decode("latin-1"))
+            raise InputError(f"{name}: truncated PNG: chunk {shown} needs {end} bytes, the file has {len(data)}")
         (stored,) = struct.unpack_from(">I", data, end - 4)
         if zlib.crc32(memoryview(data)[position + 4 : end - 4]) != stored:
-            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {kind.decode('latin-1')}")
+            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {plain_line(kind.decode('latin-1'))}")
         if kind == b"IEND":
             return
         position = end

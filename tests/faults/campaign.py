@@ -22,10 +22,10 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "cli")]
 
-from file_layer import disk_full, killed, operations, read_only
-from tiny import assert_same_run, train_words, written_folder
+from file_layer import disk_full, killed, operations, read_only  # noqa: E402
+from tiny import assert_same_run, train_words, written_folder  # noqa: E402
 
-from endotsr.cli.main import main as endotsr
+from endotsr.cli.main import main as endotsr  # noqa: E402
 
 
 class Bench:

@@ -123,6 +123,8 @@ SEQUENCE = {
     "time beyond any number": ("times", 1, 10**400),
     "time outside": ("times", 1, -0.5),
     "fewer times": ("times", [0.0]),
+    "no times": ("times", []),
+    "names are null": ("names", None),
     "index out of range": ("train_index", 0, 9),
     "negative index": ("test_index", 0, -1),
     "index twice": ("train_index", 0, 2),

@@ -90,14 +90,14 @@ class CameraPart(_Part, kw_only=True):
 class SequenceRecord(_Part, kw_only=True):
     """sequence.json."""
 
-    unit: Text | None = None
-    largest_depth: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | None = None
-    static_camera: bool | None = None
-    names: list[Text] | None = None
-    times: list[Moment] | None = None
-    train_index: list[Count] | None = None
-    test_index: list[Count] | None = None
-    cameras: list[CameraPart] | None = None
+    unit: Text | msgspec.UnsetType = msgspec.UNSET
+    largest_depth: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | msgspec.UnsetType = msgspec.UNSET
+    static_camera: bool | msgspec.UnsetType = msgspec.UNSET
+    names: list[Text] | msgspec.UnsetType = msgspec.UNSET
+    times: list[Moment] | msgspec.UnsetType = msgspec.UNSET
+    train_index: list[Count] | msgspec.UnsetType = msgspec.UNSET
+    test_index: list[Count] | msgspec.UnsetType = msgspec.UNSET
+    cameras: list[CameraPart] | msgspec.UnsetType = msgspec.UNSET
 
 
 REPORTED = (
@@ -120,19 +120,19 @@ def check_sequence_record(record: dict[str, Any], path: Path) -> None:
     cameras have a rotation and at most 2^26 pixels. A static camera is listed once.
     """
     found = _typed(record, SequenceRecord, path)
-    names = [file_name(name, f"{path}: names") for name in found.names or ()]
+    names = [file_name(name, f"{path}: names") for name in found.names or ()]  # UNSET is false
     if len(set(names)) < len(names):
         raise InputError(f"{path}: names: two frames have one name; allowed: a name for each frame")
-    if found.names is not None and found.times is not None and len(found.times) != len(names):
+    if isinstance(found.names, list) and isinstance(found.times, list) and len(found.times) != len(names):
         raise InputError(f"{path}: times: {len(found.times)} for {len(names)} frames; allowed: one a frame")
     train, test = found.train_index or [], found.test_index or []
-    count = len(names) if found.names is not None else len(found.times or ())
+    count = len(names or found.times or ())
     for key, index in (("train_index", train), ("test_index", test)):
         if index and (max(index) >= count or len(set(index)) < len(index)):
             raise InputError(f"{path}: {key}: allowed: frames from 0 to {count - 1}, each once")
     if set(train) & set(test):
         raise InputError(f"{path}: test_index: frame {min(set(train) & set(test))} is a training frame as well")
-    if found.cameras is not None and found.static_camera is not None and count:
+    if isinstance(found.cameras, list) and isinstance(found.static_camera, bool) and count:
         _check_cameras(found.cameras, 1 if found.static_camera else count, path)
 
 

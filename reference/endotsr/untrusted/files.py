@@ -55,11 +55,12 @@ def read_bytes(path: Path, largest: int) -> bytes:
     """The content of a regular file. Raises InputError as `open_regular` does, and if the file cannot be read."""
     with open_regular(path, largest) as file:
         try:
-            data = file.read(largest + 1)
+            size = os.fstat(file.fileno()).st_size
+            data = file.read(size + 1)  # no more memory than the file needs
         except OSError as error:
             raise _refusal(path, error) from None
-    if len(data) > largest:  # it has grown since its size was read
-        raise InputError(f"{path}: has more than {largest} bytes; allowed: at most {largest}")
+    if len(data) > size:
+        raise InputError(f"{path}: grew while it was read; allowed: a file that nobody is writing")
     return data
 
 

@@ -23,7 +23,9 @@ def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
 def parsed(text: str | bytes, where: str) -> Any:
     """JSON text as Python values. Raises InputError for anything else: NaN, or too many brackets inside each other."""
     try:
-        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_integer)
+        found = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_integer)
+        json.dumps(found, ensure_ascii=False).encode()  # half of a pair of surrogates is no letter
+        return found
     except RecursionError:
         raise InputError(f"{where}: cannot be read: it is nested too deeply") from None
     except ValueError as error:  # of JSON, of UTF-8, and of an integer with thousands of digits

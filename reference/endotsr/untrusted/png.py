@@ -51,9 +51,10 @@ def pixels_only(data: bytes, name: object) -> bytes:
     parts = [content for kind, content in chunks if kind == b"IDAT"]
     _check_pixels(b"".join(parts), header, name)
     kept += [(b"IDAT", content) for content in parts]
-    if len(kept) + 1 == len(chunks):
+    kept.append((b"IEND", b""))
+    if kept == chunks:
         return data
-    return data[:8] + b"".join(_chunk(kind, content) for kind, content in [*kept, (b"IEND", b"")])
+    return data[:8] + b"".join(_chunk(kind, content) for kind, content in kept)
 
 
 def _chunks(data: bytes) -> list[tuple[bytes, bytes]]:

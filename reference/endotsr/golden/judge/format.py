@@ -240,5 +240,5 @@ def read_struct(path: Path, kind: type[Any]) -> Any:
     data = read_bytes(path, LARGEST_TEXT)
     try:
         return msgspec.json.decode(data, type=kind)
-    except RecursionError:
-        raise msgspec.DecodeError("it is nested too deeply") from None
+    except (RecursionError, UnicodeDecodeError) as error:
+        raise msgspec.DecodeError(f"no JSON text: {error}") from None
