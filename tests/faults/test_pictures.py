@@ -96,6 +96,23 @@ def test_written_pictures_pass_unchanged(shape, dtype, tmp_path):
     assert np.array_equal(read_png(tmp_path / "a.png"), values)
 
 
+@pytest.mark.parametrize("parts", [1, 3])
+def test_bytes_after_the_pixels_are_left_out(parts, capfd):
+    packed = pixels() + b"left over"
+    cut = [packed[k * len(packed) // parts : (k + 1) * len(packed) // parts] for k in range(parts)]
+    assert (decode_png(png(header(), *(chunk(b"IDAT", p) for p in cut)), "a.png") == decode_png(WHOLE, "a.png")).all()
+    with pytest.raises(InputError, match="its pixels are not those of"):
+        decode_png(png(header(), chunk(b"IDAT", pixels() + bytes(100))), "a.png")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("end", [b"", b"content"])
+def test_the_end_is_written_anew(end, capfd):
+    odd = SIGNATURE + header() + chunk(b"IDAT", pixels()) + chunk(b"IEND", end)
+    assert pixels_only(odd, "a.png") == WHOLE and decode_png(odd, "a.png").shape == (3, 4, 3)
+    assert capfd.readouterr() == ("", "")
+
+
 def interlaced(width, height):
     """An interlaced grey picture of zeros."""
     passes = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))

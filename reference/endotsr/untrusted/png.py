@@ -49,8 +49,9 @@ def pixels_only(data: bytes, name: object) -> bytes:
     kept += palette
     kept += _transparency(chunks, header, len(palette[0][1]) // 3 if palette else 0)
     parts = [content for kind, content in chunks if kind == b"IDAT"]
-    _check_pixels(b"".join(parts), header, name)
-    kept += [(b"IDAT", content) for content in parts]
+    packed = b"".join(parts)
+    extra = _check_pixels(packed, header, name)
+    kept += [(b"IDAT", content) for content in (parts if not extra else [packed[:-extra]])]
     kept.append((b"IEND", b""))
     if kept == chunks:
         return data
@@ -104,8 +105,11 @@ def _transparency(chunks: list[tuple[bytes, bytes]], header: Header, entries: in
     return fits
 
 
-def _check_pixels(packed: bytes, header: Header, name: object) -> None:
-    """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown filter of a row."""
+def _check_pixels(packed: bytes, header: Header, name: object) -> int:
+    """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown filter of a row.
+
+    returns  bytes after the end of the compressed pixels
+    """
     rows = _rows(header)
     size = sum(count * (1 + stride) for count, stride in rows)
     unpacker = zlib.decompressobj()
@@ -122,6 +126,7 @@ def _check_pixels(packed: bytes, header: Header, name: object) -> None:
         if filters.max(initial=0) > LAST_FILTER:
             raise InputError(f"{name}: damaged PNG: a row of pixels uses an unknown filter")
         position += count * (1 + stride)
+    return len(unpacker.unused_data)
 
 
 def _rows(header: Header) -> list[tuple[int, int]]:
