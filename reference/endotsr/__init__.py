@@ -10,6 +10,7 @@ The rooms of the package follow the order of the paper:
     scene, fitting         the Gaussians, and their training
     sequences, simulator   input: folders, or simulated sequences with known truth
     evaluation             metrics and baselines
+    untrusted              what every file of another person passes before it is read
 
 Every forward pass `<stage>_forward` has its manual reverse pass `<stage>_reverse` directly below it.
 """

@@ -185,7 +185,7 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
 
     folder = run_folders.open_run(Path(path))
     model = load_model(folder)
-    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= model.iteration]
+    log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]
     opened = Run(model.config, folder.record(), folder.sequence_record(*RENDERING), log)
     opened._model, opened._folder = model, folder
     opened._source = None if sequence is None else str(sequence)

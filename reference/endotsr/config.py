@@ -14,6 +14,9 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 
 from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+
+LARGEST_SETTINGS = 1 << 20  # bytes of a TOML file
 
 SectionType = TypeVar("SectionType", bound=msgspec.Struct)
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -331,11 +334,12 @@ def load_config(path: Path) -> Config:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, unchecked. Raises InputError naming the file."""
+    text = read_text(Path(path), LARGEST_SETTINGS)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))  # some editors begin with a byte-order mark
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    except tomllib.TOMLDecodeError as error:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: it is nested too deeply") from None
+    except ValueError as error:  # of TOML, and of dates or integers that Python cannot hold
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
+from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.png import LARGEST_FILE, pixels_only
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
@@ -26,6 +29,8 @@ CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness
 def _cv2() -> Any:
     import cv2
 
+    # Its messages on standard error name no file, and every failed call raises or returns nothing.
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     return cv2
 
 
@@ -45,12 +50,11 @@ def check_png_bytes(data: bytes, name: object) -> None:
         kind = data[position + 4 : position + 8]
         end = position + 12 + length
         if end > len(data):
-            raise InputError(
-                f"{name}: truncated PNG: chunk {kind.decode('latin-1')} needs {end} bytes, the file has {len(data)}"
-            )
+            shown = plain_line(kind.decode("latin-1"))
+            raise InputError(f"{name}: truncated PNG: chunk {shown} needs {end} bytes, the file has {len(data)}")
         (stored,) = struct.unpack_from(">I", data, end - 4)
         if zlib.crc32(memoryview(data)[position + 4 : end - 4]) != stored:
-            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {kind.decode('latin-1')}")
+            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {plain_line(kind.decode('latin-1'))}")
         if kind == b"IEND":
             return
         position = end
@@ -59,6 +63,7 @@ def check_png_bytes(data: bytes, name: object) -> None:
 def decode_png(data: bytes, name: object) -> Array:
     """Pixels of a PNG held in memory; `name` is used in messages only. See `read_png`."""
     check_png_bytes(data, name)
+    data = pixels_only(data, name)
     cv2 = _cv2()
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -78,14 +83,11 @@ def read_png(path: Path) -> Array:
 
     returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored; transparency is dropped
 
-    Raises:  InputError naming the file if it is missing, not a PNG, truncated or damaged. OpenCV decodes a
-             truncated file into a half-grey picture without an error, so the chunk structure is checked first.
+    Raises:  InputError naming the file if it is missing, no regular file, not a PNG, truncated, damaged or too large.
+             OpenCV decodes a truncated file into a half-grey picture without an error, so the chunks and the number
+             of compressed pixels are checked first.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    return decode_png(data, path)
+    return decode_png(read_bytes(path, LARGEST_FILE), path)
 
 
 def write_png(path: Path, pixels: Array) -> None:

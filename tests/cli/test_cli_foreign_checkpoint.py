@@ -90,8 +90,8 @@ def test_a_checkpoint_from_before_the_residuals_is_of_the_run(run, tmp_path, mon
     early = tmp_path / "early"
     save = training_state.save_state
 
-    def stop(path, state, config):
-        save(path, state, config)
+    def stop(path, state, config, sequence):
+        save(path, state, config, sequence)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(training_state, "save_state", stop)

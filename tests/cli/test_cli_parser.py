@@ -67,7 +67,8 @@ def test_a_negative_number_is_a_value(word):
 
 def test_several_values_and_none():
     assert tried("--sizes", "3", "4", "5").sizes == (3, 4, 5)
-    assert tried("--sizes").sizes == ()
+    with pytest.raises(InputError, match="--sizes: missing value"):
+        tried("--sizes")
     assert tried("--sequence.depth-percentiles", "1", "99").settings.sequence.depth_percentiles == (1.0, 99.0)
 
 

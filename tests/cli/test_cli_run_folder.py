@@ -163,7 +163,7 @@ def damaged_copy(run, out, name, text):
     [
         ("{}", "input.source is missing"),
         ('{"input": {}}', "input.source is missing"),
-        ('{"input": 3}', "input.source is missing"),
+        ('{"input": 3}', "input"),
         ('{"input": {"source": "simulated"}}', "input.arrays_sha256 is missing"),
         ('{"input": {"source": "x", "arrays_sha256": {}, "simulator": {"width": "x"}}}', "input.simulator.width = 'x'"),
         ("[]", "holds list; allowed: an object"),

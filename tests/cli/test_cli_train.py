@@ -37,7 +37,7 @@ def resume(out):
 
 def test_run_folder_explains_itself(finished_run):
     names = {p.name for p in finished_run.iterdir()}
-    expected = {"config.toml", "run.json", "sequence.json", "log.jsonl", "checkpoint.npz"}
+    expected = {"config.toml", "run.json", "sequence.json", "log.jsonl", "checkpoint.npz", "checkpoint.previous.npz"}
     assert names == expected | {"metrics.json", "renders", "curves.png", "report.html", "test"}
     record = RunFolder(finished_run).record()
     assert record["status"] == "finished" and record["iterations_done"] == LAST
@@ -410,8 +410,8 @@ def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypat
     assert weight > 0
     save = training_state.save_state
 
-    def stop(path, state, config):
-        save(path, state, config)
+    def stop(path, state, config, sequence):
+        save(path, state, config, sequence)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(training_state, "save_state", stop)
@@ -427,6 +427,7 @@ def test_calibrated_weight_is_recorded_and_survives_resuming(tmp_path, monkeypat
 def test_damaged_checkpoint_is_one_line(damage, finished_run, tmp_path, capsys):
     out = tmp_path / "run"
     shutil.copytree(finished_run, out)
+    (out / "checkpoint.previous.npz").unlink()
     file = out / "checkpoint.npz"
     file.write_bytes(file.read_bytes()[:5000] if damage == "truncated" else b"PK not really")
     for words in (resume(out), ["evaluate", str(out)], ["render", str(out), "--out", str(tmp_path / "pictures")]):

@@ -22,7 +22,8 @@ from endotsr.config import (
 from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
-from endotsr.fitting.checkpoint import check_lengths, load_checkpoint
+from endotsr.fitting.checkpoint import load_checkpoint
+from endotsr.fitting.checkpoint_values import check_lengths
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
 from endotsr.fitting.schedules import densify_now

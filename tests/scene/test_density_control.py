@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from endotsr.config import DensityConfig
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
-from endotsr.fitting.checkpoint import check_lengths
+from endotsr.fitting.checkpoint_values import check_lengths
 from endotsr.scene.density_control import (
     DensityStatistics,
     _fainter_than,

@@ -276,7 +276,7 @@ DAMAGES = {
     "poses cut": (_cut("poses_bounds.npy", 0.5), {}, r"poses_bounds.npy: not a plain NumPy array"),
     "poses no array": (lambda f: (f / "poses_bounds.npy").write_bytes(b"x" * 99), {}, r"poses_bounds.npy: not a plain"),
     "poses pickled": (_rewrite_rows(lambda r: np.array([{}] * 5, object)), {}, r"poses_bounds.npy: not a plain"),
-    "poses text": (_rewrite_rows(lambda r: r.astype(str)), {}, r"poses_bounds.npy: not one array of real numbers"),
+    "poses text": (_rewrite_rows(lambda r: r.astype(str)), {}, r"poses_bounds.npy: not a plain NumPy array"),
     "poses shape": (_rewrite_rows(lambda r: r[:, :15]), {}, r"poses_bounds.npy: shape \(5, 15\), expected"),
     "poses count": (_rewrite_rows(lambda r: r[:4]), {}, r"poses_bounds.npy: 4 poses for 5 images"),
     "poses NaN": (_rewrite_rows(_set(3, 8, np.nan)), {}, r"poses_bounds.npy: frame 3: value 8 of the row is nan"),

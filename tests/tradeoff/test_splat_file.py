@@ -85,7 +85,7 @@ def test_refusals(tmp_path):
     whole.write_bytes(whole.read_bytes()[:-50])
     reasons = {
         "text.ply": "not a binary little-endian PLY", "bands.ply": "6 f_rest columns", "empty.ply": "not a binary",
-        "a.npz": "cannot be read", "less.npz": "is missing", "nan.npz": "no Gaussian with finite numbers",
+        "a.npz": "not an .npz file", "less.npz": "is missing", "nan.npz": "no Gaussian with finite numbers",
         "cut.ply": "cannot be read", "missing.ply": "No such file", "x.txt": "ends in .ply or .npz",
     }  # fmt: skip
     for name, reason in reasons.items():

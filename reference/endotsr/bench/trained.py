@@ -3,7 +3,6 @@
 The file is an npz with xyz (N, 3), log_scale (N, 3), quat_wxyz (N, 4), rgb (N, 3) and opacity (N,).
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,10 @@ from endotsr.errors import InputError
 from endotsr.kernels.constants import Y00
 from endotsr.scene import workload
 from endotsr.scene.gaussians import Gaussians
+from endotsr.untrusted.arrays import Refused, open_npz
 
 ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
+LARGEST_FILE = 1 << 32  # bytes
 DEPTH = 4.0  # scene units of the middle of the scene, that of the common workload
 PERCENTILES = (1, 99)  # of the positions: the range that is scaled to the picture
 
@@ -52,9 +53,11 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     Raises: InputError naming the file and what is missing or has another shape.
     """
     try:
-        with np.load(path) as file:
-            found = {name: file[name] for name in ARRAYS}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        with open_npz(path, LARGEST_FILE, compressed=True) as file:
+            found = {name: file.read(name) for name in ARRAYS}
+    except InputError:
+        raise
+    except (Refused, KeyError) as error:
         reason = error.args[0] if isinstance(error, KeyError) else error
         raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
     for name, rest in ARRAYS.items():

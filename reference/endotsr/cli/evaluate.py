@@ -53,11 +53,12 @@ def evaluate_run(
     from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.model import load_model
+    from endotsr.runs.records import REPORTED
     from endotsr.runs.sources import run_source, true_positions_of
 
     weights = load_lpips_weights(lpips)
     model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
-    metrics, held_out = measure_run(model, sequence, folder.record(), weights, published, truth)
+    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))
     print(f"report: {folder.path / 'report.html'}", flush=True)

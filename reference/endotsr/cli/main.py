@@ -13,6 +13,7 @@ import sys
 from endotsr import __version__
 from endotsr.errors import CalibrationError, InputError
 from endotsr.runs.stopping import signals_stop
+from endotsr.untrusted.names import plain_line
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
@@ -24,6 +25,14 @@ COMMANDS = {
     "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
     "tradeoff": "measure error against time, and find the best setting within a budget",
     "golden": "golden vectors for ports: judge outputs, run a port, check the vectors",
+}
+
+OTHER_PROGRAMS = "end other programs that hold memory"
+LESS_MEMORY = {  # what a user of this command can do; every other command has no option that needs less
+    "train": "a smaller --scale, fewer --frames (of `simulated`: --simulator.frames) or a smaller --density.maximum "
+    "needs less; with --resume, " + OTHER_PROGRAMS,
+    "demo": "a smaller --scale or fewer --simulator.frames needs less",
+    "bench": "a smaller size needs less (`endotsr bench --help`)",
 }
 
 
@@ -63,7 +72,7 @@ def main(argv: list[str] | None = None) -> int:
         _fail(f"training diverged: non-finite values: {error}; a smaller learning rate may help")
         return 1
     except MemoryError:
-        return _fail("not enough memory; a smaller --scale or fewer --frames needs less")
+        return _fail(f"not enough memory; {LESS_MEMORY.get(argv[0], OTHER_PROGRAMS)}")
 
 
 def _command(name: str):
@@ -73,7 +82,7 @@ def _command(name: str):
 
 
 def _fail(message: str) -> int:
-    print(f"endotsr: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"endotsr: error: {plain_line(message)}", file=sys.stderr)
     return 2
 
 

@@ -51,15 +51,17 @@ def run(words: list[str]) -> int:
     """The command."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.folder import refuse_existing
+    from endotsr.runs.sources import refuse_inside_data
 
     options = parse(RenderOptions, words, "render")
     folder = open_run(options.run)
     views = wanted_views(folder.sequence_record("names", "times", "train_index", "test_index"), options)
     refuse_existing(options.out)
+    refuse_inside_data(options.out, folder)
     use_threads(options.threads)
     render = renderer(folder, without=options.without)
     options.out.absolute().parent.mkdir(parents=True, exist_ok=True)
-    with replacing_folder(options.out) as target:
+    with replacing_folder(options.out, replace=False) as target:
         write_views(target, folder, views, render, options.npy)
     print(f"{len(views)} pictures in {options.out}: colour/, depth/, opacity/, render.json")
     return 0

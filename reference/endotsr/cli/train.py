@@ -93,7 +93,8 @@ def _settings(options: TrainOptions) -> Config:
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
     """Check everything, print the settings and the sequence, and train to the end."""
     from endotsr.kernels.threads import use_threads
-    from endotsr.runs.sources import load_sequence
+    from endotsr.runs.files import refuse_inside
+    from endotsr.runs.sources import SIMULATED, load_sequence
     from endotsr.runs.training import start_record, train_new_run
 
     if not options.sequence:
@@ -101,6 +102,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     assert options.out is not None
     config, source = _settings(options), options.sequence
     refuse_existing(options.out)
+    if source != SIMULATED:
+        refuse_inside(options.out, Path(source), "the sequence")
     sequence = load_sequence(source, config, options.simulator)
     config = lengthened(config, len(sequence.train_index))
     _say_settings(config, schedule_note)

@@ -10,7 +10,6 @@ Weights file: an .npz with `conv1..5_weight` (out, in, k, k), `conv1..5_bias` (o
 
 import math
 import os
-import zipfile
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
+from endotsr.untrusted.arrays import Refused, open_npz
 
 InputRange = Literal["zero_one", "minus_one_one"]
 
@@ -31,6 +31,7 @@ PADDINGS = (2, 2, 1, 1, 1)
 POOL_BEFORE = (False, True, True, False, False)  # 3 x 3 maximum, stride 2
 POOL, POOL_STRIDE = 3, 2
 TINY = 1e-10  # added to the channel norm
+LARGEST_FILE = 1 << 28  # bytes of the weights; those of AlexNet have 10 MB
 SMALLEST_SIDE = 31  # pixels of an image side that leave one feature in the fifth map
 
 
@@ -153,12 +154,9 @@ def _unit_length(features: FloatArray) -> FloatArray:
 
 def _read_weights(path: Path) -> LpipsWeights:
     try:
-        loaded = np.load(path, allow_pickle=False)
-        if not isinstance(loaded, np.lib.npyio.NpzFile):
-            raise ValueError("it is not an .npz file")
-        with loaded:
-            arrays = {key: loaded[key] for key in loaded.files}
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        with open_npz(path, LARGEST_FILE, compressed=True) as file:
+            arrays = {name: file.read(name) for name in file.names}
+    except Refused as error:
         raise InputError(f"{path}: LPIPS weights cannot be read: {error}") from None
     kernels, biases, heads = [], [], []
     for layer, (before, after, size) in enumerate(zip(CHANNELS[:-1], CHANNELS[1:], KERNELS), start=1):

@@ -2,15 +2,20 @@
 
 The file is an uncompressed npz without pickle: a JSON header (as bytes) and one entry per array,
 `gaussians.<field>`, `first.<field>`, `second.<field>`, `statistics.<field>`, and `frames.<field>` if the model has
-parameters of frames. The header lists dtype and shape of every array, so that a missing, foreign or damaged entry is
-reported by name. The file is written beside the old one and replaces it by one rename, so that one whole checkpoint
-remains at any time.
+parameters of frames. The header lists dtype, shape and SHA-256 of every array, so that a missing, foreign or damaged
+entry is reported by name.
+
+A new file is written beside the old one and replaces it by one rename; the old one keeps its content under a second
+name (`previous_of`). At any moment there is a whole checkpoint, and after the second one there are two: if the latest
+cannot be read, `load_latest` takes the one before it. Files of every earlier version are read (`READERS`).
 """
 
+import contextlib
+import hashlib
 import json
 import os
-import zipfile
-import zlib
+import secrets
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,15 +24,24 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState
+from endotsr.fitting.checkpoint_values import check_numbers, check_shapes
 from endotsr.scene.density_control import DensityStatistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, trained
+from endotsr.untrusted.arrays import NpzFile, Refused, open_npz
+from endotsr.untrusted.json import parsed
 
 FORMAT = "endotsr checkpoint"
-VERSION = 1
+VERSION = 2
 HEADER = "header"
+LARGEST = 1 << 36  # bytes: eight million Gaussians of the preset `paper`
+MOST_ITERATIONS = 1 << 53
 GROUPS = {"gaussians": Gaussians, "statistics": DensityStatistics, "frames": FrameParameters}
 TRAINED = {*Gaussians._fields, *FrameParameters._fields} - {"times"}
+
+
+class DamagedCheckpoint(InputError):
+    """A file that is no whole checkpoint, or whose numbers no training can have written."""
 
 
 class Checkpoint(NamedTuple):
@@ -42,6 +56,11 @@ class Checkpoint(NamedTuple):
     frames: FrameParameters | None = None  # None if the model has no parameters of frames
 
 
+def previous_of(path: Path) -> Path:
+    """Where the checkpoint before the one at `path` is kept: `checkpoint.previous.npz` beside `checkpoint.npz`."""
+    return path.with_name(f"{path.stem}.previous{path.suffix}")
+
+
 def save_checkpoint(
     path: Path,
     gaussians: Gaussians,
@@ -54,7 +73,8 @@ def save_checkpoint(
 ) -> None:
     """Write atomically; `rng_state` is `rng.bit_generator.state`, `header` any JSON-able dictionary.
 
-    Raises: OSError if it cannot be written (a full disk); the previous file is then intact and nothing else is left.
+    A checkpoint that is there already becomes the previous one, and the previous one is removed.
+    Raises: OSError if it cannot be written (a full disk); both earlier files are then intact and nothing else is left.
     """
     path = Path(path)
     entries = _entries(gaussians, adam, statistics, frames)
@@ -65,19 +85,56 @@ def save_checkpoint(
         "rng_state": rng_state,
         "steps": adam.step,
         "header": header,
-        "arrays": {key: [a.dtype.str, list(a.shape)] for key, a in entries.items()},
+        "arrays": {key: [a.dtype.str, list(a.shape), digest(a)] for key, a in entries.items()},
     }
     text = np.frombuffer(json.dumps(description).encode(), np.uint8)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        with open(temporary, "wb") as file:
+        with open(temporary, "xb") as file:
             np.savez(file, allow_pickle=False, **{HEADER: text}, **entries)
             file.flush()
             os.fsync(file.fileno())
+        _keep_previous(path)
         os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):  # of a folder that has vanished
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
+            error.filename = str(path)
         raise
+    _sync_folder(path.parent)
+
+
+def digest(array: NDArray) -> str:
+    """SHA-256 in hex of the bytes of an array in C order."""
+    return hashlib.sha256(np.ascontiguousarray(array).data if array.size else b"").hexdigest()
+
+
+def _keep_previous(path: Path) -> None:
+    """Give the checkpoint at `path` its second name. The first name stays until the new file takes it."""
+    previous = previous_of(path)
+    spare = previous.with_name(f".{previous.name}.{secrets.token_hex(4)}.part")
+    if not path.is_file():
+        return
+    try:
+        os.link(path, spare)
+    except OSError:  # a file system without hard links: for a moment the file has its second name only
+        os.replace(path, previous)
+        return
+    try:
+        os.replace(spare, previous)
+    finally:
+        spare.unlink(missing_ok=True)  # it remains where both names are of one file already
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the new names survive a power failure, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _entries(
@@ -93,64 +150,102 @@ def _entries(
     return {f"{group}.{name}": array for group, named in groups.items() for name, array in named.items()}
 
 
+def load_latest(path: Path) -> tuple[Checkpoint, str]:
+    """The checkpoint at `path`, or the one before it if this one is damaged; and a line that says so, or "".
+
+    Raises: InputError of the checkpoint at `path` if there is no other; of a version that is not known in any case.
+    """
+    previous = previous_of(path)
+    if not path.exists() and previous.is_file():  # stopped where the file system has no hard links
+        return load_checkpoint(previous), ""
+    try:
+        return load_checkpoint(path), ""
+    except DamagedCheckpoint as damaged:
+        try:
+            found = load_checkpoint(previous)
+        except InputError:
+            raise damaged from None
+        return found, f"{damaged}; the checkpoint before it is used: {previous.name}, iteration {found.iteration}"
+
+
 def load_checkpoint(path: Path) -> Checkpoint:
     """Read and check a checkpoint.
 
-    Raises: InputError naming the file and the key: not a checkpoint, another version, a missing or foreign entry,
-            dtype or shape other than the header says, object arrays, damaged or truncated data.
+    Raises: DamagedCheckpoint naming the file and the key: not a checkpoint, a missing or foreign entry, dtype, shape
+            or content other than the header says, object arrays, damaged or truncated data, numbers that are not
+            finite or out of range. InputError for a version that is not known.
     """
     path = Path(path)
     try:
-        opened = np.load(path, allow_pickle=False)
-        if not isinstance(opened, np.lib.npyio.NpzFile):
-            raise InputError(f"{path}: not a checkpoint but a single array")
-        with opened as file:
+        with open_npz(path, LARGEST) as file:
             description = _read_header(path, file)
             entries = _read_entries(path, file, description["arrays"])
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    except (zipfile.BadZipFile, ValueError, EOFError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not a checkpoint, or cut short: {error}") from None
+    except DamagedCheckpoint:
+        raise
+    except _OtherVersion as error:
+        raise InputError(str(error)) from None
+    except InputError as error:
+        raise DamagedCheckpoint(f"{error}; it is not a checkpoint, or damaged") from None
     return _assemble(path, description, entries)
 
 
-def _read(path: Path, file: Any, key: str) -> NDArray:
-    if key not in file.files:
-        raise InputError(f"{path}: {key}: missing")
-    try:
-        return file[key]
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: {key}: cannot be read: {error}") from None
+class _OtherVersion(InputError):
+    """A version that this program does not read."""
 
 
-def _read_header(path: Path, file: Any) -> dict[str, Any]:
-    raw = _read(path, file, HEADER)
+def _read(path: Path, file: NpzFile, key: str) -> NDArray:
+    if key not in file.names:
+        raise DamagedCheckpoint(f"{path}: {key}: missing")
     try:
-        description = json.loads(raw.tobytes())
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: {HEADER}: not JSON: {error}") from None
+        return file.read(key)
+    except Refused as error:
+        raise DamagedCheckpoint(f"{path}: {key}: cannot be read: {error}") from None
+
+
+def _read_header(path: Path, file: NpzFile) -> dict[str, Any]:
+    description = parsed(_read(path, file, HEADER).tobytes(), f"{path}: {HEADER}: not JSON")
     if not isinstance(description, dict) or description.get("format") != FORMAT:
-        raise InputError(f"{path}: {HEADER}: not a checkpoint of this program")
-    if description.get("version") != VERSION:
-        raise InputError(f"{path}: version: {description.get('version')!r}; this program reads {VERSION}")
+        raise DamagedCheckpoint(f"{path}: {HEADER}: not a checkpoint of this program")
+    version = description.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version not in READERS:
+        raise _OtherVersion(f"{path}: version: {version!r}; this program reads {', '.join(map(str, READERS))}")
     kinds = {"iteration": int, "rng_state": dict, "steps": dict, "header": dict, "arrays": dict}
     for key, kind in kinds.items():
-        if not isinstance(description.get(key), kind):
-            raise InputError(f"{path}: {HEADER}.{key}: {kind.__name__} expected")
+        if not isinstance(description.get(key), kind) or isinstance(description[key], bool):
+            raise DamagedCheckpoint(f"{path}: {HEADER}.{key}: {kind.__name__} expected")
+    for key, count in {"iteration": description["iteration"], **description["steps"]}.items():
+        if not isinstance(count, int) or isinstance(count, bool) or not 0 <= count <= MOST_ITERATIONS:
+            raise DamagedCheckpoint(f"{path}: {HEADER}: {key} is no number of iterations")
+    return READERS[version](description)
+
+
+def _of_version_1(description: dict[str, Any]) -> dict[str, Any]:
+    """Version 1 has no SHA-256 of the arrays; None stands for one that is not known."""
+    listed = {k: [*v, None] if isinstance(v, list) else v for k, v in description["arrays"].items()}
+    return description | {"arrays": listed}
+
+
+def _of_version_2(description: dict[str, Any]) -> dict[str, Any]:
     return description
 
 
-def _read_entries(path: Path, file: Any, listed: dict[str, Any]) -> dict[str, NDArray]:
-    foreign = set(file.files) - set(listed) - {HEADER}
+READERS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _of_version_1, VERSION: _of_version_2}
+"""Version -> the header of that version in the form of the present one."""
+
+
+def _read_entries(path: Path, file: NpzFile, listed: dict[str, Any]) -> dict[str, NDArray]:
+    foreign = set(file.names) - set(listed) - {HEADER}
     if foreign:
-        raise InputError(f"{path}: {min(foreign)}: not listed in the header")
+        raise DamagedCheckpoint(f"{path}: {min(foreign)}: not listed in the header")
     entries = {}
     for key, expected in listed.items():
         array = _read(path, file, key)
-        if [array.dtype.str, list(array.shape)] != expected:
-            raise InputError(f"{path}: {key}: {array.dtype.str} {array.shape} found, the header says {expected}")
+        if not isinstance(expected, list) or [array.dtype.str, list(array.shape)] != expected[:2]:
+            raise DamagedCheckpoint(
+                f"{path}: {key}: {array.dtype.str} {array.shape} found, the header says {str(expected)[:80]}"
+            )
+        if len(expected) != 3 or expected[2] not in (None, digest(array)):
+            raise DamagedCheckpoint(f"{path}: {key}: its SHA-256 is not the one in the header")
         entries[key] = array
     return entries
 
@@ -159,49 +254,39 @@ def _assemble(path: Path, description: dict[str, Any], entries: dict[str, NDArra
     groups = _grouped(path, entries)
     first, second, steps = groups["first"], groups["second"], description["steps"]
     if not first.keys() == second.keys() == steps.keys():
-        raise InputError(f"{path}: steps, first, second: they name different arrays")
+        raise DamagedCheckpoint(f"{path}: steps, first, second: they name different arrays")
     gaussians, adam = Gaussians(**groups["gaussians"]), AdamState(first, second, dict(steps))
     frames = FrameParameters(**groups["frames"]) if groups["frames"] else None
     statistics = DensityStatistics(**groups["statistics"])
     try:
-        check_lengths(gaussians, adam, frames)
+        check_shapes(gaussians, adam, frames)
+        if statistics.visits.shape != (gaussians.count,) or statistics.gradient_sum.shape != (gaussians.count,):
+            raise ValueError(f"statistics: not one entry for each of {gaussians.count} Gaussians")
+        if statistics.visits.dtype != np.int64 or statistics.gradient_sum.dtype != np.float64:
+            raise ValueError("statistics: allowed: int64 visits and float64 gradient_sum")
+        check_numbers(gaussians, adam, statistics, frames)
     except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
-    if statistics.visits.shape != (gaussians.count,) or statistics.gradient_sum.shape != (gaussians.count,):
-        raise InputError(f"{path}: statistics: not one entry for each of {gaussians.count} Gaussians")
+        raise DamagedCheckpoint(f"{path}: {error}") from None
     return Checkpoint(
         gaussians, adam, description["iteration"], description["rng_state"], statistics, description["header"], frames
     )
 
 
 def _grouped(path: Path, entries: dict[str, NDArray]) -> dict[str, dict[str, NDArray]]:
-    """Arrays by group and field. Raises InputError for an unknown name or a missing required one."""
+    """Arrays by group and field. Raises DamagedCheckpoint for an unknown name or a missing required one."""
     known = {name: set(kind._fields) for name, kind in GROUPS.items()} | {"first": TRAINED, "second": TRAINED}
     groups: dict[str, dict[str, NDArray]] = {name: {} for name in known}
     for key, array in entries.items():
         group, _, name = key.partition(".")
         if name not in known.get(group, ()):
-            raise InputError(f"{path}: {key}: not known")
+            raise DamagedCheckpoint(f"{path}: {key}: not known")
         groups[group][name] = array
     for group, kind in GROUPS.items():
         required = [name for name in kind._fields if name not in kind._field_defaults]
         for name in required if group != "frames" or groups["frames"] else ():
             if name not in groups[group]:
-                raise InputError(f"{path}: {group}.{name}: missing")
+                raise DamagedCheckpoint(f"{path}: {group}.{name}: missing")
     return groups
-
-
-def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
-    """Raise ValueError if an array or a moment has not one column for each Gaussian, or for each training frame."""
-    for what, named, count in (
-        ("Gaussians", arrays(gaussians), gaussians.count),
-        ("training frames", trained(frames), 0 if frames is None else frames.times.size),
-    ):
-        for name, array in named.items():
-            moments = {f"first {name}": adam.first.get(name), f"second {name}": adam.second.get(name)}
-            for label, found in ({name: array} | moments).items():
-                if found is not None and found.shape != (*array.shape[:-1], count):
-                    raise ValueError(f"{label}: {found.shape} for {count} {what}")
 
 
 def restore_rng(state: dict[str, Any]) -> np.random.Generator:
@@ -209,6 +294,6 @@ def restore_rng(state: dict[str, Any]) -> np.random.Generator:
     generator = np.random.default_rng()
     try:
         generator.bit_generator.state = state
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError, AttributeError) as error:
         raise InputError(f"rng_state: not the state of a PCG64 generator: {error}") from None
     return generator

@@ -26,6 +26,7 @@ from endotsr.scene.parameters import FrameParameters, frame_parameters, trained
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import check_finite
+from endotsr.untrusted.json import number
 
 
 @dataclass
@@ -115,8 +116,10 @@ def check_state(state: TrainingState) -> None:
     check_finite(trained(state.frames))
 
 
-def save_state(path: Path, state: TrainingState, config: Config) -> None:
+def save_state(path: Path, state: TrainingState, config: Config, sequence: str | None = None) -> None:
     """Write a checkpoint, atomically.
+
+    sequence   fingerprint of the sequence, to which the checkpoint then belongs
 
     Raises: OSError, or FloatingPointError naming array and index if a parameter is not finite (the render
             would merely lack its Gaussian). The previous checkpoint is then intact.
@@ -125,7 +128,7 @@ def save_state(path: Path, state: TrainingState, config: Config) -> None:
         check_state(state)
     except ValueError as error:
         raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
-    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap}
+    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "sequence": sequence}
     generator = dict(state.rng.bit_generator.state)
     save_checkpoint(
         path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header, state.frames
@@ -133,8 +136,10 @@ def save_state(path: Path, state: TrainingState, config: Config) -> None:
 
 
 def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingState:
-    """The state as it was saved."""
+    """The state as it was saved. Raises InputError for a weight or a random state that no training has."""
     weight = checkpoint.header.get("lambda_lap")
+    if weight is not None:
+        number(weight, "header.lambda_lap", low=0.0)
     return TrainingState(
         checkpoint.gaussians,
         checkpoint.adam,

@@ -15,6 +15,7 @@ import numpy as np
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import adam_update, add_array, regather
+from endotsr.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
     SceneGrads,
@@ -50,6 +51,7 @@ from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, ren
 
 OnIteration = Callable[[dict[str, Any]], None]
 
+WATCHED_GRADIENTS = ("d_position", "d_log_scale", "d_quaternion", "d_opacity_logit")
 PSNR_EVERY = 10  # iterations between two training PSNRs in the log, since each costs a pass over the image
 
 
@@ -66,17 +68,22 @@ def train(
 
     With lambda_lap = "auto" and no weight yet, the base model is first trained to K_s and calibrated (equation 7).
     That pre-training is not checkpointed: after an interruption it starts again and gives the same weight.
-    Raises: FloatingPointError naming iteration, frame and terms if the loss is not finite; ValueError naming array
-            and index if the state holds a number that is not finite.
+    Raises: Diverged (a FloatingPointError) naming iteration, frame and term if a loss or a gradient is not finite;
+            the state is then that before the iteration, but for the density statistics. ValueError naming array and
+            index if the state holds a number that is not finite.
     """
     check_state(state)
+    watch = DivergenceWatch(state.gaussians)
     if state.lambda_lap is None and config.model.laplacian:
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
     shop = workshop(sequence, config)
     while state.iteration < config.training.iterations:
-        on_iteration(training_step(state, shop))
+        entry = training_step(state, shop)
+        on_iteration(entry)
+        if advice := watch.see(entry, state.gaussians):
+            on_message(advice)
         if state.iteration % config.training.checkpoint_every == 0:
             on_checkpoint(state)
     return state
@@ -95,7 +102,7 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
 
 def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
     """One iteration; returns its log entry."""
-    config, iteration = shop.config, state.iteration + 1
+    config, iteration, rng_state = shop.config, state.iteration + 1, dict(state.rng.bit_generator.state)
     if residuals_activate(iteration, config):
         _activate_residuals(state, config)
     view = draw_view(state.rng, shop.sequence, config.training)
@@ -114,6 +121,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
         timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, shop)),
         timed(timer, "density control", lambda: _watch_density(state, d_scene, camera, watched)),
     )
+    _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
     entry = _log_entry(iteration, view, loss, penalty, rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
@@ -193,6 +201,17 @@ def _control_density(state: TrainingState, shop: Workshop) -> None:
     state.gaussians, state.statistics = result.gaussians, result.statistics
 
 
+def _refuse_not_finite(
+    iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: dict[str, Any]
+) -> None:
+    """Raise `Diverged` for the first loss term or gradient that is not finite, before a parameter is changed."""
+    terms = {**loss.terms, "matern_penalty": penalty or 0.0, "loss": loss.loss}
+    broken = next(((name, str(float(v))) for name, v in terms.items() if not math.isfinite(v)), None)
+    broken = broken or not_finite({name: getattr(d_scene, name) for name in WATCHED_GRADIENTS})
+    if broken:
+        raise Diverged(iteration, view.index, *broken, rng_state)
+
+
 def _log_entry(
     iteration: int,
     view: View,
@@ -203,10 +222,8 @@ def _log_entry(
     state: TrainingState,
     config: Config,
 ) -> dict[str, Any]:
-    """The log entry of an iteration. Raises FloatingPointError on a loss that is not finite."""
+    """The log entry of an iteration."""
     total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
-    if not math.isfinite(total):
-        raise FloatingPointError(f"iteration {iteration}, frame {view.index}: loss is {total}; terms {loss.terms}")
     terms = {name: float(value) for name, value in loss.terms.items()}
     entry: dict[str, Any] = {"iteration": iteration, "frame": view.index, "loss": total, **terms}
     if penalty is not None:

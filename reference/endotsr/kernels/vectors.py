@@ -33,7 +33,10 @@ def _register_bytes() -> int:
     """64 with AVX-512; otherwise 32, which also fits into sixteen registers of 16 bytes."""
     features = numba.config.CPU_FEATURES  # type: ignore[attr-defined]  # the target that Numba compiles for
     if features is None:
-        features = get_host_cpu_features().flatten()
+        try:
+            features = get_host_cpu_features().flatten()
+        except RuntimeError:  # LLVM knows none of this processor
+            features = ""
     return 64 if "+avx512f" in features else 32
 
 

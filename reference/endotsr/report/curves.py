@@ -4,7 +4,7 @@ Every chart exists for a light and for a dark page (transparent background). A c
 not drawn; a chart without any curve is left out.
 """
 
-import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.errors import InputError
 from endotsr.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
+from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.json import parsed
 
 LogEntries = list[dict[str, Any]]
+
+LARGEST_LOG = 1 << 30  # bytes: several million iterations
 
 TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
 
@@ -34,12 +39,12 @@ def read_log(path: Path) -> LogEntries:
     if not Path(path).exists():
         return []
     entries = []
-    for line in Path(path).read_text(encoding="utf-8").splitlines():
+    for line in read_bytes(Path(path), LARGEST_LOG).splitlines():
         try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
+            entry = parsed(line, "a line of the log")
+        except InputError:
             continue
-        if isinstance(entry, dict):
+        if isinstance(entry, dict) and isinstance(entry.get("iteration", 0), int):
             entries.append(entry)
     return entries
 
@@ -49,7 +54,7 @@ def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.f
     pairs = [
         (entry.get("iteration", position + 1), entry[key])
         for position, entry in enumerate(log)
-        if isinstance(entry.get(key), int | float) and np.isfinite(entry[key])
+        if isinstance(entry.get(key), int | float) and math.isfinite(entry[key])
     ]
     table = np.array(pairs, np.float64).reshape(-1, 2)
     return table[:, 0], table[:, 1]

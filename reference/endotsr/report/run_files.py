@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.config import config_to_toml
+from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.report.curves import curves_png, read_log
 from endotsr.report.data import FramePictures, ReportData
@@ -20,6 +21,7 @@ from endotsr.runs.files import replace_file, replacing_folder, write_json
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
+from endotsr.untrusted.names import file_name
 
 
 def write_evaluation(
@@ -33,7 +35,7 @@ def write_evaluation(
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
     write_json(folder.path / "metrics.json", metrics)
     reached = metrics["run"]["iteration"]
-    log = [entry for entry in read_log(folder.log) if entry["iteration"] <= reached]  # those up to the checkpoint
+    log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= reached]
     picture = curves_png(log, metrics)
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
@@ -43,12 +45,14 @@ def write_evaluation(
 def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: dict[int, RenderOut]) -> None:
     """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
     peers = folder.path / "test" / f"ours_{iteration}"
+    if peers.parent.is_symlink():
+        raise InputError(f"{peers.parent}: is a link; allowed: a folder of the run")
     peers.parent.mkdir(exist_ok=True)
     with replacing_folder(folder.path / "renders") as renders, replacing_folder(peers) as test:
         for name in ("renders", "gt", "masks"):
             (test / name).mkdir()
         for number, (index, out) in enumerate(held_out.items()):
-            name = sequence.names[index]
+            name = file_name(sequence.names[index], "names of the frames")
             truth, mask = sequence.frame(index).image, sequence.masks[index]
             write_png(renders / f"{name}.png", rgb_bytes(out.colour))
             write_png(renders / f"{name}_comparison.png", triptych_picture(triptych(out.colour, truth, mask)))

@@ -5,16 +5,20 @@ import errno
 import json
 import math
 import os
+import secrets
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
+from endotsr.untrusted import json as json_files
+from endotsr.untrusted.names import plain_line
 
 
 def refuse_folder(path: Path) -> None:
-    """Raises InputError if this is no folder and cannot become one; makes nothing."""
+    """Raises InputError if this is no folder and cannot become one; leaves nothing behind."""
     if path.is_dir():
         return
     if os.path.lexists(path):
@@ -24,6 +28,25 @@ def refuse_folder(path: Path) -> None:
         raise InputError(f"{path}: cannot be created: {above} is not a folder")
     if not os.access(above, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be created: no permission to write in {above}")
+    probe = above / f".partial-{secrets.token_hex(4)}-{path.name}"
+    try:  # only the attempt tells: of a read-only disk or of /proc the permissions say nothing
+        probe.mkdir()
+        probe.rmdir()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be created: {above}: {error.strerror}") from None
+
+
+def refuse_inside(path: Path, data: Path, what: str) -> None:
+    """Raises InputError if the folder `path` would lie in the folder `data`, which `what` describes in the message."""
+    inner, outer = Path(path).resolve(), Path(data).resolve()
+    if outer.is_dir() and inner.is_relative_to(outer):
+        raise InputError(f"{path}: lies inside {what} {data}; choose an --out outside of it")
+
+
+def refuse_link(path: Path) -> None:
+    """Raises InputError if this exists and is no regular file, or is a link: a file elsewhere would be changed."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise InputError(f"{path}: is a link or no regular file; allowed: the file that the run wrote")
 
 
 def refuse_unwritable(*files: Path | None) -> None:
@@ -49,7 +72,8 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
     Raises: OSError of the file system, with `path` in place of the temporary name.
     """
-    temporary = path.with_name(f".partial-{path.name}")  # keeps the ending, by which writers choose the format
+    # A name that nobody can put a link at beforehand; it keeps the ending, by which writers choose the format.
+    temporary = path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
     try:
         write(temporary)
         os.replace(temporary, path)
@@ -62,13 +86,19 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 
 @contextlib.contextmanager
-def replacing_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails."""
-    temporary = path.with_name(f".partial-{os.getpid()}-{path.name}")
-    shutil.rmtree(temporary, ignore_errors=True)
+def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
+    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails.
+
+    replace   False: a folder that has appeared at `path` in the meantime is kept, and InputError raised
+    """
+    if path.is_symlink():
+        raise InputError(f"{path}: is a link; allowed: a folder, or a name that is free")
+    temporary = path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
     temporary.mkdir()
     try:
         yield temporary
+        if not replace and os.path.lexists(path):
+            raise InputError(f"{path}: exists already; choose another --out")
         if path.exists():
             shutil.rmtree(path)
         os.rename(temporary, path)
@@ -78,12 +108,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
 
 def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    if not isinstance(data, dict):
-        raise InputError(f"{path}: holds {type(data).__name__}; allowed: an object with keys, as the run wrote it")
+    data = json_files.read_json(path)
     for dotted in needed:
         value: Any = data
         for key in dotted.split("."):
@@ -91,6 +116,11 @@ def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:
                 raise InputError(f"{path}: {dotted} is missing; the file is not as the run wrote it")
             value = value[key]
     return data
+
+
+def warn(line: str) -> None:
+    """One line on standard error about something that was worked around."""
+    print(f"endotsr: warning: {plain_line(line)}", file=sys.stderr, flush=True)
 
 
 def finite(data: Any) -> Any:

@@ -4,7 +4,8 @@
     run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
     sequence.json    cameras, times, names, split: what rendering needs when the pictures are elsewhere
     log.jsonl        one line an iteration
-    checkpoint.npz   the latest checkpoint
+    checkpoint.npz   the latest checkpoint, and checkpoint.previous.npz, the one before it
+    diverged.npz     the state before an iteration whose numbers were not finite
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 
 A run folder appears complete under its name or not at all, files are replaced whole, and the log of a resumed run
@@ -21,7 +22,8 @@ from typing import IO, Any
 
 from endotsr.config import Config, config_to_toml, load_config
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line, read_json, refuse_folder, replacing_folder, write_json
+from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, replacing_folder, write_json
+from endotsr.runs.records import check_run_record, check_sequence_record
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,11 @@ class RunFolder:
         return self.path / "checkpoint.npz"
 
     @property
+    def has_checkpoint(self) -> bool:
+        """Whether there is a checkpoint, be it the one before the latest."""
+        return os.path.lexists(self.checkpoint) or (self.path / "checkpoint.previous.npz").exists()
+
+    @property
     def log(self) -> Path:
         """One JSON object an iteration."""
         return self.path / "log.jsonl"
@@ -45,12 +52,18 @@ class RunFolder:
         return load_config(self.path / "config.toml")
 
     def record(self, *needed: str) -> dict[str, Any]:
-        """run.json, read anew. Raises InputError if one of the `needed` keys (`input.source`) is missing."""
-        return read_json(self.path / "run.json", needed)
+        """run.json, read anew and checked. Raises InputError if a `needed` key (`input.source`) is missing."""
+        path = self.path / "run.json"
+        record = read_json(path, needed)
+        check_run_record(record, path)
+        return record
 
     def sequence_record(self, *needed: str) -> dict[str, Any]:
-        """sequence.json. Raises InputError if one of the `needed` keys is missing."""
-        return read_json(self.path / "sequence.json", needed)
+        """sequence.json, checked. Raises InputError if one of the `needed` keys is missing."""
+        path = self.path / "sequence.json"
+        record = read_json(path, needed)
+        check_sequence_record(record, path)
+        return record
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -58,6 +71,7 @@ class RunFolder:
 
         Raises: InputError if another process holds it. Without effect where the system or the disk supports no locks.
         """
+        refuse_link(self.log)
         with self.log.open("ab") as file:
             _lock(file, self.path)
             yield
@@ -66,7 +80,8 @@ class RunFolder:
         """Temporary files of a process that was killed."""
         for pattern in (".*.part", ".partial-*"):
             for file in self.path.glob(pattern):
-                shutil.rmtree(file) if file.is_dir() else file.unlink(missing_ok=True)
+                folder = file.is_dir() and not file.is_symlink()
+                shutil.rmtree(file) if folder else file.unlink(missing_ok=True)
 
     def update(self, **entries: Any) -> None:
         """Replace or add entries of run.json."""
@@ -108,7 +123,7 @@ def create_run(path: Path, config: Config, record: dict[str, Any], sequence_reco
     refuse_existing(path)
     try:
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
-        with replacing_folder(path) as folder:
+        with replacing_folder(path, replace=False) as folder:
             (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
             write_json(folder / "run.json", record)
             write_json(folder / "sequence.json", sequence_record)

@@ -6,7 +6,11 @@ import os
 from pathlib import Path
 from typing import IO, Any
 
-from endotsr.runs.files import finite
+from endotsr.errors import InputError
+from endotsr.runs.files import finite, refuse_link
+from endotsr.untrusted.json import integer, number, parsed
+
+LONGEST_LINE = 1 << 20  # bytes
 
 
 class RunLog:
@@ -19,14 +23,15 @@ class RunLog:
 
     def _cut(self, path: Path, kept: int) -> int:
         end = 0
+        refuse_link(path)
         if path.exists():
             with path.open("r+b") as file:
-                for line in file:
+                while line := file.readline(LONGEST_LINE):
                     entry = _entry(line)
                     if entry is None or entry["iteration"] > kept:
                         break
                     end += len(line)
-                    self.seconds += entry.get("seconds") or 0.0
+                    self.seconds += _seconds(entry)
                 file.truncate(end)
         return end
 
@@ -49,8 +54,16 @@ class RunLog:
 
 
 def _entry(line: bytes) -> dict[str, Any] | None:
-    with contextlib.suppress(ValueError):
-        entry = json.loads(line)
-        if line.endswith(b"\n") and isinstance(entry, dict) and "iteration" in entry:
+    with contextlib.suppress(InputError):
+        entry = parsed(line, "log.jsonl")
+        if line.endswith(b"\n") and isinstance(entry, dict):
+            integer(entry.get("iteration"), "iteration")
             return entry
     return None
+
+
+def _seconds(entry: dict[str, Any]) -> float:
+    """The seconds of a line; 0 where they are missing or no number."""
+    with contextlib.suppress(InputError):
+        return number(entry.get("seconds"), "seconds", low=0.0)
+    return 0.0

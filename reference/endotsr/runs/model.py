@@ -1,9 +1,12 @@
 """From a run folder to a model that renders, or to a training that continues.
 
 A checkpoint is read with the settings of config.toml. If the two are not of one run (an edited file, a checkpoint
-copied in), the arrays would be misread, so every setting is compared first.
+copied in), the arrays would be misread, so every setting is compared first, and the fingerprint of the sequence with
+that of run.json.
 """
 
+import hashlib
+import json
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +15,7 @@ import msgspec
 
 from endotsr.config import Config
 from endotsr.errors import InputError
+from endotsr.runs.files import warn
 from endotsr.runs.folder import RunFolder
 
 if TYPE_CHECKING:
@@ -38,40 +42,60 @@ def load_model(folder: RunFolder) -> Model:
 
     from endotsr.fitting.model import spectral_from
 
-    if not folder.checkpoint.exists():
+    if not folder.has_checkpoint:
         raise InputError(
             f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --out {folder.path} --resume`"
         )
     config, record = folder.config(), folder.sequence_record("times", "train_index")
-    checkpoint = _checkpoint_of(folder, config)
+    checkpoint, _ = _checkpoint_of(folder, config)
+    if not record["train_index"]:
+        raise InputError(f"{folder.path / 'sequence.json'}: train_index: holds no frame; allowed: at least one")
     times = np.array(record["times"])[record["train_index"]]
     spectral = spectral_from(config.model, times)
     return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration, checkpoint.frames)
 
 
 def save_training(folder: RunFolder, state: Any, config: Config) -> None:
-    """Replace the last checkpoint by the state of a training."""
+    """Replace the last checkpoint by the state of a training; it names the sequence of run.json."""
     from endotsr.fitting.state import save_state
 
-    save_state(folder.checkpoint, state, config)
+    save_state(folder.checkpoint, state, config, sequence_fingerprint(folder.record()))
 
 
-def load_training(folder: RunFolder, config: Config) -> Any:
-    """The training at its last checkpoint. Raises InputError if it is damaged or of other settings."""
+def load_training(folder: RunFolder, config: Config, *, continues: bool = False) -> Any:
+    """The training at its latest whole checkpoint. Raises InputError if there is none, or it is of other settings.
+
+    continues   the caller holds the lock of the folder and will write checkpoints: a damaged one is put aside as
+                checkpoint.damaged.npz, so that it never takes the place of the one before it
+    """
     from endotsr.fitting.state import state_from_checkpoint
 
-    checkpoint = _checkpoint_of(folder, config)
+    checkpoint, damaged = _checkpoint_of(folder, config)
     try:
-        return state_from_checkpoint(checkpoint, config)
+        state = state_from_checkpoint(checkpoint, config)
     except InputError as error:
         raise InputError(f"{folder.checkpoint}: {error}") from None
+    if damaged and continues:
+        folder.checkpoint.replace(folder.path / "checkpoint.damaged.npz")
+    return state
 
 
-def _checkpoint_of(folder: RunFolder, config: Config) -> "Checkpoint":
-    """The checkpoint, which must be of a training with these settings."""
-    from endotsr.fitting.checkpoint import load_checkpoint
+def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", bool]:
+    """The latest whole checkpoint, and whether a later one is damaged (a warning names it).
 
-    checkpoint = load_checkpoint(folder.checkpoint)
+    It must be of a training with these settings on the sequence of run.json.
+    """
+    from endotsr.fitting.checkpoint import load_latest
+
+    checkpoint, note = load_latest(folder.checkpoint)
+    if note:
+        warn(note)
+    trained_on, recorded = checkpoint.header.get("sequence"), sequence_fingerprint(folder.record())
+    if trained_on is not None and recorded is not None and trained_on != recorded:
+        raise InputError(
+            f"{folder.checkpoint}: trained on another sequence than the one in {folder.path / 'run.json'}; "
+            "allowed: checkpoint and records of one run, as it wrote them"
+        )
     asked = dict(_named(msgspec.json.decode(msgspec.json.encode(config))))  # as JSON, which the checkpoint holds
     for key, value in (*_named(checkpoint.header.get("config")), *_seen_in_arrays(checkpoint, config)):
         if key in asked and key not in CHANGE_NO_NUMBER and asked[key] != value:
@@ -79,7 +103,13 @@ def _checkpoint_of(folder: RunFolder, config: Config) -> "Checkpoint":
                 f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} says "
                 f"{asked[key]!r}; allowed: checkpoint and settings of one run, as it wrote them"
             )
-    return checkpoint
+    return checkpoint, bool(note)
+
+
+def sequence_fingerprint(record: dict[str, Any]) -> str | None:
+    """SHA-256 over the hashes of the pictures, times and cameras in run.json; None where it holds none."""
+    hashes = record.get("input", {}).get("arrays_sha256")
+    return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest() if hashes else None
 
 
 def _named(settings: Any) -> Iterator[tuple[str, Any]]:

@@ -9,6 +9,7 @@ import msgspec
 
 from endotsr.config import Config, checked
 from endotsr.errors import InputError
+from endotsr.runs.files import refuse_inside
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
@@ -53,11 +54,6 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
 
 def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> dict[str, Any]:
     """Record of the input for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
-    import numpy as np
-
-    digests = {name: _digest(getattr(sequence, name)) for name in ARRAYS}
-    poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
-    digests["cameras"] = _digest(poses)
     record = {
         "source": source if source in (SIMULATED, IN_MEMORY) else str(Path(source).resolve()),
         "frames": sequence.count,
@@ -68,7 +64,7 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
         "tissue_fraction": sequence.tissue_fraction,
         "static_camera": sequence.static_camera,
         "notes": list(sequence.notes),
-        "arrays_sha256": digests,
+        "arrays_sha256": _digests(sequence),
     }
     if source == SIMULATED:
         record["simulator"] = msgspec.to_builtins(simulator)
@@ -79,6 +75,14 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
     return record
 
 
+def _digests(sequence: Sequence) -> dict[str, str]:
+    """SHA-256 of the pictures, the times and the cameras."""
+    import numpy as np
+
+    poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
+    return {name: _digest(getattr(sequence, name)) for name in ARRAYS} | {"cameras": _digest(poses)}
+
+
 def _digest(array) -> str:
     return hashlib.sha256(array.tobytes()).hexdigest()
 
@@ -86,8 +90,9 @@ def _digest(array) -> str:
 def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
     """Raises InputError if this is not the sequence that the run was started on."""
     remembered = run.record().get("input", {}).get("arrays_sha256", {})
-    for name in ARRAYS:
-        if remembered.get(name) != _digest(getattr(sequence, name)):
+    found = _digests(sequence)
+    for name in (*ARRAYS, *({"cameras"} & remembered.keys())):
+        if remembered.get(name) != found[name]:
             raise InputError(
                 f"{source}: {name} differ from those the run {run.path} was trained on (sha256 in run.json); "
                 "a run continues only on the input that it was started on"
@@ -100,6 +105,13 @@ def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
     where = str(folder.path / "run.json")
     simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
     return str(record["source"]), simulator
+
+
+def refuse_inside_data(out: Path, folder: RunFolder) -> None:
+    """Raises InputError if the folder `out` would lie inside the sequence that a run was trained on."""
+    source = folder.record().get("input", {}).get("source")
+    if source not in (None, SIMULATED, IN_MEMORY):
+        refuse_inside(out, Path(source), "the sequence of the run,")
 
 
 def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from endotsr.config import Config
 from endotsr.errors import InputError
+from endotsr.fitting.divergence import Diverged
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
@@ -70,7 +71,7 @@ def train_new_run(
         with folder.locked():
             train_run(folder, state, sequence, config, observer)
     except RunStopped as stopped:
-        if folder.checkpoint.exists():
+        if folder.has_checkpoint:
             raise
         shutil.rmtree(folder.path, ignore_errors=True)  # nothing of use was written
         raise InputError(str(stopped).split(";")[0]) from None
@@ -85,7 +86,8 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
     config = folder.config()
     with folder.locked():
         folder.remove_leftovers()
-        state = load_training(folder, config) if folder.checkpoint.exists() else new_training(sequence, config)
+        saved = folder.has_checkpoint
+        state = load_training(folder, config, continues=True) if saved else new_training(sequence, config)
         planned = config.training.iterations
         observer.say(f"resuming {folder.path} after iteration {state.iteration} of {planned}")
         if state.iteration < planned:
@@ -136,7 +138,7 @@ class _Recorder:
         self._folder, self._config, self._observer = folder, config, observer
         self._seconds_before, self._began = self.log.seconds, time.monotonic()
         self._last_tick = self._began
-        self._saved = state.iteration if folder.checkpoint.exists() else None
+        self._saved = state.iteration if folder.has_checkpoint else None
         self._between_iterations = False  # whether the run was stopped after a whole iteration
 
     def on_iteration(self, entry: dict[str, Any]) -> None:
@@ -172,9 +174,22 @@ class _Recorder:
                     self.on_checkpoint(state)
             self._mark("interrupted")
             return KeyboardInterrupt(self._advice())
+        if not self._folder.path.is_dir():
+            return RunStopped(f"{self._folder.path}: the run folder has vanished, and what was trained is lost")
         self._mark("failed")
+        if isinstance(error, Diverged):
+            return self._dumped(error, state)
         if isinstance(error, OSError):
             return RunStopped(f"{os_error_line(error, self._folder.path)}; {self._advice()}")
+        return error
+
+    def _dumped(self, error: Diverged, state: "TrainingState") -> BaseException:
+        """The error, with the place of the dump that repeats the iteration."""
+        from endotsr.runs.diverged import save_diverged
+
+        with contextlib.suppress(OSError):
+            kept = save_diverged(self._folder, state, error, self._config)
+            error.args = (f"{error}; {kept} holds the state before it (`endotsr.runs.diverged.repeat_iteration`)",)
         return error
 
     def _advice(self) -> str:
@@ -183,7 +198,7 @@ class _Recorder:
         return f"{kept}; continue with `endotsr train --out {self._folder.path} --resume`"
 
     def _mark(self, status: str) -> None:
-        with contextlib.suppress(OSError):  # a full disk cannot hold this record either
+        with contextlib.suppress(OSError, InputError):  # a full disk cannot hold this record either
             self._folder.update(status=status)
 
     def _costs(self) -> dict[str, Any]:

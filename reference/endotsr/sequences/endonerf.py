@@ -9,7 +9,6 @@ the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assum
 an `InputError` of one line that names file, frame and reason. This module does not depend on models or training.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,6 +30,7 @@ from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames, time_stamps
 from endotsr.splatting.camera import scale_camera
+from endotsr.untrusted.files import in_threads
 
 NEAR = 0.2  # near plane of every preset, scene units
 LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
@@ -181,8 +181,7 @@ def _read_pictures(
         depth_types[i] = raw.dtype
         depth[i] = clip_depth(raw, config.depth_percentiles)
 
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame with one
+    in_threads(read_frame, n)
     _check_depth_scale(depth, files.depth, depth_types)
     return images, threshold_masks(masks, [str(file) for file in files.masks], notes), depth
 

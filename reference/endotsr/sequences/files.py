@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from endotsr.errors import InputError
+from endotsr.untrusted.files import open_regular
+from endotsr.untrusted.names import file_name
+from endotsr.untrusted.png import LARGEST_FILE
 
 ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
 
@@ -86,13 +89,14 @@ def _check_same_keys(here: list, there: list, reference: list[Path], other: list
 
 
 def _check_names_are_text(files: list[Path]) -> None:
-    """Refuse a path that is not UTF-8: the record of a run could not hold it."""
+    """Refuse a path that is not UTF-8, and a name that no picture of a run could bear: the record holds the names."""
     for file in files:
         try:
             str(file).encode("utf-8")
         except UnicodeEncodeError:
             shown = os.fsencode(file).decode("utf-8", "backslashreplace")
             raise InputError(f"{shown}: the name is not UTF-8; allowed: file and folder names in UTF-8") from None
+        file_name(file.stem, str(file.parent))
 
 
 def _check_names_alike(files: list[Path]) -> None:
@@ -139,7 +143,7 @@ def hash_files(root: Path, files: Iterable[Path]) -> dict[str, str]:
     found = {}
     for file in files:
         try:
-            with file.open("rb") as stream:
+            with open_regular(file, LARGEST_FILE) as stream:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise InputError(f"{file}: cannot be read: {error.strerror}") from None

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.untrusted.arrays import read_npy
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
-ARRAY_START = b"\x93NUMPY"  # first bytes of every .npy file
+LARGEST_POSES = 1 << 26  # bytes: half a million frames
 ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
 FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
@@ -36,16 +37,10 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
     try:
-        with path.open("rb") as stream:
-            start = stream.read(len(ARRAY_START))
-        # NumPy would treat any other file as a pickle and advise loading it.
-        rows = np.load(path, allow_pickle=False) if start == ARRAY_START else None
-    except (OSError, ValueError, EOFError) as error:
-        reason = "it holds Python objects" if "allow_pickle" in str(error) else str(error).splitlines()[0]
-        raise InputError(f"{path}: not a plain NumPy array file: {reason}; {ALLOWED_POSES}") from None
-    if rows is None:
-        raise InputError(f"{path}: not a plain NumPy array file; {ALLOWED_POSES}")
-    if not isinstance(rows, np.ndarray) or rows.dtype.kind not in "fiu":
+        rows = read_npy(path, LARGEST_POSES)
+    except InputError as error:
+        raise InputError(f"{error}; {ALLOWED_POSES}") from None
+    if rows.dtype.kind not in "fiu":
         raise InputError(f"{path}: not one array of real numbers")
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")

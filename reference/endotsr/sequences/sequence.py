@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from endotsr.splatting.camera import Camera
+from endotsr.untrusted.names import file_name
 
 
 class Frame(NamedTuple):
@@ -57,6 +58,8 @@ class Sequence:
                 raise ValueError(f"{name}: {shape} of {np.dtype(dtype)} expected, got {array.shape} of {array.dtype}")
         if len(self.cameras) != n or len(self.names) != n:
             raise ValueError(f"{n} frames, but {len(self.cameras)} cameras and {len(self.names)} names")
+        for name in self.names:
+            file_name(name, "names of the frames")
         if np.intersect1d(self.train_index, self.test_index).size:
             raise ValueError("a frame is both training and held out")
 

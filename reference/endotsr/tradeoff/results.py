@@ -1,12 +1,12 @@
 """The files of a measurement, `tradeoff.json` and `training.json`."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
 from endotsr.errors import InputError
+from endotsr.untrusted.json import read_json
 
 FORMAT = 1  # of both; raised when a key changes its name or meaning
 
@@ -111,11 +111,8 @@ def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[
     needed   the required keys with their types; None = only the format of the file is checked
     Raises:  InputError if it cannot be read, is of another format, or lacks a key.
     """
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
+    found = read_json(file)
+    if found.get("format") != FORMAT:
         raise InputError(f"{file}: not a measurement of this version; measure again with another --out")
     if needed is not None:
         try:

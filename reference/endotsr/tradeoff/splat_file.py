@@ -5,12 +5,12 @@
 `.npz`  arrays xyz (N, 3), log_scale (N, 3), quat_wxyz (N, 4), rgb (N, 3), opacity (N,) in [0, 1]
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.bench.trained import LARGEST_FILE, read_arrays
 from endotsr.config import ModelConfig
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
@@ -18,6 +18,7 @@ from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
 from endotsr.tradeoff.scenes import StudyScene
+from endotsr.untrusted.files import read_bytes
 
 SIDE = 320  # pixels of the picture
 FOCAL = 1.2  # image widths
@@ -51,7 +52,9 @@ def read_splats(path: Path) -> Gaussians:
         found = readers[path.suffix.lower()](path)
     except KeyError as error:
         raise InputError(f"{path}: {error.args[0]} is missing; see `endotsr tradeoff --help`") from None
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     sound = np.all([np.isfinite(a).reshape(-1, a.shape[-1]).all(axis=0) for a in arrays(found).values()], axis=0)
     if not sound.any():
@@ -61,12 +64,12 @@ def read_splats(path: Path) -> Gaussians:
 
 
 def _from_npz(path: Path) -> Gaussians:
-    with np.load(path, allow_pickle=False) as data:
-        opacity = np.clip(data["opacity"].astype(np.float64), OPACITY_STEP / 2, 1 - OPACITY_STEP / 2)
-        colour = (data["rgb"].astype(np.float64) - 0.5) / Y00
-        return Gaussians(
-            data["xyz"].T, data["quat_wxyz"].T, data["log_scale"].T, np.log(opacity / (1 - opacity)), colour.T[None]
-        )
+    data = read_arrays(path)
+    opacity = np.clip(data["opacity"].astype(np.float64), OPACITY_STEP / 2, 1 - OPACITY_STEP / 2)
+    colour = (data["rgb"].astype(np.float64) - 0.5) / Y00
+    return Gaussians(
+        data["xyz"].T, data["quat_wxyz"].T, data["log_scale"].T, np.log(opacity / (1 - opacity)), colour.T[None]
+    )
 
 
 def _from_ply(path: Path) -> Gaussians:
@@ -92,19 +95,22 @@ def _from_ply(path: Path) -> Gaussians:
 
 def _ply_vertices(path: Path) -> NDArray[np.void]:
     """The vertex element of a binary little-endian PLY file whose first element it is."""
-    content = path.read_bytes()
+    content = read_bytes(path, LARGEST_FILE)
     head, mark, body = content.partition(b"end_header\n")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     if not mark or lines[:1] != [["ply"]] or ["format", "binary_little_endian", "1.0"] not in lines:
         raise ValueError("not a binary little-endian PLY file")
     elements = [i for i, line in enumerate(lines) if line[:1] == ["element"]]
-    if not elements or lines[elements[0]][1] != "vertex":
+    if not elements or len(lines[elements[0]]) != 3 or lines[elements[0]][1] != "vertex":
         raise ValueError("the first element is not `vertex`")
     properties = [line for line in lines[elements[0] : (elements + [None])[1]] if line[:1] == ["property"]]
     if any(len(line) != 3 or line[1] not in PLY_TYPES for line in properties):
         raise ValueError("a vertex property is not a plain number")
     kind = np.dtype([(line[2], PLY_TYPES[line[1]]) for line in properties])
-    return np.frombuffer(body, kind, count=int(lines[elements[0]][2]))
+    count = int(lines[elements[0]][2])
+    if count < 1 or count * kind.itemsize > len(body):
+        raise ValueError(f"{count} vertices of {kind.itemsize} bytes announced, {len(body)} bytes found")
+    return np.frombuffer(body, kind, count=count)
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:

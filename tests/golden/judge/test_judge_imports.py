@@ -8,7 +8,7 @@ from pathlib import Path
 import endotsr.golden.judge
 
 ROOM = Path(endotsr.golden.judge.__file__).parent
-OWN = ("endotsr.errors", "endotsr.golden.judge")
+OWN = ("endotsr.errors", "endotsr.golden.judge", "endotsr.untrusted.files", "endotsr.untrusted.names")
 LIBRARIES = {"numpy", "msgspec", "pytest"}  # pytest by the door for ports in Python, where it is called
 
 
@@ -26,11 +26,11 @@ def imported(path: Path) -> set[str]:
 
 def foreign(names: set[str]) -> set[str]:
     """Modules that the judge may not import."""
-    own = {name for name in names if name in OWN or name.startswith(f"{OWN[1]}.")}
+    own = {name for name in names if name in OWN or name.startswith("endotsr.golden.judge.")}
     return {name for name in names - own if name.split(".")[0] not in LIBRARIES | sys.stdlib_module_names}
 
 
-def test_the_judge_imports_numpy_msgspec_errors_and_itself():
+def test_the_judge_imports_numpy_msgspec_errors_checks_of_files_and_itself():
     files = sorted(ROOM.glob("*.py"))
     assert len(files) >= 10
     assert {path.name: foreign(imported(path)) for path in files if foreign(imported(path))} == {}
@@ -48,5 +48,5 @@ def test_nothing_of_the_method_is_loaded_with_the_judge():
     script = f"import sys; import {', '.join(names)}; print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = {name for name in done.stdout.split() if name.startswith("endotsr")}
-    assert loaded == {"endotsr", "endotsr.errors", "endotsr.golden", "endotsr.golden.judge", *names}
+    assert loaded == {"endotsr", "endotsr.golden", "endotsr.untrusted", *OWN, *names}
     assert "numba" not in done.stdout.split()

@@ -73,7 +73,8 @@ def _parser(fields: list[Field]) -> argparse.ArgumentParser:
             parser.add_argument(field.name, dest=path, action="store_true")
             parser.add_argument(field.off, dest=path, action="store_false")
         else:
-            parser.add_argument(field.name, dest=path, nargs=None if field.count == 1 else field.count)
+            several = "+" if field.count == "*" else field.count  # an option without any value is a slip
+            parser.add_argument(field.name, dest=path, nargs=None if field.count == 1 else several)
     return parser
 
 

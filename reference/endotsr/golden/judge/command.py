@@ -28,7 +28,7 @@ def clear_kept(root: Path) -> None:
     try:
         read_struct(root / KEPT[0] / "requests.json", Requests)
         foreign = [path for path in taken if path.is_symlink() or not path.is_dir()]
-    except (OSError, msgspec.DecodeError):
+    except (OSError, InputError, msgspec.DecodeError):
         foreign = taken
     if foreign:
         raise InputError(

@@ -1,10 +1,16 @@
-"""The format of the files of `golden/` as typed structures, through which all JSON is read and written."""
+"""The format of the files of `golden/` as typed structures, through which all JSON is read and written.
+
+Names and paths of files are checked as soon as a structure is made: none leaves the folder it belongs to.
+"""
 
 import json
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+
+from endotsr.untrusted.files import LARGEST_TEXT, read_bytes
+from endotsr.untrusted.names import file_name, relative_path
 
 Level = Literal[0, 1, 2, 3, 4, 5]
 LEVELS = {
@@ -73,6 +79,9 @@ class Array(_Strict, frozen=True, kw_only=True):
     shape: tuple[int, ...]
     recipe: str
 
+    def __post_init__(self) -> None:
+        relative_path(self.file, "file")
+
 
 class Output(_Strict, frozen=True, kw_only=True):
     """An expected output."""
@@ -85,6 +94,10 @@ class Output(_Strict, frozen=True, kw_only=True):
     compare: Rule
     because: Because | None
     truth: Truth
+
+    def __post_init__(self) -> None:
+        for file in (self.file, *self.compare.others):
+            relative_path(file, "file")
 
     def answer(self, number: int) -> str:
         """File of a legal answer of the case; 0 = `file`, which is also that of outputs with one answer only."""
@@ -118,6 +131,10 @@ class Case(_Strict, frozen=True, kw_only=True):
     outputs: dict[str, Output]
     mistakes: dict[str, Mistake]
 
+    def __post_init__(self) -> None:
+        for name in (self.family, self.case, *self.outputs):
+            file_name(name, "a name of the case")
+
     @property
     def name(self) -> str:
         """family/case"""
@@ -139,6 +156,9 @@ class FileEntry(_Strict, frozen=True, kw_only=True):
     dtype: str | None = None
     shape: tuple[int, ...] | None = None
 
+    def __post_init__(self) -> None:
+        relative_path(self.path, "path")
+
 
 class FlagNote(_Strict, frozen=True, kw_only=True):
     """A mistake that has a name."""
@@ -156,6 +176,11 @@ class Manifest(_Strict, frozen=True, kw_only=True):
     families: dict[str, tuple[str, ...]]
     flags: dict[str, FlagNote]
     files: tuple[FileEntry, ...]
+
+    def __post_init__(self) -> None:
+        for family, cases in self.families.items():
+            for name in (family, *cases):
+                file_name(name, "families")
 
 
 class RequestOutput(_Strict, frozen=True, kw_only=True):
@@ -177,6 +202,12 @@ class Request(_Strict, frozen=True, kw_only=True):
     inputs: dict[str, str]
     outputs: dict[str, RequestOutput]
 
+    def __post_init__(self) -> None:
+        for file in self.inputs.values():
+            relative_path(file, "inputs")
+        for name in self.outputs:
+            file_name(name, "outputs")
+
 
 class Requests(_Strict, frozen=True, kw_only=True):
     """requests.json at the root of a request folder."""
@@ -185,6 +216,10 @@ class Requests(_Strict, frozen=True, kw_only=True):
     precision: Precision
     level: Level
     cases: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in self.cases:
+            relative_path(name, "cases")
 
 
 SCHEMAS = {"case": Case, "manifest": Manifest, "request": Request, "requests": Requests}
@@ -201,5 +236,9 @@ def schema_text(kind: type[msgspec.Struct]) -> str:
 
 
 def read_struct(path: Path, kind: type[Any]) -> Any:
-    """Raises OSError or msgspec.DecodeError / ValidationError."""
-    return msgspec.json.decode(path.read_bytes(), type=kind)
+    """Raises InputError if the file cannot be read, msgspec.DecodeError / ValidationError if it is not of this kind."""
+    data = read_bytes(path, LARGEST_TEXT)
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (RecursionError, UnicodeDecodeError) as error:
+        raise msgspec.DecodeError(f"no JSON text: {error}") from None

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.golden.judge.format import Case, FileEntry, Manifest, read_struct
+from endotsr.golden.judge.npy import LARGEST as LARGEST_ARRAY
 from endotsr.golden.judge.npy import Refused, read_plain
+from endotsr.untrusted.files import read_bytes, read_text
 
 
 class Golden(NamedTuple):
@@ -60,7 +62,7 @@ def read_golden(folder: Path, *, verify: bool = True) -> Golden:
     """Manifest and cases. Raises InputError naming the file that is missing, damaged or not of this format."""
     try:
         manifest = read_struct(folder / "manifest.json", Manifest)
-        version = (folder / "VERSION").read_text().strip()
+        version = read_text(folder / "VERSION").strip()
     except (OSError, msgspec.DecodeError) as error:
         raise InputError(f"{folder / 'manifest.json'}: cannot be read: {error}") from None
     if version != manifest.version:
@@ -82,9 +84,9 @@ def read_golden(folder: Path, *, verify: bool = True) -> Golden:
 def _verify(folder: Path, entry: FileEntry) -> None:
     path = folder / entry.path
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; the golden folder is incomplete") from None
+        data = read_bytes(path, LARGEST_ARRAY)
+    except InputError as error:
+        raise InputError(f"{error}; the golden folder is incomplete") from None
     if hashlib.sha256(data).hexdigest() != entry.sha256:
         raise InputError(f"{path}: differs from the checksum in manifest.json; the golden folder is damaged")
 

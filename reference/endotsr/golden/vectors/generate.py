@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from endotsr.errors import InputError
 from endotsr.golden.judge.compare import judged
 from endotsr.golden.judge.format import Case, Manifest, read_struct
 from endotsr.golden.judge.store import plain_or_none
@@ -67,7 +68,7 @@ def moved(folder: Path, one: Solved) -> list[str]:
             lines.append(f"{one.case.name}/{name}: {size}" + (", within tolerance" if verdict.passed else ""))
     try:
         before = read_struct(root / "case.json", Case)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, InputError, msgspec.DecodeError):
         return [*lines, f"{one.case.name}: new case"]
     fresh = msgspec.json.decode(msgspec.json.encode(one.case), type=Case)
     if (before.settings, before.title, before.flags) != (fresh.settings, fresh.title, fresh.flags):
@@ -82,7 +83,7 @@ def write(folder: Path) -> list[str]:
     lines = [line for one in solved for line in moved(folder, one)]
     try:
         published = read_struct(folder / "manifest.json", Manifest)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, InputError, msgspec.DecodeError):
         published = None
     files = rendered_files(solved, all_wrong_ports(), version, published)
     for root in GENERATED:

@@ -1,0 +1,66 @@
+"""Tables of docs/guides/reliability.md from the results of the campaigns: python docs/pages/reliability.py
+
+docs/results/faults.json   python tests/faults/campaign.py --kills 50 --json docs/results/faults.json
+docs/results/fuzz.json     python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json
+docs/results/soak.json     python tests/faults/soak.py --json docs/results/soak.json --plot docs/results/soak.png
+"""
+
+from pathlib import Path
+from typing import Any
+
+from marks import read_json, write_marked
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "guides" / "reliability.md"
+RESULTS = ROOT / "docs" / "results"
+MAKERS = {
+    "faults": "python tests/faults/campaign.py --kills 50 --json docs/results/faults.json",
+    "fuzz": "python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json",
+    "soak": "python tests/faults/soak.py --json docs/results/soak.json",
+}
+
+
+def parts() -> dict[str, str]:
+    """The generated parts of the page by name."""
+    found = {name: read_json(RESULTS / f"{name}.json", command) for name, command in MAKERS.items()}
+    return {"faults": faults(found["faults"]), "fuzz": fuzz(found["fuzz"]), "soak": soak(found["soak"])}
+
+
+def faults(result: dict[str, Any]) -> str:
+    """One row a fault."""
+    rows = [f"| {r['fault']} | {r['as_promised']} of {r['trials']} | {r['what']} |" for r in result["faults"]]
+    return "\n".join(["| Fault | As promised | What happens |", "|---|---|---|", *rows, "", made(result)])
+
+
+def fuzz(result: dict[str, Any]) -> str:
+    """One row a reader, and the sum."""
+    readers = result["readers"]
+    rows = [f"| {r['reader']} | {r['inputs']} | {r['seconds']} | {r['findings']} |" for r in readers]
+    total = [sum(r[key] for r in readers) for key in ("inputs", "seconds", "findings")]
+    rows.append(f"| together | {total[0]} | {total[1]} | {total[2]} |")
+    bound = f"Memory bound: {result['memory'] >> 20} MiB above the start. {made(result)}"
+    return "\n".join(["| Reader | Inputs | Seconds | Findings in this run |", "|---|---|---|---|", *rows, "", bound])
+
+
+def soak(result: dict[str, Any]) -> str:
+    """The memory of a long run and the cost of the guard, in a sentence each."""
+    run, guard = result["soak"], result["guard"]
+    return "\n".join(
+        [
+            f"Over {run['iterations']} iterations of a small scene the resident memory stays at"
+            f" {run['median_bytes'] / 1e6:.0f} MB, within {run['largest_deviation']:.2%} of it.",
+            f"The check of the gradients of {guard['gaussians']} Gaussians takes {1e3 * guard['seconds']:.2f} ms an"
+            " iteration.",
+            made(result),
+        ]
+    )
+
+
+def made(result: dict[str, Any]) -> str:
+    """Date and machine."""
+    machine = result["machine"]
+    return f"Measured on {result['date']}, {machine['processor']}, {machine['cores']} cores."
+
+
+if __name__ == "__main__":
+    write_marked(PAGE, parts(), "reliability")

@@ -1,0 +1,118 @@
+"""The numbers of a checkpoint are checked like any input: a file may have been damaged, edited or made up.
+
+In: the arrays as they were read. Out: nothing, or ValueError with the name of the array and what is allowed. The limits
+hold for every state that a training can reach; the message never depends on the values alone.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.fitting.adam import AdamState
+from endotsr.scene.density_control import DensityStatistics
+from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
+from endotsr.scene.parameters import CHANNELS, FrameParameters, trained
+
+PRECISIONS = ("float32", "float64")
+HARMONICS = (1, 4, 9, 16)  # (degree + 1)^2
+SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE = -1000.0, 88.0  # the exponential of the larger one still is a float32
+# The axes before the last: a number is a length, a letter stands for the same length wherever it occurs.
+SHAPES: dict[str, tuple[int | str, ...]] = {
+    "position": (3,),
+    "quaternion": (4,),
+    "log_scale": (3,),
+    "opacity_logit": (),
+    "harmonics": ("K", 3),
+    "fdm_weight": (DEFORMATION_CHANNELS, "B"),
+    "fdm_centre": (DEFORMATION_CHANNELS, "B"),
+    "fdm_width": (DEFORMATION_CHANNELS, "B"),
+    "appearance_coefficients": (3, "2F"),
+    "motion_coefficients": (3, "2F"),
+    "exposure_log_gain": (CHANNELS,),
+    "exposure_bias": (CHANNELS,),
+}
+
+
+def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
+    """Check axes, precision and lengths. Raises ValueError.
+
+    Every array has the axes of `SHAPES` and one column for each Gaussian, or for each training frame; its moments have
+    its shape. All are of one precision. The three arrays of the deformation are there together or not at all.
+    """
+    named = arrays(gaussians) | trained(frames)
+    lengths: dict[str, int] = {}
+    for name, array in named.items():
+        _check_axes(name, array, lengths)
+        if array.dtype != gaussians.position.dtype or array.dtype.name not in PRECISIONS:
+            raise ValueError(f"{name}: {array.dtype}; allowed: {' or '.join(PRECISIONS)}, the same in every array")
+    if len({array is None for array in (gaussians.fdm_weight, gaussians.fdm_centre, gaussians.fdm_width)}) > 1:
+        raise ValueError("fdm_weight, fdm_centre, fdm_width: some are missing; allowed: all three or none")
+    if lengths["K"] not in HARMONICS or lengths.get("2F", 0) % 2:
+        raise ValueError(
+            f"harmonics: {lengths['K']} coefficients, 2F = {lengths.get('2F')}; allowed: 1, 4, 9, 16; even"
+        )
+    if frames is not None and (frames.times.ndim != 1 or frames.times.dtype != np.float64):
+        raise ValueError(f"times: {frames.times.dtype} {frames.times.shape}; allowed: float64 (n,)")
+    check_lengths(gaussians, adam, frames)
+    if adam.first.keys() != named.keys():
+        raise ValueError(f"first: moments of {', '.join(adam.first)}; allowed: those of {', '.join(named)}")
+
+
+def _check_axes(name: str, array: NDArray, lengths: dict[str, int]) -> None:
+    """Compare the axes with `SHAPES`; the length of a letter is remembered in `lengths`."""
+    expected = SHAPES[name]
+    if array.ndim != len(expected) + 1:
+        raise ValueError(f"{name}: {array.ndim} axes; allowed: {len(expected) + 1}")
+    for length, wanted in zip(array.shape, expected):
+        if length != (lengths.setdefault(wanted, length) if isinstance(wanted, str) else wanted):
+            raise ValueError(f"{name}: {array.shape}; allowed: ({', '.join(map(str, expected))}, count)")
+
+
+def check_lengths(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
+    """Raise ValueError if an array or a moment has not one column for each Gaussian, or for each training frame."""
+    for what, named, count in (
+        ("Gaussians", arrays(gaussians), gaussians.count),
+        ("training frames", trained(frames), 0 if frames is None else frames.times.size),
+    ):
+        for name, array in named.items():
+            moments = {f"first {name}": adam.first.get(name), f"second {name}": adam.second.get(name)}
+            for label, found in ({name: array} | moments).items():
+                if found is not None and found.shape != (*array.shape[:-1], count):
+                    raise ValueError(f"{label}: {found.shape} for {count} {what}")
+                if found is not None and found.dtype != array.dtype:
+                    raise ValueError(f"{label}: {found.dtype}; allowed: {array.dtype}")
+
+
+def check_numbers(
+    gaussians: Gaussians, adam: AdamState, statistics: DensityStatistics, frames: FrameParameters | None = None
+) -> None:
+    """Check the values of arrays that have passed `check_shapes`. Raises ValueError naming array and index.
+
+    All are finite. Log-scales lie in [-1000, 88], second moments and statistics are not negative, and the times of the
+    training frames ascend within [0, 1].
+    """
+    for label, array, low, high in _limits(gaussians, adam, statistics, frames):
+        good = (array >= low) & (array <= high)  # NaN is in no range
+        if not good.all():
+            index = tuple(int(i) for i in np.argwhere(~good)[0])
+            limits = "finite numbers" if high > 1e30 and low else f"finite numbers from {low:g} to {high:.4g}"
+            raise ValueError(f"{label}[{', '.join(map(str, index))}] is {array[index]}; allowed: {limits}")
+    if frames is not None and (np.diff(frames.times) <= 0).any():
+        raise ValueError("times: they do not ascend; allowed: the ascending times of the training frames")
+
+
+def _limits(
+    gaussians: Gaussians, adam: AdamState, statistics: DensityStatistics, frames: FrameParameters | None
+) -> Iterator[tuple[str, NDArray, float, float]]:
+    """Name, array, and the range of its values; every range excludes infinity."""
+    largest = float(np.finfo(gaussians.position.dtype).max)
+    for name, array in (arrays(gaussians) | trained(frames)).items():
+        scale = name == "log_scale"
+        yield name, array, *((SMALLEST_LOG_SCALE, LARGEST_LOG_SCALE) if scale else (-largest, largest))
+        yield f"first {name}", adam.first[name], -largest, largest
+        yield f"second {name}", adam.second[name], 0.0, largest
+    yield "gradient_sum", statistics.gradient_sum, 0.0, float(np.finfo(np.float64).max)
+    yield "visits", statistics.visits, 0, np.iinfo(np.int64).max
+    if frames is not None:
+        yield "times", frames.times, 0.0, 1.0

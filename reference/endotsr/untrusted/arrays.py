@@ -1,0 +1,144 @@
+"""Arrays from .npy and .npz files: plain numbers, never pickled objects, never more memory than the file has bytes.
+
+A header that promises another size than the file has is refused before anything is allocated. The entries of an .npz
+must be stored without compression unless the caller allows it, so that a small file cannot become a large array.
+"""
+
+import io
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import open_regular
+
+LONGEST_HEADER = 4096  # bytes of the header of an array
+MOST_AXES = 8
+NUMBERS = "biuf"  # kinds of NumPy: truth values, integers, unsigned integers, floating-point numbers
+DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, NotImplementedError, RuntimeError, KeyError)
+
+
+class Refused(ValueError):
+    """Data that is no array of plain numbers; the message states the reason."""
+
+
+def read_npy(path: Path, largest: int) -> NDArray:
+    """The array of an .npy file. Raises InputError if it holds anything but one array of plain numbers."""
+    with open_regular(path, largest) as file:
+        length = file.seek(0, io.SEEK_END)
+        file.seek(0)
+        try:
+            return array_from(file, length)
+        except (Refused, OSError) as error:
+            raise InputError(f"{path}: not a plain NumPy array file: {error}") from None
+
+
+def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
+    """One array in .npy form that fills the next `length` bytes of a stream. Raises Refused."""
+    shape, fortran, dtype, start = _header(file)
+    size = math.prod(shape) * dtype.itemsize
+    if size != length - start:
+        raise Refused(f"shape {shape} of {dtype.str} needs {size} bytes, the file has {length - start}")
+    data = bytearray(size)
+    if file.readinto(data) != size or file.read(1):
+        raise Refused("the data ends early")
+    array = np.frombuffer(data, dtype)
+    return array.reshape(shape, order="F" if fortran else "C")
+
+
+def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, int]:
+    """Shape, order, dtype and length in bytes of the header of an array."""
+    start = file.read(8)
+    if start[:6] != npy.MAGIC_PREFIX:
+        raise Refused("not an .npy file")
+    wide = start[6:7] in (b"\x02", b"\x03")
+    if start[6:] not in (b"\x01\x00", b"\x02\x00", b"\x03\x00"):
+        raise Refused("unknown version of the .npy format")
+    prefix = file.read(4 if wide else 2)
+    length = int.from_bytes(prefix, "little")
+    if length > LONGEST_HEADER:
+        raise Refused(f"its header has {length} bytes; allowed: {LONGEST_HEADER}")
+    whole = io.BytesIO(start + prefix + file.read(length))
+    npy.read_magic(whole)
+    reader = npy.read_array_header_2_0 if wide else npy.read_array_header_1_0
+    try:
+        shape, fortran, dtype = reader(whole, max_header_size=LONGEST_HEADER)
+    except Exception as error:  # a literal of Python is evaluated in there, and raises whatever it finds
+        raise Refused(f"its header cannot be read: {str(error).splitlines()[0] if str(error) else 'damaged'}") from None
+    if dtype.hasobject:
+        raise Refused("it holds Python objects")
+    if (
+        dtype.kind not in NUMBERS
+        or dtype.itemsize > 8
+        or dtype.shape
+        or len(shape) > MOST_AXES
+        or min(shape, default=0) < 0
+    ):
+        raise Refused(f"{dtype} {shape}; allowed: plain numbers of at most 8 bytes, with {MOST_AXES} axes or fewer")
+    return shape, fortran, dtype, len(start) + len(prefix) + length
+
+
+class NpzFile:
+    """The arrays of an open .npz file, read one by one. Made by `open_npz`."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._entries = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the arrays, in the order of the file."""
+        return list(self._entries)
+
+    def read(self, name: str) -> NDArray:
+        """One array, its checksum verified. Raises Refused."""
+        entry = self._entries[name]
+        try:
+            with self._archive.open(entry) as stream:
+                return array_from(stream, entry.file_size)  # type: ignore[arg-type]  # a ZipExtFile
+        except Refused:
+            raise
+        except DAMAGE as error:
+            raise Refused(str(error).splitlines()[0] if str(error) else "damaged") from None
+
+
+@contextmanager
+def open_npz(path: Path, largest: int, *, compressed: bool = False) -> Iterator[NpzFile]:
+    """An .npz file for reading.
+
+    largest      bytes of the file, and of all its arrays together
+    compressed   allow compressed entries
+
+    Raises: InputError if it is no .npz file, if an entry is not an .npy file, is listed twice, or is compressed, or if
+            the arrays together are larger than `largest`.
+    """
+    with open_regular(path, largest) as file:
+        try:
+            archive = zipfile.ZipFile(file)
+        except DAMAGE as error:
+            raise InputError(f"{path}: not an .npz file, or cut short: {error}") from None
+        with archive:
+            _check_entries(path, archive.infolist(), largest, compressed)
+            yield NpzFile(archive)
+
+
+def _check_entries(path: Path, entries: list[zipfile.ZipInfo], largest: int, compressed: bool) -> None:
+    names = [entry.filename for entry in entries]
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: an entry is listed twice; allowed: every array once")
+    if sum(entry.file_size for entry in entries) > largest:
+        raise InputError(f"{path}: its arrays have more than {largest} bytes together; allowed: at most {largest}")
+    for entry in entries:
+        if entry.flag_bits & 1 or (entry.compress_type != zipfile.ZIP_STORED and not compressed):
+            raise InputError(
+                f"{path}: an entry is compressed or encrypted; allowed: arrays as `numpy.savez` stores them"
+            )
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise InputError(f"{path}: an entry is compressed in an unknown way; allowed: as `numpy.savez` does it")

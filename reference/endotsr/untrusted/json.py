@@ -1,0 +1,84 @@
+"""JSON from a file: objects without NaN, and the numbers in them."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import LARGEST_TEXT, read_text
+from endotsr.untrusted.names import shown
+
+MOST_DIGITS = 60  # of an integer: the state of a random generator has 39
+
+
+def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
+    """The JSON object of a file. Raises InputError if the file cannot be read or holds anything else, NaN included."""
+    data = parsed(read_text(path, largest), str(path))
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: holds {type(data).__name__}; allowed: an object with keys, as the run wrote it")
+    return data
+
+
+def parsed(text: str | bytes, where: str) -> Any:
+    """JSON text as Python values. Raises InputError for anything else: NaN, or too many brackets inside each other."""
+    try:
+        found = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_integer)
+        json.dumps(found, ensure_ascii=False).encode()  # half of a pair of surrogates is no letter
+        return found
+    except RecursionError:
+        raise InputError(f"{where}: cannot be read: it is nested too deeply") from None
+    except ValueError as error:  # of JSON, of UTF-8, and of an integer with thousands of digits
+        raise InputError(f"{where}: cannot be read: {str(error).splitlines()[0]}") from None
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if not math.isfinite(value):
+        raise ValueError(f"{digits[:20]} is beyond the largest number")
+    return value
+
+
+def _integer(digits: str) -> int:
+    if len(digits) > MOST_DIGITS:
+        raise ValueError(f"an integer of {len(digits)} digits; allowed: {MOST_DIGITS}")
+    return int(digits)
+
+
+def _refuse_constant(name: str) -> Any:
+    raise ValueError(f"{name} is no JSON number")
+
+
+def number(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> float:
+    """A finite number in [low, high]. Raises InputError for anything else; True and False are no numbers."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if low <= value <= high and abs(value) <= 1.7e308:  # refuses NaN, infinity and integers beyond any float
+            return float(value)
+    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: {_range('a finite number', low, high)}")
+
+
+def integer(value: Any, where: str, low: float = -math.inf, high: float = math.inf) -> int:
+    """An integer in [low, high]. Raises InputError for anything else; True and False are no integers."""
+    if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
+        return value
+    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: {_range('an integer', low, high)}")
+
+
+def text(value: Any, where: str) -> str:
+    """Text. Raises InputError for anything else, and for a zero byte, which no path can hold."""
+    if isinstance(value, str) and "\0" not in value:
+        return value
+    raise InputError(f"{where}: {shown(value)} is not allowed; allowed: text")
+
+
+def listed(value: Any, where: str, count: int | None = None) -> list[Any]:
+    """A list, of `count` entries if given. Raises InputError for anything else."""
+    if isinstance(value, list) and count in (None, len(value)):
+        return value
+    found = f"{len(value)} entries" if isinstance(value, list) else type(value).__name__
+    raise InputError(f"{where}: holds {found}; allowed: a list{'' if count is None else f' of {count} entries'}")
+
+
+def _range(what: str, low: float, high: float) -> str:
+    limits = [f"{sign} {limit:g}" for sign, limit in ((">=", low), ("<=", high)) if math.isfinite(limit)]
+    return " ".join([what, " and ".join(limits)]).strip()

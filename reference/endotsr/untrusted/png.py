@@ -1,0 +1,140 @@
+"""PNG files whose pixels are all there, reduced to the chunks that decide them.
+
+A decoder fills what is missing with grey, prints its complaints on standard error, and reads chunks of text, colour
+profiles and metadata that no pixel depends on. Here the compressed pixels are unpacked once to a size that the header
+fixes, before the decoder sees them, and every other chunk is left out.
+"""
+
+import struct
+import zlib
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.errors import InputError
+
+LARGEST_FILE = 1 << 28  # bytes: 256 MiB
+MOST_PIXELS = 1 << 26  # 8192 x 8192
+MOST_EXTRA = 64  # bytes after the end of the compressed pixels, which some programs leave there
+CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type
+DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
+TRANSPARENT = {0: 2, 2: 6}  # bytes of tRNS by colour type
+PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))  # Adam7
+LAST_FILTER = 4
+
+
+class Header(NamedTuple):
+    """The chunk IHDR."""
+
+    width: int
+    height: int
+    bits: int  # of a channel
+    colour: int  # type
+    interlaced: bool
+
+
+def pixels_only(data: bytes, name: object) -> bytes:
+    """The same picture with the chunks IHDR, PLTE, tRNS, IDAT and IEND alone.
+
+    data     a PNG file whose chunks are whole (`opencv.check_png_bytes`)
+    name     for messages
+
+    Raises: InputError if the header is not allowed, if the picture has more than 2^26 pixels, if a chunk that the
+            pixels need is missing, repeated or unknown, or if the compressed pixels are not those of the header.
+    """
+    chunks = _chunks(data)
+    header = _header(chunks, name)
+    kept = [chunks[0]]
+    palette = _palette(chunks, header, name)
+    kept += palette
+    kept += _transparency(chunks, header, len(palette[0][1]) // 3 if palette else 0)
+    parts = [content for kind, content in chunks if kind == b"IDAT"]
+    packed = b"".join(parts)
+    extra = _check_pixels(packed, header, name)
+    kept += [(b"IDAT", content) for content in (parts if not extra else [packed[:-extra]])]
+    kept.append((b"IEND", b""))
+    if kept == chunks:
+        return data
+    return data[:8] + b"".join(_chunk(kind, content) for kind, content in kept)
+
+
+def _chunks(data: bytes) -> list[tuple[bytes, bytes]]:
+    """Kind and content of every chunk up to IEND."""
+    found, position = [], 8
+    while not found or found[-1][0] != b"IEND":
+        (length,) = struct.unpack_from(">I", data, position)
+        found.append((data[position + 4 : position + 8], data[position + 8 : position + 8 + length]))
+        position += 12 + length
+    return found
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+
+def _header(chunks: list[tuple[bytes, bytes]], name: object) -> Header:
+    kind, content = chunks[0]
+    if kind != b"IHDR" or len(content) != 13 or sum(kind == b"IHDR" for kind, _ in chunks) != 1:
+        raise InputError(f"{name}: damaged PNG: its header is missing, repeated or of another length")
+    foreign = [kind for kind, _ in chunks if kind[:1].isupper() and kind not in (b"IHDR", b"PLTE", b"IDAT", b"IEND")]
+    if foreign:
+        raise InputError(f"{name}: damaged PNG: unknown chunk {foreign[0].decode('latin-1')!r}")
+    width, height, bits, colour, packing, filtering, interlace = struct.unpack(">IIBBBBB", content)
+    if bits not in DEPTHS.get(colour, ()) or packing or filtering or interlace > 1:
+        raise InputError(f"{name}: damaged PNG: its header states a kind of picture that does not exist")
+    if not 0 < width * height <= MOST_PIXELS:
+        raise InputError(f"{name}: {width}x{height} pixels; allowed: 1 to {MOST_PIXELS} pixels")
+    return Header(width, height, bits, colour, interlace == 1)
+
+
+def _palette(chunks: list[tuple[bytes, bytes]], header: Header, name: object) -> list[tuple[bytes, bytes]]:
+    """The palette of a picture that has one, as a list of no or one chunk; a suggested palette is left out."""
+    if header.colour != 3:
+        return []
+    found = [chunk for chunk in chunks if chunk[0] == b"PLTE"]
+    entries = len(found[0][1]) // 3 if len(found) == 1 and len(found[0][1]) % 3 == 0 else 0
+    if not 0 < entries <= 1 << header.bits:
+        raise InputError(f"{name}: damaged PNG: its palette is missing, repeated or of another length")
+    return found
+
+
+def _transparency(chunks: list[tuple[bytes, bytes]], header: Header, entries: int) -> list[tuple[bytes, bytes]]:
+    """The chunk tRNS if its length is that of the colour type."""
+    found = [chunk for chunk in chunks if chunk[0] == b"tRNS"][:1]
+    fits = [c for c in found if TRANSPARENT.get(header.colour) == len(c[1]) or 0 < len(c[1]) <= entries]
+    return fits
+
+
+def _check_pixels(packed: bytes, header: Header, name: object) -> int:
+    """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown filter of a row.
+
+    returns  bytes after the end of the compressed pixels
+    """
+    rows = _rows(header)
+    size = sum(count * (1 + stride) for count, stride in rows)
+    unpacker = zlib.decompressobj()
+    try:
+        raw = unpacker.decompress(packed, size)
+        more = unpacker.decompress(unpacker.unconsumed_tail, 1)
+    except zlib.error as error:
+        raise InputError(f"{name}: damaged PNG: its pixels cannot be unpacked: {error}") from None
+    if len(raw) != size or more or not unpacker.eof or len(unpacker.unused_data) > MOST_EXTRA:
+        raise InputError(f"{name}: damaged PNG: its pixels are not those of {header.width}x{header.height}")
+    position, values = 0, np.frombuffer(raw, np.uint8)
+    for count, stride in rows:
+        filters = values[position : position + count * (1 + stride) : 1 + stride]
+        if filters.max(initial=0) > LAST_FILTER:
+            raise InputError(f"{name}: damaged PNG: a row of pixels uses an unknown filter")
+        position += count * (1 + stride)
+    return len(unpacker.unused_data)
+
+
+def _rows(header: Header) -> list[tuple[int, int]]:
+    """Number of rows and bytes of a row, without the byte of its filter, for every pass over the picture."""
+    passes = PASSES if header.interlaced else ((0, 0, 1, 1),)
+    bits, found = CHANNELS[header.colour] * header.bits, []
+    for left, top, across, down in passes:
+        columns, rows = -(-(header.width - left) // across), -(-(header.height - top) // down)
+        if columns > 0 and rows > 0:
+            found.append((rows, (columns * bits + 7) // 8))
+    return found

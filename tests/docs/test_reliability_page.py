@@ -1,0 +1,40 @@
+"""The page on reliability holds the tables of the stored results, and its promises name what exists."""
+
+import json
+import re
+
+import pytest
+import reliability
+from marks import replaced
+
+
+def test_the_tables_are_those_of_the_results():
+    text = reliability.PAGE.read_text(encoding="utf-8")
+    assert replaced(text, reliability.parts(), reliability.PAGE, "reliability") == text
+
+
+@pytest.mark.parametrize("name", reliability.MAKERS)
+def test_every_result_can_be_made_again(name):
+    command = reliability.MAKERS[name].split()
+    assert (reliability.ROOT / command[1]).is_file() and (reliability.ROOT / command[-1]).is_file()
+
+
+def test_every_trial_is_as_promised():
+    rows = json.loads((reliability.RESULTS / "faults.json").read_text())["faults"]
+    assert {row["fault"]: row["trials"] - row["as_promised"] for row in rows} == {row["fault"]: 0 for row in rows}
+    assert sum(row["trials"] for row in rows if row["fault"].startswith("SIGKILL")) >= 50
+
+
+def test_every_file_that_the_page_names_exists():
+    text = reliability.PAGE.read_text(encoding="utf-8")
+    for path in re.findall(r"(tests/\S+?\.py)", text):
+        assert (reliability.ROOT / path).is_file(), path
+    bounds = {"256 MiB": "png.LARGEST_FILE", "64 MiB": "files.LARGEST_TEXT", "64 GiB": "checkpoint.LARGEST"}
+    from endotsr.fitting import checkpoint
+    from endotsr.untrusted import files, png
+
+    places = {"png": png, "files": files, "checkpoint": checkpoint}
+    for said, name in bounds.items():
+        size, unit = said.split()
+        module, constant = name.split(".")
+        assert said in text and int(size) * {"MiB": 1 << 20, "GiB": 1 << 30}[unit] == getattr(places[module], constant)

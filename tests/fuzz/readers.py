@@ -1,0 +1,302 @@
+"""Every reader of a file that another person may have made, with good files to start from and its mutation.
+
+A reader may return or raise `InputError` (for the judge of ports `Refused`, for golden files also what its callers turn
+into `InputError`). Anything else is a finding.
+"""
+
+import io
+import json
+import random
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path[:0] = [str(Path(__file__).parent)]
+
+import msgspec  # noqa: E402
+import mutate  # noqa: E402
+import numpy as np  # noqa: E402
+
+from endotsr.errors import InputError  # noqa: E402
+
+ROOT = Path(__file__).parents[2]
+GOLDEN = ROOT / "golden"
+CORPUS = Path(__file__).parent / "corpus"  # inputs that were findings once, by reader
+
+
+class Reader(NamedTuple):
+    """A reader under test."""
+
+    name: str  # of the file that is written, with its ending
+    seeds: Callable[[], list[bytes]]
+    mutate: Callable[[random.Random, bytes], bytes]
+    read: Callable[[Path], object]
+    refuses: tuple[type[Exception], ...] = (InputError,)
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    import cv2
+
+    return cv2.imencode(".png", pixels)[1].tobytes()
+
+
+@cache
+def png_seeds() -> list[bytes]:
+    """Grey, colour and transparent pictures of 8 and 16 bits, one with a palette and one that is interlaced."""
+    from PIL import Image
+
+    rng = np.random.default_rng(0)
+    found = [_png(rng.integers(0, 255, shape, np.uint8)) for shape in ((5, 7), (6, 4, 3), (4, 4, 4))]
+    found.append(_png(rng.integers(0, 65535, (5, 6), np.uint16)))
+    out = io.BytesIO()
+    Image.fromarray(rng.integers(0, 255, (9, 9), np.uint8)).convert("P").save(out, "png")
+    return [*found, out.getvalue()]
+
+
+def _saved(array: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
+@cache
+def pose_seeds() -> list[bytes]:
+    """A static and a moving camera."""
+    row = np.hstack([np.eye(3), np.zeros((3, 1)), [[32], [48], [40]]]).ravel()
+    rows = np.tile(np.hstack([row, [0.0, 100.0]]), (9, 1))
+    moving = rows.copy()
+    moving[:, 3] = np.arange(9)
+    return [_saved(rows), _saved(np.asfortranarray(moving)), _saved(moving.astype(np.float32))]
+
+
+def read_poses(path: Path) -> object:
+    """As `read_endonerf` does."""
+    from endotsr.sequences.poses import cameras_from_rows, read_pose_rows
+
+    return cameras_from_rows(read_pose_rows(path, 9), 48, 32, path, range(9))
+
+
+@cache
+def scene_seeds() -> list[bytes]:
+    """A trained scene as an .npz file."""
+    rng, count = np.random.default_rng(0), 6
+    arrays = {"xyz": (count, 3), "log_scale": (count, 3), "quat_wxyz": (count, 4), "rgb": (count, 3)}
+    entries = {name: rng.normal(size=shape).astype(np.float32) for name, shape in arrays.items()}
+    out = io.BytesIO()
+    np.savez(out, opacity=rng.uniform(size=count).astype(np.float32), **entries)
+    return [out.getvalue()]
+
+
+@cache
+def ply_seeds() -> list[bytes]:
+    """Four splats of degree 0."""
+    names = ["x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity",
+             "f_dc_0", "f_dc_1", "f_dc_2"]  # fmt: skip
+    head = ["ply", "format binary_little_endian 1.0", "element vertex 4", *(f"property float {n}" for n in names)]
+    body = np.random.default_rng(0).normal(size=(4, len(names))).astype("<f4").tobytes()
+    return ["\n".join([*head, "end_header\n"]).encode() + body]
+
+
+def read_splats(path: Path) -> object:
+    from endotsr.tradeoff.splat_file import read_splats as read
+
+    return read(path)
+
+
+@cache
+def toml_seeds() -> list[bytes]:
+    """The settings of two presets."""
+    from endotsr.config import DEMO, SHARP, config_to_toml
+
+    return [config_to_toml(config).encode() for config in (DEMO, SHARP)]
+
+
+def read_settings(path: Path) -> object:
+    from endotsr.config import load_config
+
+    return load_config(path)
+
+
+@cache
+def _tiny():
+    from endotsr.config import config_from_dict
+    from endotsr.simulator.settings import SimulatorSettings
+    from endotsr.simulator.simulate import simulate
+
+    settings = SimulatorSettings(width=32, height=24, frames=9)
+    points = {"first_frame_points": 6, "other_frame_points": 2}
+    config = config_from_dict({"initialisation": points, "training": {"iterations": 2}})
+    return settings, simulate(settings).sequence, config
+
+
+@cache
+def checkpoint_seeds() -> list[bytes]:
+    """The checkpoint of an untrained scene of eight Gaussians."""
+    import tempfile
+
+    from endotsr.fitting.state import new_training, save_state
+
+    _, sequence, config = _tiny()
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "checkpoint.npz"
+        save_state(path, new_training(sequence, config), config, "0" * 64)
+        return [path.read_bytes()]
+
+
+def read_checkpoint(path: Path) -> object:
+    """As a resumed training does."""
+    from endotsr.config import PAPER
+    from endotsr.fitting.checkpoint import load_latest
+    from endotsr.fitting.state import state_from_checkpoint
+
+    return state_from_checkpoint(load_latest(path)[0], PAPER)
+
+
+@cache
+def sequence_seeds() -> list[bytes]:
+    """sequence.json of a static camera, and of one that moves."""
+    from endotsr.runs.files import finite
+    from endotsr.runs.sources import sequence_record
+
+    _, sequence, _ = _tiny()
+    record = finite(sequence_record(sequence))
+    moving = record | {"static_camera": False, "cameras": record["cameras"] * 9}
+    return [json.dumps(record).encode(), json.dumps(moving).encode()]
+
+
+def read_sequence(path: Path) -> object:
+    """As `endotsr render` does, up to the names of the pictures."""
+    from endotsr.cli.render import RenderOptions, wanted_views
+    from endotsr.runs.folder import RunFolder
+    from endotsr.runs.sources import remembered_cameras
+
+    record = RunFolder(path.parent).sequence_record(
+        "names", "times", "train_index", "test_index", "cameras", "static_camera", "unit"
+    )
+    cameras = remembered_cameras(record)
+    views = wanted_views(record, RenderOptions(Path("run"), Path("out"), frames="all"))
+    for view in views:
+        inside = (path.parent / f"{view.label}.png").resolve()
+        assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
+        assert cameras[view.frame].width > 0
+    return np.array(record["times"])[record["train_index"]]
+
+
+@cache
+def record_seeds() -> list[bytes]:
+    """run.json."""
+    from endotsr.config import DEMO
+    from endotsr.runs.files import finite
+    from endotsr.runs.training import start_record
+
+    settings, sequence, _ = _tiny()
+    return [json.dumps(finite(start_record(["endotsr"], "simulated", sequence, DEMO, settings, 2))).encode()]
+
+
+def read_record(path: Path) -> object:
+    """As `endotsr evaluate` does."""
+    from endotsr.config import DEMO
+    from endotsr.evaluation.run import _about_run
+    from endotsr.report.run_text import facts
+    from endotsr.runs.folder import RunFolder
+    from endotsr.runs.model import Model, sequence_fingerprint
+    from endotsr.runs.records import REPORTED
+    from endotsr.runs.sources import run_source
+
+    folder = RunFolder(path.parent)
+    record = folder.record(*REPORTED)
+    run_source(folder)
+    scene = type("Scene", (), {"count": 3})()
+    return facts({"run": _about_run(record, Model(scene, None, DEMO, 5))}), sequence_fingerprint(record)
+
+
+@cache
+def log_seeds() -> list[bytes]:
+    """Six lines of a log."""
+    rows = [{"iteration": i, "frame": 0, "loss": 0.5, "l1": 0.1, "gaussians": 9, "seconds": 0.01} for i in range(1, 7)]
+    return [b"".join(json.dumps(row).encode() + b"\n" for row in rows)]
+
+
+def read_log(path: Path) -> object:
+    """As the report and a resumed training do."""
+    from endotsr.report.curves import read_log as read
+    from endotsr.report.curves import series
+    from endotsr.runs.log import RunLog
+
+    log = [entry for entry in read(path) if entry.get("iteration", 0) <= 5]
+    found = [series(log, key) for key in ("loss", "l1", "psnr", "seconds")]
+    RunLog(path, 5).close()
+    return found
+
+
+def golden_json(kind: str) -> Callable[[Path], object]:
+    def read(path: Path) -> object:
+        from endotsr.golden.judge.format import SCHEMAS, read_struct
+
+        return read_struct(path, SCHEMAS[kind])
+
+    return read
+
+
+@cache
+def manifest_seeds() -> list[bytes]:
+    """The manifest, with a few of its files."""
+    whole = json.loads((GOLDEN / "manifest.json").read_text())
+    return [json.dumps(whole | {"files": whole["files"][:6]}).encode()]
+
+
+@cache
+def case_seeds() -> list[bytes]:
+    """Three cases."""
+    return [path.read_bytes() for path in sorted((GOLDEN / "cases").rglob("case.json"))[::40][:3]]
+
+
+@cache
+def request_seeds() -> list[bytes]:
+    """A request to a port."""
+    output = {"level": 1, "unit": "1", "dtype": "real", "shape": [3, 7]}
+    request = {"family": "motion", "case": "generic", "operation": "motion", "settings": {"beta": 0.3},
+               "inputs": {"phi": "inputs/phi.npy"}, "outputs": {"translation": output}}  # fmt: skip
+    return [json.dumps(request).encode()]
+
+
+def read_port_output(path: Path) -> object:
+    """As the judge reads the outputs of a port."""
+    from endotsr.golden.judge.npy import read_plain
+
+    return read_plain(path, path.parent)
+
+
+def read_png(path: Path) -> object:
+    from endotsr.opencv import read_png as read
+
+    return read(path)
+
+
+def _refused() -> type[Exception]:
+    from endotsr.golden.judge.npy import Refused
+
+    return Refused
+
+
+READERS = {
+    "png": Reader("a.png", png_seeds, mutate.png, read_png),
+    "poses (npy)": Reader("poses_bounds.npy", pose_seeds, mutate.npy, read_poses),
+    "splats (npz)": Reader("a.npz", scene_seeds, mutate.npz, read_splats),
+    "splats (ply)": Reader("a.ply", ply_seeds, mutate.ply, read_splats),
+    "settings (toml)": Reader("config.toml", toml_seeds, mutate.lines, read_settings),
+    "checkpoint": Reader("checkpoint.npz", checkpoint_seeds, mutate.checkpoint, read_checkpoint),
+    "run.json": Reader("run.json", record_seeds, mutate.tree, read_record),
+    "sequence.json": Reader("sequence.json", sequence_seeds, mutate.tree, read_sequence),
+    "log.jsonl": Reader("log.jsonl", log_seeds, mutate.jsonl, read_log),
+    "golden manifest": Reader(
+        "manifest.json", manifest_seeds, mutate.tree, golden_json("manifest"), (InputError, msgspec.DecodeError)
+    ),
+    "golden case": Reader("case.json", case_seeds, mutate.tree, golden_json("case"), (InputError, msgspec.DecodeError)),
+    "request to a port": Reader(
+        "request.json", request_seeds, mutate.tree, golden_json("request"), (InputError, msgspec.DecodeError)
+    ),
+    "output of a port (npy)": Reader("a.npy", pose_seeds, mutate.npy, read_port_output, (_refused(),)),
+}
