@@ -56,11 +56,12 @@ def methods_of(metrics: dict[str, Any], label: str, where: object, baselines: bo
         rows = {label: metrics["held_out"]["per_frame"]}
         if baselines:
             rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
-        for row in (row for per_frame in rows.values() for row in per_frame):
-            (row["frame"], row["name"])
+        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+        for method in methods:
+            _frames(method)
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
-    return [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+    return methods
 
 
 def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
@@ -85,17 +86,21 @@ def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0)
 
 def _refuse_other_frames(methods: list[Method]) -> None:
     first = methods[0]
-    frames = [(row["frame"], row["name"]) for row in first.per_frame]
+    frames = _frames(first)
     for k, other in enumerate(methods[1:], start=1):
         if other.label in [method.label for method in methods[:k]]:
             raise InputError(f"two methods are called {other.label!r}; allowed: NAME=PATH with different names")
-        if [(row["frame"], row["name"]) for row in other.per_frame] != frames:
+        if _frames(other) != frames:
             raise InputError(
                 f"{other.label}: {_about(other)}; {first.label}: {_about(first)}; allowed: the same held-out frames"
             )
         for name, digest in other.digests.items():
             if first.digests.get(name) != digest:
                 raise InputError(f"{other.label} and {first.label}: measured on different {name}; allowed: the same")
+
+
+def _frames(method: Method) -> list[tuple[int, str]]:
+    return [(row["frame"], row["name"]) for row in method.per_frame]
 
 
 def _about(method: Method) -> str:
