@@ -56,13 +56,14 @@ class RenderOptions:
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.export.scene import open_scene
+    from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
     from endotsr.views import pictures
     from endotsr.views.plan import Request
 
     options = parse(RenderOptions, words, "render")
-    asked = {name: getattr(options, name) for name in ("times", "frames", "count", "camera", "size", "angle", "offset")}
-    request = Request(**asked)
+    times = Times(options.times, options.frames, options.count)
+    request = Request(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate)
     use_threads(options.threads)
     scene = open_scene(options.scene)

@@ -11,7 +11,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.export.files import check_folder_name
 from endotsr.export.scene import MovingScene
+from endotsr.export.times import moments
 from endotsr.opencv import write_png
 from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
 from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
@@ -23,15 +25,13 @@ from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
 from endotsr.views.film import ByteImage, check_film, write_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, normalised_depth, scale_of, side_by_side
-from endotsr.views.plan import Request, View, check_request, moments, views_of
+from endotsr.views.plan import Request, View, check_request, views_of
 
 DepthKind = Literal["accumulated", "normalised"]
 ABOUT_DEPTH = {
     "accumulated": "not normalised by opacity",
     "normalised": "normalised by opacity",
 }
-FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
-FILE_ENDINGS = (*FILM_ENDINGS, ".png", ".jpg", ".jpeg", ".npy", ".npz", ".ply", ".html", ".json", ".csv")
 
 
 class Look(NamedTuple):
@@ -40,13 +40,6 @@ class Look(NamedTuple):
     depth: DepthKind = "accumulated"
     taken_out: tuple[str, ...] = ()  # spectral components to leave out
     panels: tuple[Panel, ...] = ("render",)  # of a film, from left to right
-
-
-def check_folder_name(out: Path) -> None:
-    """Raises InputError for a folder whose name is that of a file of another kind."""
-    if out.suffix.lower() in FILE_ENDINGS and not out.is_dir():
-        film = "; --film FILE writes a film" if out.suffix.lower() in FILM_ENDINGS else ""
-        raise InputError(f"{out}: --out is a folder of pictures, and this is the name of a {out.suffix} file{film}")
 
 
 def check_panels(panels: tuple[Panel, ...], views: list[View]) -> None:
@@ -71,7 +64,7 @@ def requested_views(scene: MovingScene, request: Request, default: str) -> list[
     check_request(request, scene.record, default)
     pivot_depth, _ = 1.0, scene.model
     if request.camera in TURNING:
-        time, frame, _, _ = moments(request, scene.record, default)[0]
+        time, frame, _, _ = moments("render", request.times, scene.record, default)[0]
         out = scene.render(time, remembered_cameras(scene.record)[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
     return views_of(request, scene.record, pivot_depth, default)
@@ -82,7 +75,7 @@ def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
     if out is None and film is None:
         raise InputError("render: --out DIR or --film FILE is missing: where the pictures are written")
     if out is not None:
-        check_folder_name(out)
+        check_folder_name(out, "pictures", film="--film FILE writes a film")
         refuse_existing(out)
     if film is not None:
         check_film(film, rate)

@@ -4,12 +4,12 @@ In: what the user asks for and the record of the sequence (sequence.json). Out: 
 """
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.runs.sources import nearest_frame, remembered_cameras
+from endotsr.export.times import Times, moments
+from endotsr.runs.sources import remembered_cameras
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
@@ -26,48 +26,19 @@ class View(NamedTuple):
     exact: bool  # whether this is the moment of a frame and its own camera, so that it can be compared with it
 
 
-@dataclass(frozen=True)
-class Request:
-    """The views that are asked for. One of `times`, `frames` and `count` is given, or none for the default."""
+class Request(NamedTuple):
+    """The views that are asked for."""
 
-    times: tuple[float, ...] = ()
-    frames: Literal["test", "train", "all"] | None = None
-    count: int | None = None
+    times: Times = Times()
     camera: str = "observed"  # a path, the number of a frame, or a JSON file
     offset: tuple[float, ...] = (0.0, 0.0, 0.0)  # right, down, forward; scene units
     size: str = ""  # WIDTHxHEIGHT
     angle: float = 8.0  # degrees, of orbit and sway
 
 
-def moments(request: Request, record: dict[str, Any], default: str = "test") -> list[tuple[float, int, str, bool]]:
-    """Time, nearest frame, name, and whether it is the moment of that frame.
-
-    Raises: InputError for a time that does not exist, or for two ways to choose the times.
-    """
-    if sum([bool(request.times), request.frames is not None, request.count is not None]) > 1:
-        raise InputError("render: give one of --times, --frames and --count")
-    if request.times or request.count is not None:
-        times = list(request.times) or _even(request.count or 0)
-        for time in times:
-            if not 0.0 <= time <= 1.0:
-                raise InputError(f"render: --times {time:g} is not allowed; allowed: times in [0, 1]")
-        known = record["times"]
-        nearest = [nearest_frame(known, t) for t in times]
-        return [(t, i, f"{k:05d}", known[i] == t) for k, (t, i) in enumerate(zip(times, nearest))]
-    every = range(len(record["names"]))
-    chosen = {"test": record["test_index"], "train": record["train_index"], "all": every}[request.frames or default]
-    return [(record["times"][i], i, record["names"][i], True) for i in chosen]
-
-
-def _even(count: int) -> list[float]:
-    if count < 1:
-        raise InputError(f"render: --count {count} is not allowed; allowed: an integer >= 1")
-    return [i / max(count - 1, 1) for i in range(count)]
-
-
 def check_request(request: Request, record: dict[str, Any], default: str = "test") -> None:
     """Everything that can be refused without a model and its cameras. Raises: InputError."""
-    moments(request, record, default)
+    moments("render", request.times, record, default)
     if request.size:
         read_size(request.size)
     if not 0.0 <= request.angle <= LARGEST_ANGLE:
@@ -92,7 +63,7 @@ def views_of(request: Request, record: dict[str, Any], pivot_depth: float, defau
 
     Raises: InputError for a file of cameras that cannot be used.
     """
-    wanted = moments(request, record, default)
+    wanted = moments("render", request.times, record, default)
     observed = remembered_cameras(record)
     cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth)
     if any(request.offset):
