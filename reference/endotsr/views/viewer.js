@@ -40,6 +40,7 @@ planes = null;
 const canvas = element("scene");
 canvas.width = about.width;
 canvas.height = about.height;
+element("stage").style.setProperty("--widest", `calc(72vh * ${about.width / about.height})`);  // no scrolling
 const gl = canvas.getContext("webgl2", {antialias: false, preserveDrawingBuffer: true});
 if (!gl) return fail("This page needs WebGL 2, which this browser does not offer.");
 const precise = gl.getExtension("EXT_color_buffer_float") !== null;
