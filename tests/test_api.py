@@ -255,3 +255,12 @@ def test_the_code_of_the_pages_runs(page, sequence, tmp_path, monkeypatch, capsy
     exec(compile(code, page, "exec"), found)
     assert found["run"].iteration == 4 and found["view"].depth.shape == (24, 24)
     assert endotsr.open_run("runs/mine").iteration == 4
+
+
+def test_a_run_in_memory_renders_with_the_exposure_of_its_frames(tmp_path):
+    sequence = endotsr.load_sequence("simulated", simulator=SIMULATOR)
+    first = {"first_frame_points": 100, "other_frame_points": 0}
+    settings = {"model": {"exposure": True}, "optimiser": {"exposure": 0.5}, "initialisation": first}
+    run = endotsr.train(sequence, iterations=2, on_message=lambda line: None, **settings)
+    again = endotsr.open_run(run.save(tmp_path / "run"))
+    assert (run.render(0.3).colour == again.render(0.3).colour).all()

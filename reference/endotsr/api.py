@@ -349,7 +349,8 @@ class Run:
         from endotsr.fitting.model import spectral_from
 
         times = np.asarray(self.sequence_record["times"])[self.sequence_record["train_index"]]
-        return Model(state.gaussians, spectral_from(self.config.model, times), self.config, state.iteration)
+        spectral = spectral_from(self.config.model, times)
+        return Model(state.gaussians, spectral, self.config, state.iteration, state.frames)
 
     def _reached(self, state: "TrainingState") -> dict[str, Any]:
         finished = state.iteration >= self.config.training.iterations

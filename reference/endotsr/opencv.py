@@ -1,4 +1,4 @@
-"""The only module that imports OpenCV: picture files, Canny edges, DIS optical flow and area resizing.
+"""The only module that imports OpenCV: picture files, films, Canny edges, optical flow and area resizing.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
 (BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this module. `cv2` is
@@ -6,8 +6,11 @@ imported on first use, so that commands which read no picture start without it. 
 module, except through the Canny edges, which are an input of the smoothness loss.
 """
 
+import contextlib
+import os
 import struct
 import zlib
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -214,3 +217,55 @@ def area_resize(image: Array, width: int, height: int) -> Array:
         return image
     cv2 = _cv2()
     return cv2.resize(np.ascontiguousarray(image), (width, height), interpolation=cv2.INTER_AREA)
+
+
+def write_video(path: Path, pictures: Iterable[Array], rate: float) -> None:
+    """Write a film in the VP9 format; the ending of the name, .mp4 or .webm, chooses the container.
+
+    pictures  (H, W, 3) uint8 RGB, all of one size with even sides
+    rate      pictures a second
+    Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode VP9.
+    """
+    cv2, writer = _cv2(), None
+    try:
+        for picture in pictures:
+            if writer is None:
+                height, width = picture.shape[:2]
+                with _silent():  # the library warns of a tag that a webm file does not hold
+                    writer = cv2.VideoWriter(
+                        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), float(rate), (width, height)
+                    )
+                if not writer.isOpened():
+                    raise InputError(f"{path}: this build of OpenCV cannot encode the film; allowed: a name in .gif")
+            writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+    finally:
+        if writer is not None:
+            writer.release()
+    if writer is None:
+        raise InputError(f"{path}: a film needs a picture")
+
+
+def read_video(path: Path) -> list[Array]:
+    """Every picture of a film, (H, W, 3) uint8 RGB. Raises: InputError if it cannot be read."""
+    cv2 = _cv2()
+    reader = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    found = []
+    while (read := reader.read())[0]:
+        found.append(np.ascontiguousarray(read[1][:, :, ::-1]))
+    reader.release()
+    if not found:
+        raise InputError(f"{path}: cannot be read as a film")
+    return found
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Nothing is written to the standard error of the process, by libraries in C either, during the block."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

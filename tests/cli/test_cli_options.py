@@ -205,6 +205,7 @@ def test_message_of_a_wrong_section_value():
 def test_missing_words(capsys):
     assert_refused(capsys, ["train", "simulated"], "--out")
     assert_refused(capsys, ["train", "--out", "run"], "SEQUENCE")
-    assert_refused(capsys, ["render"], "RUN", "--out")
+    assert_refused(capsys, ["render"], "missing: SCENE")
+    assert_refused(capsys, ["render", "run"], "--out DIR or --film FILE is missing")
     assert_refused(capsys, ["demo"], "demo: --out RUN is missing")
     assert_refused(capsys, ["demo", "--ou", "x"], "--ou: no such option; did you mean --out?")

@@ -349,7 +349,7 @@ def test_resume_of_a_finished_run_changes_nothing(finished_run, tmp_path, capsys
     [
         (["--model.beta", "0.2"], ["model.beta = 0.2", "keeps the settings"]),
         (["--model.beta", "0.2"], ["requested: model.beta = 0.2 (run: 0.3)\n"]),
-        (["--iterations", "40"], ["keeps the settings", "requested: training.iterations = 40 (run: 30)\n"]),
+        (["--iterations", "20"], ["keeps the settings", "requested: training.iterations = 20 (run: 30)\n"]),
         (
             ["--scale", "0.5", "--seed", "1"],
             ["requested: sequence.scale = 0.5 (run: 1.0), training.seed = 1 (run: 0)\n"],

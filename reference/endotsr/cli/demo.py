@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.parser import HELP_ALL, parse
 from endotsr.errors import InputError
 from endotsr.runs.sources import SIMULATED
 
@@ -35,6 +35,8 @@ def run(words: list[str]) -> int:
 
     if {"-h", "--help"} & set(words):
         parse(DemoOptions, words, "demo")
+    if HELP_ALL in words:
+        parse(train.TrainOptions, words, "demo")
     words = [SIMULATED, "--preset", "demo", *words]
     if parse(train.TrainOptions, words, "demo").out is None:
         raise InputError("demo: --out RUN is missing: the run folder to create")

@@ -1,4 +1,4 @@
-"""`endotsr evaluate`: the held-out metrics of a run beside baselines, with renders and a report."""
+"""`endotsr evaluate`: the held-out metrics of a run, or of any folder of pictures, beside baselines."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.shown import SHOWN, ShownSettings, shown_sequence
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable, replace_file, write_json
 from endotsr.runs.folder import RunFolder, open_run
 
 if TYPE_CHECKING:
@@ -14,40 +17,88 @@ if TYPE_CHECKING:
 
 @dataclass
 class EvaluateOptions:
-    """Measure a run on its held-out frames; write metrics.json, renders/, curves.png and report.html in its folder."""
+    """Measure a run on its held-out frames; write metrics.json, renders/, curves.png and report.html in its folder.
 
-    run: Annotated[Path, Option("RUN", positional=True)]
-    """run folder"""
+    With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
+    of RUN or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display units),
+    paired by the names of the frames, by their numbers, or in order. The run, if one is named, is not changed.
+    """
+
+    run: Annotated[Path | None, Option("RUN", positional=True)] = None
+    """run folder; with --pictures it may be left out"""
+    pictures: Annotated[Path | None, Option("FOLDER")] = None
+    """measure the pictures of this folder, not the run"""
+    label: Annotated[str, Option("TEXT")] = ""
+    """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """current location of the sequence of the run (default: the recorded one)"""
+    """EndoNeRF folder, or `simulated`; with RUN: its current location (default: the recorded one)"""
+    json: Annotated[Path | None, Option("FILE")] = None
+    """also write the metrics as JSON"""
+    csv: Annotated[Path | None, Option("FILE")] = None
+    """also write the metrics of every held-out frame as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
     paper_row: Literal["pulling"] | None = None
     """also show the published figures of this clip"""
     threads: int = 0
     """threads, 0 = all cores"""
+    settings: Annotated[ShownSettings, Option(flat=True)] = SHOWN
 
 
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.evaluation.run import PUBLISHED
     from endotsr.kernels.threads import use_threads
+    from endotsr.report.spreadsheet import frames_csv
+
+    options = parse(EvaluateOptions, words, "evaluate")
+    refuse_unwritable(options.json, options.csv)
+    use_threads(options.threads)
+    published = (PUBLISHED[options.paper_row],) if options.paper_row else ()
+    metrics = _pictures(options, published) if options.pictures else _run(options, published)
+    if options.json:
+        write_json(options.json, metrics)
+    if options.csv:
+        text = frames_csv(metrics, metrics.get("label", "this model"))
+        replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return 0
+
+
+def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
+    """Metrics of the run, written to its folder."""
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence
 
-    options = parse(EvaluateOptions, words, "evaluate")
+    if options.run is None:
+        raise InputError("evaluate: RUN is missing: a run folder, or --pictures FOLDER with --sequence SEQUENCE")
+    if options.settings != SHOWN:
+        raise InputError(f"evaluate: --sequence.* beside {options.run} is not allowed: the run has fixed its settings")
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
-    use_threads(options.threads)
     sequence = load_run_sequence(folder, options.sequence)
-    evaluate_run(folder, sequence, options.lpips, (PUBLISHED[options.paper_row],) if options.paper_row else ())
-    return 0
+    return evaluate_run(folder, sequence, options.lpips, published)
+
+
+def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
+    """Metrics of a folder of pictures."""
+    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.report.run_text import held_out_table
+
+    assert options.pictures is not None
+    weights = load_lpips_weights(options.lpips)
+    sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
+    found = find_pictures(options.pictures, sequence)
+    print(f"{options.pictures}: {len(found.files)} pictures, paired {found.pairing}")
+    metrics = measure_pictures(found, sequence, options.label, weights) | {"published": list(published)}
+    print(held_out_table(metrics))
+    return metrics
 
 
 def evaluate_run(
     folder: RunFolder, sequence: "Sequence", lpips: Path | None = None, published: tuple[dict[str, Any], ...] = ()
-) -> None:
-    """Measure the latest checkpoint, write the files of an evaluation, and print the table."""
+) -> dict[str, Any]:
+    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.run import measure_run
     from endotsr.report.run_files import write_evaluation
@@ -62,3 +113,4 @@ def evaluate_run(
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))
     print(f"report: {folder.path / 'report.html'}", flush=True)
+    return metrics

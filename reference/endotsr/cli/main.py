@@ -11,6 +11,7 @@ import os
 import sys
 
 from endotsr import __version__
+from endotsr.cli.parts.output import saying, split_output
 from endotsr.errors import CalibrationError, InputError
 from endotsr.runs.stopping import signals_stop
 from endotsr.untrusted.names import plain_line
@@ -19,11 +20,15 @@ COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "train": "train on an EndoNeRF folder, or on a simulated sequence",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
-    "render": "render colour, depth and opacity at any time in [0, 1]",
-    "evaluate": "measure held-out frames, compare with baselines, and write renders and a self-contained report",
+    "render": "render pictures and films at any time in [0, 1], from any camera",
+    "view": "write a page with the moving scene, which opens in any browser without a network",
+    "export": "write .ply files, a point cloud, or a slim model",
+    "evaluate": "measure held-out frames of a run, or any pictures, beside baselines, with renders and a report",
+    "compare": "compare runs and folders of pictures frame by frame, with intervals",
     "gradcheck": "check every reverse pass against finite differences",
     "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
     "tradeoff": "measure error against time, and find the best setting within a budget",
+    "completion": "print a script that completes commands and options in bash, zsh or fish",
     "golden": "golden vectors for ports: judge outputs, run a port, check the vectors",
 }
 
@@ -41,15 +46,24 @@ def main(argv: list[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal whose encoding lacks letters of a file name
-    if not argv or argv[0] in ("-h", "--help"):
+    try:
+        output, words = split_output(argv)
+        with saying(output):
+            return _main(words)
+    except InputError as error:
+        return _fail(str(error))
+
+
+def _main(words: list[str]) -> int:
+    if not words or words[0] in ("-h", "--help"):
         print(_overview())
         return 0
-    if argv[0] == "--version":
+    if words[0] == "--version":
         print(f"endotsr {__version__}")
         return 0
     try:
         with signals_stop():
-            return _command(argv[0])(argv[1:])
+            return _command(words[0])(words[1:])
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
         print(table)
@@ -100,6 +114,7 @@ def _overview() -> str:
             "options:",
             "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
             "  --version    the version",
+            "  -q, --quiet; --log-file FILE   print nothing but errors; also write what is printed (any command)",
         ]
     )
 

@@ -25,7 +25,7 @@ class TrainOptions:
     """Train on an EndoNeRF folder (or on the word `simulated`), evaluate, and write a run folder.
 
     Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
-    from its last checkpoint to the same result, bit for bit.
+    from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
@@ -35,7 +35,7 @@ class TrainOptions:
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
     iterations: Annotated[int | None, Option("N")] = None
-    """length of the run; stretches the schedule"""
+    """length of the run; stretches the schedule. With --resume: a larger number extends the run"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
     scale: float | None = None
@@ -118,7 +118,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     """Refuse settings that would change the run, and train it from its last checkpoint to the end."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.sources import check_same_input, load_sequence, run_source
-    from endotsr.runs.training import resume_run
+    from endotsr.runs.training import extend_run, resume_run
 
     folder = open_run(out)
     kept = folder.config()
@@ -126,14 +126,19 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     remembered, simulator = run_source(folder)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
     asked = _settings(options)
-    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
+    extended = asked.training.iterations > kept.training.iterations
+    allowed = RESUMABLE | ({"training.iterations"} if extended else set())
+    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in allowed]
     if refused:
         raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
     source = source or remembered
     sequence = load_sequence(source, kept, options.simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
-    resume_run(folder, sequence, threads, Progress(kept.training.iterations))
+    if extended:
+        print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
+        extend_run(folder, asked.training.iterations)
+    resume_run(folder, sequence, threads, Progress(asked.training.iterations))
     return folder, sequence
 
 

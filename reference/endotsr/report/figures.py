@@ -162,6 +162,15 @@ def encode(image: ByteImage, kind: str = "png") -> bytes:
     return buffer.getvalue()
 
 
+def encode_transparent(image: NDArray[np.uint8]) -> bytes:
+    """PNG bytes of an (H, W, 4) image, RGB and opacity."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(image).save(buffer, format="png")
+    return buffer.getvalue()
+
+
 def data_uri(content: bytes, kind: str) -> str:
     """The bytes of an image file as a data URI."""
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -42,9 +42,13 @@ def facts(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 def held_out_table(metrics: dict[str, Any]) -> str:
-    """The held-out means of model, baselines and published figures as text."""
-    rows = [("this model", metrics["held_out"]["mean"])]
-    rows += [(entry["label"], entry["mean"]) for entry in (metrics["cross_fade"], *metrics["baselines"].values())]
+    """The held-out means of model, baselines and published figures as text.
+
+    metrics   of `evaluation.run.measure_run`, or of `evaluation.pictures.measure_pictures`, which has a `label`
+    """
+    rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
+    rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
+    rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
     rows += [(entry["label"], entry) for entry in metrics["published"]]
     columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
     width = max(len(label) for label, _ in rows)
@@ -54,12 +58,13 @@ def held_out_table(metrics: dict[str, Any]) -> str:
         cells = (f"{_number(mean.get(key), digits):>12}" for key, _, digits in columns)
         lines.append(" ".join([f"{label:<{width}}", *cells]))
     inside = metrics["training"]["mean"].get("psnr_tissue")
-    lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
-    if motion := metrics["trajectories"]:
+    if "run" in metrics or inside is not None:
+        lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
+    if motion := metrics.get("trajectories"):
         lines.append(trajectory_sentence(motion))
     if frames := left_out(metrics):
         lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
-    if metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
+    if "run" in metrics and metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
         lines.append(f"checkpoint of iteration {iterations(metrics['run'])}")
     if metrics["lpips_reason"]:
         lines.append(f"LPIPS: {metrics['lpips_reason']} (--lpips FILE)")

@@ -10,10 +10,12 @@ import shutil
 import time
 from typing import TYPE_CHECKING, Any, Protocol
 
-from endotsr.config import Config
+import msgspec
+
+from endotsr.config import Config, config_to_toml
 from endotsr.errors import InputError
 from endotsr.fitting.divergence import Diverged
-from endotsr.runs.files import os_error_line
+from endotsr.runs.files import os_error_line, replace_file
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
@@ -94,6 +96,26 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
             entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
             folder.update(status="running", resumed=[*folder.record().get("resumed", []), entry])
             train_run(folder, state, sequence, config, observer)
+
+
+def extend_run(folder: RunFolder, iterations: int) -> None:
+    """Give a run more iterations: config.toml and checkpoint get the new number, and no other setting changes.
+
+    Milestones stay at their iterations. Rates that decay over the whole run follow, from the next iteration on, the
+    decay of a run of the new length, so that they begin higher than they ended.
+    """
+    from endotsr.runs.model import load_training, save_training
+
+    with folder.locked():
+        before = folder.config()
+        training = msgspec.structs.replace(before.training, iterations=iterations)
+        config = msgspec.structs.replace(before, training=training)
+        if folder.checkpoint.exists():
+            save_training(folder, load_training(folder, before), config)
+        text = config_to_toml(config)
+        replace_file(folder.path / "config.toml", lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        entry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
+        folder.update(extended=[*folder.record().get("extended", []), entry])
 
 
 def train_run(

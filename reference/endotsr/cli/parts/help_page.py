@@ -17,6 +17,21 @@ from endotsr.config import allowed_values
 WIDEST = 120  # characters of a line; longer lines are hard to read on a wide terminal
 GAP = 2  # characters between name and help, and before the name
 OPTIONS = "options:"
+COMMON = (
+    ("-h, --help", "print this help; --help-all prints every option"),
+    ("-q, --quiet", "print nothing but errors"),
+    ("--log-file FILE", "also write everything that is printed to a file"),
+)  # of every command
+FEW_SETTINGS = 12  # settings of sections up to which the short help shows all of them
+OFTEN_SET = (
+    "sequence.split",
+    "sequence.excluded_value",
+    "model.appearance",
+    "model.spectral_motion",
+    "model.laplacian",
+    "loss.lambda_lap",
+    "training.precision",
+)
 UNBROKEN = "\u00a0"  # a space at which textwrap does not break
 
 
@@ -25,8 +40,19 @@ def terminal_width() -> int:
     return min(shutil.get_terminal_size(fallback=(100, 24)).columns, WIDEST)
 
 
-def help_page(options: type, fields: list[Field], command: str, width: int) -> str:
-    """The help of a command, in lines of at most `width` characters."""
+def short_fields(fields: list[Field]) -> list[Field]:
+    """The options that people set: all of a command with few settings, else those outside of sections and OFTEN_SET."""
+    settings = [field for field in fields if "." in field.name]
+    if len(settings) <= FEW_SETTINGS:
+        return fields
+    return [field for field in fields if "." not in field.name or field.key in OFTEN_SET]
+
+
+def help_page(options: type, fields: list[Field], command: str, width: int, hidden: int = 0) -> str:
+    """The help of a command, in lines of at most `width` characters.
+
+    hidden   options that are left out of `fields`; the last line says how to see them
+    """
     needed = [field for field in fields if field.positional or field.default is REQUIRED]
     usage = " ".join(["endotsr", command, *(_required_name(field) for field in needed), "[OPTIONS]"])
     longest = max(len(_shown_name(field)) for field in fields)
@@ -34,9 +60,11 @@ def help_page(options: type, fields: list[Field], command: str, width: int) -> s
     blocks = [f"usage: {usage}"]
     blocks += [textwrap.fill(text, width) for text in (inspect.getdoc(options) or "").split("\n\n")]
     for title, members in _groups(fields, width):
-        rows = [_row("-h, --help", "print this help", column, width)] if title == OPTIONS else []
+        rows = [_row(name, text, column, width) for name, text in COMMON] if title == OPTIONS else []
         rows += [_row(_shown_name(field), _explained(field), column, width) for field in members]
         blocks.append("\n".join([title, *rows]))
+    if hidden:
+        blocks.append(f"`endotsr {command} --help-all` lists {hidden} more settings.")
     return "\n\n".join(blocks) + "\n"
 
 

@@ -12,25 +12,28 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 
 from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
-from endotsr.cli.parts.help_page import help_page, terminal_width
+from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
 from endotsr.config import allowed_values, checked
 from endotsr.errors import InputError
 
 T = TypeVar("T")
+HELP_ALL = "--help-all"
+HELP = {"-h", "--help", HELP_ALL}
 SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
 
 
 def parse(options: type[T], words: list[str], command: str, default: T | None = None) -> T:
     """The options of one command, over the values of `default` if it is given.
 
-    `--help` prints them and leaves with SystemExit(0).
+    `--help` prints those that people set, `--help-all` prints all of them; both leave with SystemExit(0).
 
     Raises:  InputError for an unknown option, a value of the wrong type or range, and a missing option.
     """
     fields = fields_of(options, default)
-    if {"-h", "--help"} & set(words):
-        print(help_page(options, fields, command, terminal_width()), end="")
+    if HELP & set(words):
+        shown = fields if HELP_ALL in words else short_fields(fields)
+        print(help_page(options, shown, command, terminal_width(), len(fields) - len(shown)), end="")
         raise SystemExit(0)
     given, unknown = _given(fields, words)
     if unknown:

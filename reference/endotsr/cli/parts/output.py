@@ -1,0 +1,97 @@
+"""Options that every command has: `-q` says less, `--log-file FILE` keeps what is said.
+
+In: the words of a command line. Out: the words without these options, and streams in the place of the standard ones.
+Errors are always printed. A log file gets every line of standard output and standard error, also with `-q`.
+"""
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from endotsr.errors import InputError
+
+QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
+
+
+class Output(NamedTuple):
+    """Where a command says what it says."""
+
+    quiet: bool = False
+    log_file: Path | None = None
+
+
+def split_output(words: list[str]) -> tuple[Output, list[str]]:
+    """The options of this module, and the other words in their order.
+
+    Raises: InputError for `--log-file` without a value.
+    """
+    rest, quiet, file = [], False, None
+    found = iter(words)
+    for word in found:
+        name, equals, value = word.partition("=")
+        if word in QUIET:
+            quiet = True
+        elif name == LOG_FILE:
+            value = value if equals else next(found, "")
+            if not value:
+                raise InputError("--log-file: missing value FILE")
+            file = Path(value)
+        else:
+            rest.append(word)
+    return Output(quiet, file), rest
+
+
+@contextlib.contextmanager
+def saying(output: Output) -> Iterator[None]:
+    """Standard output and standard error as asked for, during the block; the log file is written from its beginning.
+
+    Raises: InputError if the log file cannot be written.
+    """
+    with contextlib.ExitStack() as stack:
+        log = stack.enter_context(_opened(output.log_file)) if output.log_file else None
+        if output.quiet or log is not None:
+            stack.enter_context(contextlib.redirect_stdout(_Tee(None if output.quiet else sys.stdout, log)))
+        if log is not None:
+            stack.enter_context(contextlib.redirect_stderr(_Tee(sys.stderr, log)))
+        yield
+
+
+def _opened(file: Path) -> IO[str]:
+    try:
+        return file.open("w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+class _Tee:
+    """A text stream that writes to a shown stream, to a log, to both or to none."""
+
+    def __init__(self, shown: Any, log: IO[str] | None) -> None:
+        self._shown, self._log = shown, log
+        self.encoding = "utf-8"
+
+    def write(self, text: str) -> int:
+        """As a text file."""
+        if self._shown is not None:
+            self._shown.write(text)
+        if self._log is not None:
+            self._log.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """As a text file."""
+        for stream in (self._shown, self._log):
+            if stream is not None:
+                stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether the shown stream is a terminal, on which a progress bar is drawn."""
+        return self._log is None and self._shown is not None and self._shown.isatty()
+
+    def fileno(self) -> int:
+        """Of the shown stream. Raises: OSError without one."""
+        if self._shown is None:
+            raise OSError("a quiet stream has no file")
+        return self._shown.fileno()

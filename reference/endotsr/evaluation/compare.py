@@ -1,0 +1,137 @@
+"""Several methods on the same held-out frames: means, and differences paired frame by frame.
+
+In: dictionaries of metrics.json, of runs or of folders of pictures. Out: one row a method. A difference is that to the
+first method on the same frame, so that frames that are difficult for both cancel. Its interval is a bootstrap over the
+frames: it says how the mean would vary with the choice of frames of this clip, and nothing about other clips.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+
+RESAMPLES = 9999
+CONFIDENCE = 0.95
+SMALLER_IS_BETTER = ("lpips", "lpips_symmetric")
+
+
+class Method(NamedTuple):
+    """The held-out frames of one method."""
+
+    label: str
+    per_frame: list[dict[str, Any]]  # entries of metrics.json: frame, name, time, metrics
+    digests: dict[str, str]  # array -> SHA-256 of the frames and masks it was measured on; empty if unknown
+
+
+class Difference(NamedTuple):
+    """A paired difference to the first method, over the frames for which both have a value."""
+
+    mean: float
+    low: float  # of the interval
+    high: float
+    better: int  # frames on which this method is the better one
+    frames: int
+
+
+class Row(NamedTuple):
+    """One method and one metric."""
+
+    label: str
+    metric: str
+    mean: float | None
+    difference: Difference | None  # None for the first method, and without a common frame
+
+
+def methods_of(metrics: dict[str, Any], label: str, where: object, baselines: bool = False) -> list[Method]:
+    """The method of one metrics.json, and the baselines in it if they are asked for.
+
+    where   the file, for messages
+    Raises: InputError if the dictionary is none of `endotsr evaluate`.
+    """
+    try:
+        about = metrics["pictures"] if "pictures" in metrics else metrics["run"]["input"]
+        digests = {name: str(about["arrays_sha256"][name]) for name in ("images", "masks")}
+        rows = {label: metrics["held_out"]["per_frame"]}
+        if baselines:
+            rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
+        methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
+        for method in methods:
+            _frames(method)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
+    return methods
+
+
+def compare(methods: list[Method], metric_names: tuple[str, ...], seed: int = 0) -> list[Row]:
+    """Means and paired differences to the first method, metric by metric.
+
+    metric_names   keys of the entries; a metric that no method has is left out
+    seed           of the resampling
+    Raises: InputError if two methods have one label, or if they were not measured on the same frames and masks.
+    """
+    _refuse_other_frames(methods)
+    rows = []
+    for metric in metric_names:
+        columns = [_column(method, metric) for method in methods]
+        if all(np.isnan(column).all() for column in columns):
+            continue
+        for k, (method, column) in enumerate(zip(methods, columns)):
+            difference = None if k == 0 else _paired(column - columns[0], metric, seed)
+            mean = None if np.isnan(column).all() else float(np.nanmean(column))
+            rows.append(Row(method.label, metric, mean, difference))
+    return rows
+
+
+def _refuse_other_frames(methods: list[Method]) -> None:
+    first = methods[0]
+    frames = _frames(first)
+    for k, other in enumerate(methods[1:], start=1):
+        if other.label in [method.label for method in methods[:k]]:
+            raise InputError(f"two methods are called {other.label!r}; allowed: NAME=PATH with different names")
+        if _frames(other) != frames:
+            raise InputError(
+                f"{other.label}: {_about(other)}; {first.label}: {_about(first)}; allowed: the same held-out frames"
+            )
+        for name, digest in other.digests.items():
+            if first.digests.get(name) != digest:
+                raise InputError(f"{other.label} and {first.label}: measured on different {name}; allowed: the same")
+
+
+def _frames(method: Method) -> list[tuple[int, str]]:
+    return [(row["frame"], row["name"]) for row in method.per_frame]
+
+
+def _about(method: Method) -> str:
+    names = [row["name"] for row in method.per_frame]
+    return f"{len(names)} frames" + (f" from {names[0]} to {names[-1]}" if names else "")
+
+
+def _column(method: Method, metric: str) -> FloatArray:
+    """The metric on every frame, NaN where it has no value."""
+    values = [row.get(metric) for row in method.per_frame]
+    return np.array([np.nan if value is None else float(value) for value in values], np.float64)
+
+
+def _paired(difference: FloatArray, metric: str, seed: int) -> Difference | None:
+    """Mean, interval and count of the differences; NaN entries are left out."""
+    known = difference[np.isfinite(difference)]
+    if not known.size:
+        return None
+    low, high = interval(known, seed)
+    better = int(np.count_nonzero(known < 0 if metric in SMALLER_IS_BETTER else known > 0))
+    return Difference(float(known.mean()), low, high, better, known.size)
+
+
+def interval(values: FloatArray, seed: int = 0) -> tuple[float, float]:
+    """The percentile bootstrap interval of a mean, at CONFIDENCE; one value is its own interval."""
+    from scipy.stats import bootstrap
+
+    if values.size < 2:
+        return float(values[0]), float(values[0])
+    found = bootstrap(
+        (values,), np.mean, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile",
+        rng=np.random.default_rng(seed),
+    ).confidence_interval  # fmt: skip
+    return float(found.low), float(found.high)

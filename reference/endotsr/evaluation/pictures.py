@@ -1,0 +1,190 @@
+"""A folder of pictures in the place of a model: the renders of any method, measured by the same code.
+
+In: a folder with one picture a frame, `.png` (8 or 16 bit) or `.npy` (float), and the sequence that it shows. Out: the
+file of every frame, and the dictionary of metrics.json for these pictures. A float array keeps what an 8-bit file
+rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of that baseline to the last digit.
+"""
+
+import hashlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.evaluation.evaluate import FORMAT, baseline_table, evaluate_frames
+from endotsr.evaluation.lpips import LpipsWeights, lpips_obstacle
+from endotsr.kernels.arrays import Array, FloatArray
+from endotsr.opencv import read_png
+from endotsr.sequences.files import frame_numbers, shortened
+from endotsr.sequences.sequence import Sequence
+from endotsr.untrusted.arrays import read_npy
+
+KINDS = (".npy", ".png")  # the first kind of which a folder holds a file is read
+CHANNELS = 3
+LARGEST_FILE = 1 << 32  # bytes
+LARGEST = 16.0  # display units: a larger number is a level from 0 to 255 or 65535, not an overshoot
+
+
+class Pictures(NamedTuple):
+    """The files of a folder by frame number, and how they were paired with the frames."""
+
+    folder: Path
+    files: dict[int, Path]  # frame number -> file, held-out frames at least
+    pairing: str  # in words
+
+
+def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
+    """The picture of every held-out frame.
+
+    The files are paired by the first of these rules that gives every held-out frame one file:
+    the name of the frame (the stem, or the stem up to its first dot); the number of the frame in the name; the order of
+    the numbers, where there are as many files as held-out frames, or as many as frames.
+
+    Raises: InputError for a folder without pictures, or one in which no rule applies.
+    """
+    folder = Path(folder)
+    files = _listed(folder)
+    held_out = [int(i) for i in sequence.test_index]
+    numbers = frame_numbers(files)
+    for found, pairing in (
+        (_by_name(files, sequence), "by the names of the frames"),
+        (_by_number(files, numbers), "by the frame numbers in the names"),
+        (_by_order(files, numbers, held_out), "in order: as many files as held-out frames"),
+        (_by_order(files, numbers, list(range(sequence.count))), "in order: as many files as frames"),
+    ):
+        if all(i in found for i in held_out):
+            return Pictures(folder, {i: found[i] for i in sorted(found) if i < sequence.count}, pairing)
+    wanted = shortened([sequence.names[i] for i in held_out])
+    raise InputError(
+        f"{folder}: {len(files)} {files[0].suffix} files cannot be paired with the {len(held_out)} held-out frames "
+        f"({wanted}); allowed: their names, their numbers, or one file for each, numbered in order"
+    )
+
+
+def _listed(folder: Path) -> list[Path]:
+    """The pictures of a folder by name, all of one kind."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: folder of pictures not found")
+    for kind in KINDS:
+        files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
+        if files:
+            return files
+    raise InputError(f"{folder}: holds no picture; allowed: one {' or '.join(KINDS)} file a frame")
+
+
+def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
+    """Frames whose name, or name up to the first dot, is that of exactly one file."""
+    whole = {file.stem: file for file in files}
+    short: dict[str, list[Path]] = {}
+    for file in files:
+        short.setdefault(file.name.split(".")[0], []).append(file)
+    found = {}
+    for i, name in enumerate(sequence.names):
+        alike = short.get(name.split(".")[0], [])
+        if name in whole:
+            found[i] = whole[name]
+        elif len(alike) == 1:
+            found[i] = alike[0]
+    return found
+
+
+def _by_number(files: list[Path], numbers: list[tuple[int, ...]] | None) -> dict[int, Path]:
+    """The files by the number in their names; none where it is not one number, or not unique."""
+    if numbers is None or len(numbers[0]) != 1 or len(set(numbers)) < len(numbers):
+        return {}
+    return {number: file for (number,), file in zip(numbers, files)}
+
+
+def _by_order(files: list[Path], numbers: list[tuple[int, ...]] | None, frames: list[int]) -> dict[int, Path]:
+    """One file for each of the frames, in the order of the numbers; none if the counts differ."""
+    if len(files) != len(frames) or (numbers is None and len(files) > 1):
+        return {}
+    ordered = files if numbers is None else [file for _, file in sorted(zip(numbers, files))]
+    return dict(zip(frames, ordered))
+
+
+def read_picture(file: Path, shape: tuple[int, ...]) -> FloatArray:
+    """One picture in display units.
+
+    file      PNG: 8 or 16 bits, divided by 255 or 65535; NPY: floats in display units, (3, H, W) or (H, W, 3)
+    shape     (3, H, W) of the frame
+    returns   (3, H, W), float32, or float64 where the file holds float64; not clipped
+
+    Raises: InputError naming the file: unreadable, of another shape or type, with values that are no display units.
+    """
+    picture = _read_array(file) if file.suffix.lower() == ".npy" else _read_levels(file)
+    if picture.ndim == len(shape) and picture.shape != shape and picture.shape[2:] == (CHANNELS,):
+        picture = picture.transpose(2, 0, 1)
+    if picture.shape != shape:
+        size = "x".join(map(str, picture.shape))
+        raise InputError(f"{file}: an array of {size}; allowed: a picture of {shape[2]}x{shape[1]} in 3 channels")
+    return np.ascontiguousarray(picture)
+
+
+def _read_levels(file: Path) -> FloatArray:
+    pixels = read_png(file)
+    return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
+
+
+def _read_array(file: Path) -> Array:
+    array = read_npy(file, LARGEST_FILE)
+    if array.dtype not in (np.float32, np.float64):
+        raise InputError(
+            f"{file}: holds {array.dtype}; allowed: an array of float32 or float64 in display units [0, 1]"
+        )
+    if not np.isfinite(array).all():
+        raise InputError(f"{file}: holds values that are not finite; allowed: display units [0, 1]")
+    if array.size and np.abs(array).max() > LARGEST:
+        raise InputError(f"{file}: holds {np.abs(array).max():g}; allowed: display units, from 0 to 1 (not to 255)")
+    return array
+
+
+def measure_pictures(
+    pictures: Pictures, sequence: Sequence, label: str = "", weights: LpipsWeights | None = None
+) -> dict[str, Any]:
+    """The dictionary of metrics.json for a folder of pictures.
+
+    label     name of the method; default: the name of the folder
+    returns   the keys of `evaluate_model`, `label` and `pictures` (folder, pairing, file of every frame). The training
+              part covers the training frames that the folder holds, which may be none
+
+    Raises: InputError as `read_picture`.
+    """
+    shape = sequence.images.shape[1:]
+    training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
+
+    def render(index: int) -> FloatArray:
+        return read_picture(pictures.files[index], shape)
+
+    held_out = evaluate_frames(sequence, sequence.test_index, render, weights)
+    inside = evaluate_frames(sequence, training, render)
+    baselines = baseline_table(sequence, weights)
+    return {
+        "format": FORMAT,
+        "label": label or pictures.folder.absolute().name,
+        "frames": {
+            "total": sequence.count,
+            "training": len(sequence.train_index),
+            "held_out": [int(i) for i in sequence.test_index],
+            "training_sample": training,
+            "tissue_fraction": sequence.tissue_fraction,
+        },
+        "held_out": held_out.as_dict(),
+        "training": inside.as_dict(),
+        "baselines": baselines,
+        "published": [],
+        "lpips_reason": lpips_obstacle(weights, *shape[1:]),
+        "not_finite": held_out.not_finite + inside.not_finite + sum(b["not_finite"] for b in baselines.values()),
+        "pictures": {
+            "folder": str(pictures.folder.absolute()),
+            "pairing": pictures.pairing,
+            "arrays_sha256": {name: _digest(getattr(sequence, name)) for name in ("images", "masks")},
+            "files": {sequence.names[i]: file.name for i, file in pictures.files.items()},
+        },
+    }
+
+
+def _digest(array: Array) -> str:
+    """As in the record of a run, so that pictures and runs of the same frames can be told from others."""
+    return hashlib.sha256(array.tobytes()).hexdigest()

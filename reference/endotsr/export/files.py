@@ -1,0 +1,101 @@
+"""What `endotsr export` writes: a slim model, one ply file, or a folder of them, chosen by the name of the output."""
+
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.export.model import save_slim_model
+from endotsr.export.ply import gaussian_vertices, point_vertices, write_ply
+from endotsr.export.scene import MovingScene
+from endotsr.export.times import Times, moments
+from endotsr.runs.files import refuse_unwritable, replacing_folder
+from endotsr.runs.folder import refuse_existing
+
+FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
+FILE_ENDINGS = (*FILM_ENDINGS, ".png", ".jpg", ".jpeg", ".npy", ".npz", ".ply", ".html", ".json", ".csv")
+
+
+class Content(NamedTuple):
+    """The content of a ply file."""
+
+    kind: Literal["gaussians", "points"] = "gaussians"
+    least_opacity: float = 0.1  # of a point
+    taken_out: tuple[str, ...] = ()  # spectral components to leave out
+
+
+ALL_TIMES, GAUSSIANS = Times(), Content()
+
+
+def check_folder_name(out: Path, of: str, film: str = "") -> None:
+    """Raises InputError for a folder whose name is that of a file of another kind.
+
+    of     what the folder holds, for the message
+    film   how a film is written instead
+    """
+    ending = out.suffix.lower()
+    if ending in FILE_ENDINGS and not out.is_dir():
+        advice = f"; {film}" if film and ending in FILM_ENDINGS else ""
+        raise InputError(f"{out}: --out is a folder of {of}, and this is the name of a {ending} file{advice}")
+
+
+def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS) -> str:
+    """Write a scene to `out`, as the ending of its name says; returns one line on what was written.
+
+    .npz    slim model; a choice of times or content is refused
+    .ply    one time, the first frame of the sequence if none is chosen
+    none    a folder with one ply file for each time; all frames if none is chosen
+    Raises: InputError for another ending, for times that do not exist, and for a place that cannot be written.
+    """
+    if not 0.0 <= content.least_opacity <= 1.0:
+        raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; allowed: 0 to 1")
+    ending = out.suffix.lower()
+    if ending == ".npz":
+        return _slim(scene, out, times, content)
+    if ending == ".ply":
+        return _one_time(scene, out, times, content)
+    check_folder_name(out, "ply files")
+    return _every_time(scene, out, times, content)
+
+
+def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    if times.chosen or content != GAUSSIANS:
+        raise InputError(
+            f"{out}: a slim model holds every time and the whole scene; allowed: --out alone, or a .ply file"
+        )
+    refuse_unwritable(out)
+    model = scene.model
+    record = scene.record if scene.folder is None else scene.folder.sequence_record("largest_depth")
+    save_slim_model(out, model, record)
+    size = out.stat().st_size
+    whole = scene.folder.checkpoint.stat().st_size if scene.folder else None
+    compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
+    return f"{out}: {model.gaussians.count} Gaussians, {size / 1e6:.2f} MB{compared}"
+
+
+def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    wanted = moments("export", times if times.chosen else Times(frames="all"), scene.record)
+    if times.chosen and len(wanted) > 1:
+        raise InputError(f"{out}: one file holds one time, and {len(wanted)} are chosen; allowed: a folder, one time")
+    refuse_unwritable(out)
+    count = _write(scene, out, wanted[0][0], content)
+    return f"{out}: {count} {content.kind} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
+
+
+def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    wanted = moments("export", times, scene.record, default="all")
+    refuse_existing(out)
+    scene.model  # refuses a run without a usable checkpoint before anything is made  # noqa: B018
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with replacing_folder(out) as target:
+        for k, (time, _, _, _) in enumerate(wanted):
+            _write(scene, target / f"{k:05d}.ply", time, content)
+    return f"{out}: {len(wanted)} files of {content.kind}, 00000.ply to {len(wanted) - 1:05d}.ply"
+
+
+def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
+    """One ply file; returns the number of its vertices."""
+    moment = scene.at(time, content.taken_out)
+    vertices = point_vertices(moment, content.least_opacity) if content.kind == "points" else gaussian_vertices(moment)
+    unit = scene.record.get("unit", "scene units")
+    write_ply(file, vertices, (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}"))
+    return vertices.size

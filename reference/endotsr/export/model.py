@@ -1,0 +1,165 @@
+"""The slim model: all that rendering needs of a run, in one compressed file of half precision.
+
+A checkpoint also holds the state of the optimiser, in full precision. The slim model drops it and rounds every array
+but the positions to float16: the positions keep float32, since an error of theirs moves the picture. The file is an
+npz without pickle: a JSON header (as bytes) with settings, iteration and the record of the sequence, and one entry an
+array.
+"""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import config_from_dict
+from endotsr.errors import InputError
+from endotsr.fitting.model import spectral_from
+from endotsr.runs.files import replace_file
+from endotsr.runs.model import Model
+from endotsr.runs.records import check_sequence_record
+from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
+from endotsr.scene.parameters import FrameParameters, trained
+from endotsr.untrusted.arrays import Refused, open_npz
+from endotsr.untrusted.json import integer, parsed
+
+FORMAT = "endotsr slim model"
+VERSION = 1
+HEADER = "header"
+LARGEST_FILE = 1 << 33  # bytes of all arrays together
+KEPT_WHOLE = ("gaussians.position",)  # float32
+RECORD = ("unit", "largest_depth", "static_camera", "names", "times", "train_index", "test_index", "cameras")
+HALF = np.finfo(np.float16)
+
+
+class SlimModel(NamedTuple):
+    """A model and the record of its sequence (sequence.json)."""
+
+    model: Model
+    record: dict[str, Any]
+
+
+def save_slim_model(path: Path, model: Model, record: dict[str, Any]) -> None:
+    """Write a slim model; the file appears whole or not at all, and equal models give equal bytes.
+
+    record   sequence.json
+    A number beyond the range of float16 (65504) becomes the largest one.
+    """
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "iteration": model.iteration,
+        "config": msgspec.to_builtins(model.config),
+        "sequence": {key: record[key] for key in RECORD},
+        "frame_times": None if model.frames is None else model.frames.times.tolist(),
+    }
+    entries = {f"gaussians.{name}": a for name, a in arrays(model.gaussians).items()}
+    entries |= {f"frames.{name}": a for name, a in trained(model.frames).items()}
+    stored = {name: a.astype(np.float32) if name in KEPT_WHOLE else _half(a) for name, a in entries.items()}
+    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
+
+    def write(temporary: Path) -> None:
+        with temporary.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **{HEADER: text}, **stored)
+
+    replace_file(path, write)
+
+
+def _half(array: NDArray) -> NDArray[np.float16]:
+    return np.clip(array, HALF.min, HALF.max).astype(np.float16)
+
+
+def load_slim_model(path: Path) -> SlimModel:
+    """Read and check a slim model; arrays come back as float32.
+
+    Raises: InputError naming the file and the key: not a slim model, another version, an array that is missing,
+            foreign, of another shape or not finite, settings that do not exist, damaged data.
+    """
+    path = Path(path)
+    try:
+        with open_npz(path, LARGEST_FILE, compressed=True) as file:
+            entries = {name: file.read(name) for name in file.names}
+        header = parsed(entries.pop(HEADER).tobytes(), f"{path}: header")
+    except (Refused, KeyError) as error:
+        raise InputError(f"{path}: not a slim model, or damaged: {error}") from None
+    if not isinstance(header, dict) or (header.get("format"), header.get("version")) != (FORMAT, VERSION):
+        raise InputError(
+            f"{path}: not a slim model of version {VERSION}; `endotsr export RUN --out FILE.npz` makes one"
+        )
+    for key in ("iteration", "config", "sequence", "frame_times"):
+        if key not in header:
+            raise InputError(f"{path}: header: {key} is missing")
+    record = _record(header["sequence"], path)
+    config = config_from_dict(header["config"], str(path))
+    gaussians = _gaussians(entries, path)
+    frames = _frames(entries, header["frame_times"], path)
+    if entries:
+        raise InputError(f"{path}: {next(iter(entries))} is foreign to a slim model")
+    spectral = spectral_from(config.model, np.array(record["times"], np.float64)[record["train_index"]])
+    return SlimModel(
+        Model(gaussians, spectral, config, integer(header["iteration"], f"{path}: header: iteration", low=0), frames),
+        record,
+    )
+
+
+def _record(record: Any, path: Path) -> dict[str, Any]:
+    for key in RECORD:
+        if not isinstance(record, dict) or key not in record:
+            raise InputError(f"{path}: header: sequence.{key} is missing")
+    check_sequence_record(record, path)
+    return record
+
+
+def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
+    """The arrays of the Gaussians, taken out of `entries`."""
+    found = {name: _entry(entries, f"gaussians.{name}", path) for name in Gaussians._fields}
+    needed = Gaussians._fields[: len(Gaussians._fields) - len(Gaussians._field_defaults)]
+    for name in needed:
+        if found[name] is None:
+            raise InputError(f"{path}: gaussians.{name} is missing")
+    count = found["position"].shape[-1]
+    rows = {"position": (3,), "quaternion": (4,), "log_scale": (3,), "opacity_logit": ()}
+    for name, array in found.items():
+        shape = array if array is None else array.shape
+        if shape is not None and (shape[-1:] != (count,) or shape[:-1] != rows.get(name, shape[:-1])):
+            raise InputError(f"{path}: gaussians.{name} has the shape {shape}; {count} Gaussians expected")
+    _refuse_odd_shapes(found, path)
+    return Gaussians(**found)
+
+
+def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
+    """Shapes that depend on the settings of a model: all three arrays of the deformation, harmonics of a degree."""
+    fdm = [found[name] for name in ("fdm_weight", "fdm_centre", "fdm_width")]
+    shapes = {None if array is None else array.shape for array in fdm}
+    shape = next(iter(shapes))
+    if len(shapes) > 1 or (shape is not None and (len(shape) != 3 or shape[0] != DEFORMATION_CHANNELS)):
+        raise InputError(f"{path}: gaussians.fdm_weight, fdm_centre and fdm_width do not belong together")
+    if found["harmonics"].shape[:-1] not in [(k, 3) for k in (1, 4, 9, 16)]:
+        raise InputError(f"{path}: gaussians.harmonics has the shape {found['harmonics'].shape}")
+    for name in ("appearance_coefficients", "motion_coefficients"):
+        array = found[name]
+        if array is not None and (array.ndim != 3 or array.shape[0] != 3 or array.shape[1] % 2):
+            raise InputError(f"{path}: gaussians.{name} has the shape {array.shape}")
+
+
+def _frames(entries: dict[str, NDArray], times: Any, path: Path) -> FrameParameters | None:
+    if times is None:
+        return None
+    found = [_entry(entries, f"frames.{name}", path) for name in ("exposure_log_gain", "exposure_bias")]
+    if any(array is None or array.shape != (3, len(times)) for array in found):
+        raise InputError(f"{path}: frames.exposure_*: two arrays for {len(times)} frames expected")
+    return FrameParameters(np.array(times, np.float64), *found)
+
+
+def _entry(entries: dict[str, NDArray], name: str, path: Path) -> Any:
+    """An array as float32, taken out of `entries`; None if it is not there."""
+    array = entries.pop(name, None)
+    if array is None:
+        return None
+    if array.dtype not in (np.float16, np.float32):
+        raise InputError(f"{path}: {name} holds {array.dtype}; allowed: float16, float32")
+    if not np.isfinite(array).all():
+        raise InputError(f"{path}: {name} holds numbers that are not finite")
+    return np.ascontiguousarray(array, np.float32)

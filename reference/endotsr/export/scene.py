@@ -1,0 +1,111 @@
+"""What rendering needs, opened from any file that holds it: a run folder, a slim model, or a 3DGS ply file.
+
+A ply file is one moment: its scene does not move, and it is seen by a camera that faces it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from endotsr.config import PAPER, ModelConfig
+from endotsr.errors import InputError
+from endotsr.export.model import load_slim_model
+from endotsr.export.ply import read_gaussians
+from endotsr.fitting.model import render_at, scene_at, spectral_from, without
+from endotsr.kernels.arrays import FloatArray
+from endotsr.runs.folder import RunFolder, open_run
+from endotsr.runs.model import Model, load_model
+from endotsr.scene.gaussians import Gaussians
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderOut, Scene
+
+FOCAL = 1.2  # image widths, of a camera that faces a scene
+MARGIN = 1.1  # of its picture around the Gaussians
+SIDE = 512  # pixels of its picture
+NEAR = 0.01  # distances of the camera: its near plane
+STILL = ModelConfig(appearance=False, spectral_motion=False, deformation=False)
+RECORD = ("unit", "static_camera", "names", "times", "train_index", "test_index", "cameras")  # keys that are read
+COMPONENTS = ("appearance", "spectral_motion")
+
+
+@dataclass(frozen=True)
+class MovingScene:
+    """The record of a sequence (sequence.json) and the model of it, which a run folder gives at its first use."""
+
+    record: dict[str, Any]
+    loaded: Model | None = None
+    folder: RunFolder | None = None
+
+    @cached_property
+    def model(self) -> Model:
+        """Raises: InputError if the run has no usable checkpoint, or an incomplete record."""
+        if self.loaded is not None:
+            return self.loaded
+        assert self.folder is not None
+        model = load_model(self.folder)
+        self.folder.sequence_record(*RECORD)
+        return model
+
+    def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
+        """Render at a time in [0, 1]; `taken_out` names spectral components to leave out."""
+        model = self.model
+        gaussians = self._kept(taken_out)
+        return render_at(gaussians, model.spectral, model.config, camera, time, frames=model.frames)
+
+    def at(self, time: float, taken_out: tuple[str, ...] = ()) -> Scene:
+        """The deformed Gaussians at a time; the exposure of a frame is no part of them."""
+        model = self.model
+        return scene_at(self._kept(taken_out), model.spectral, model.config.model, time)[0]
+
+    def _kept(self, taken_out: tuple[str, ...]) -> Gaussians:
+        appearance, motion = (name not in taken_out for name in COMPONENTS)
+        return without(self.model.gaussians, appearance=appearance, spectral_motion=motion)
+
+
+def open_scene(path: Path) -> MovingScene:
+    """A scene to render. Raises: InputError if there is none at `path`, or if a file is damaged."""
+    path = Path(path)
+    if path.suffix.lower() == ".ply" and not path.is_dir():
+        return _from_ply(path)
+    if path.suffix.lower() == ".npz" and not path.is_dir():
+        slim = load_slim_model(path)
+        return MovingScene(slim.record, slim.model)
+    if path.is_file():
+        raise InputError(f"{path}: not a scene; allowed: a run folder, a slim model (.npz) or a 3DGS file (.ply)")
+    folder = open_run(path)
+    return MovingScene(folder.sequence_record("names", "times", "train_index", "test_index"), folder=folder)
+
+
+def _from_ply(path: Path) -> MovingScene:
+    gaussians = read_gaussians(path)
+    camera = facing_camera(gaussians.position, SIDE)
+    distance = float(camera.translation[2] + np.median(gaussians.position[2]))
+    config = msgspec.structs.replace(
+        PAPER,
+        model=msgspec.structs.replace(STILL, harmonics_degree=round(len(gaussians.harmonics) ** 0.5) - 1),
+        raster=msgspec.structs.replace(PAPER.raster, near=NEAR * distance),
+    )
+    record = {
+        "unit": "scene units",
+        "largest_depth": 2 * distance,
+        "static_camera": True,
+        "names": [path.stem],
+        "times": [0.0],
+        "train_index": [0],
+        "test_index": [0],
+        "cameras": [camera._asdict() | {name: getattr(camera, name).tolist() for name in ("rotation", "translation")}],
+    }
+    return MovingScene(record, Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0))
+
+
+def facing_camera(position: FloatArray, side: int) -> Camera:
+    """A camera along +z towards the middle of the positions, with all but a few per cent of them in the picture."""
+    low, high = np.quantile(position.astype(np.float64), [0.02, 0.98], axis=1)
+    reach = max(float((high - low)[:2].max()) / 2, 1e-6)
+    distance = MARGIN * 2 * FOCAL * reach + float(high[2] - low[2]) / 2
+    translation = -(low + high) / 2 + np.array([0, 0, distance])
+    return Camera(np.eye(3), translation, FOCAL * side, FOCAL * side, side / 2, side / 2, side, side)

@@ -1,0 +1,153 @@
+"""Camera paths around an observed camera, and cameras of a file.
+
+In: the cameras of the frames and a pivot depth. Out: one camera a picture. A path of a static clip shows what the
+observed camera cannot: that the scene is three-dimensional. Conventions are those of `splatting.camera`.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.splatting.camera import Camera
+from endotsr.untrusted.json import read_json
+
+TURNING = ("orbit", "sway")
+PATHS = ("observed", *TURNING)
+ORTHONORMAL = 1e-3  # largest entry of R R^T - I that still counts as the rounding of a written rotation
+LARGEST_SIDE = 16384  # pixels of a rendered picture
+
+
+def turned(camera: Camera, yaw: float, pitch: float, pivot_depth: float) -> Camera:
+    """The camera turned about the point of its optical axis at `pivot_depth`, which stays where it is in the picture.
+
+    yaw, pitch    radians; positive: the camera moves to the right, and down
+    pivot_depth   view-space z of the pivot, scene units
+    """
+    sy, cy, sp, cp = math.sin(yaw), math.cos(yaw), math.sin(pitch), math.cos(pitch)
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+    turn, pivot = about_x.T @ about_y, np.array([0.0, 0.0, pivot_depth])
+    rotation = turn @ np.asarray(camera.rotation, np.float64)
+    return camera._replace(rotation=rotation, translation=turn @ (camera.translation - pivot) + pivot)
+
+
+def shifted(camera: Camera, offset: tuple[float, ...]) -> Camera:
+    """The camera moved by `offset` = (right, down, forward) along its own axes, scene units."""
+    return camera._replace(translation=np.asarray(camera.translation, np.float64) - np.asarray(offset, np.float64))
+
+
+def fitted(camera: Camera, width: int, height: int) -> Camera:
+    """The camera for a picture of another size: square pixels stay square, and all that it saw stays in the picture."""
+    scale = min(width / camera.width, height / camera.height)
+    return camera._replace(
+        fx=camera.fx * scale,
+        fy=camera.fy * scale,
+        cx=camera.cx * scale + (width - camera.width * scale) / 2,
+        cy=camera.cy * scale + (height - camera.height * scale) / 2,
+        width=width,
+        height=height,
+    )
+
+
+def path_cameras(path: str, cameras: list[Camera], angle: float, pivot_depth: float) -> list[Camera]:
+    """Each camera moved along a path: once around over all pictures, so that a film can be repeated.
+
+    path     observed: as they are; sway: left, right and back; orbit: around a circle
+    angle    largest turn, degrees
+    """
+    radians, count = math.radians(angle), max(len(cameras), 1)
+    phases = [2 * math.pi * k / count for k in range(count)]
+    if path == "sway":
+        return [turned(c, radians * math.sin(p), 0.0, pivot_depth) for c, p in zip(cameras, phases)]
+    if path == "orbit":
+        return [turned(c, radians * math.sin(p), radians * math.cos(p), pivot_depth) for c, p in zip(cameras, phases)]
+    return list(cameras)
+
+
+def pivot_depth_of(depth: FloatArray, opacity: FloatArray) -> float:
+    """The median depth of a rendered view, over the pixels that are more than half opaque; 1 if there are none."""
+    seen = opacity > 0.5
+    return float(np.median(depth[seen] / opacity[seen])) if seen.any() else 1.0
+
+
+def read_cameras(file: Path, like: Camera) -> list[Camera]:
+    """The cameras of a JSON file: `{"cameras": [{"rotation": 3x3, "translation": [3], "fx": ..., ...}, ...]}`.
+
+    The keys are those of sequence.json: a world-to-camera pose and pinhole intrinsics in pixels. Intrinsics and size
+    that a camera does not name are those of `like`.
+
+    Raises: InputError naming file, camera and key.
+    """
+    entries = read_json(Path(file)).get("cameras")
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f'{file}: key cameras is missing; allowed: {{"cameras": [{{"rotation": ...}}, ...]}}')
+    return [_camera(entry, like, f"{file}: cameras[{k}]") for k, entry in enumerate(entries)]
+
+
+def _camera(entry: Any, like: Camera, where: str) -> Camera:
+    if not isinstance(entry, dict):
+        raise InputError(f"{where}: {type(entry).__name__}; allowed: an object with rotation and translation")
+    unknown = [key for key in entry if key not in Camera._fields]
+    if unknown:
+        raise InputError(f"{where}: unknown key {unknown[0]}; allowed: {', '.join(Camera._fields)}")
+    rotation = _numbers(entry, "rotation", (3, 3), where)
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(rotation) < 0:
+        raise InputError(f"{where}: rotation is no rotation matrix; allowed: orthonormal rows, determinant 1")
+    named = {key: float(_numbers(entry, key, (), where)) for key in ("fx", "fy", "cx", "cy") if key in entry}
+    for key in ("fx", "fy"):
+        if named.get(key, 1.0) <= 0:
+            raise InputError(f"{where}: {key} = {named[key]:g} is not allowed; allowed: a number > 0")
+    for key in ("width", "height"):
+        if key in entry:
+            checked_side(entry[key], f"{where}: {key}")
+            named[key] = entry[key]
+    return like._replace(rotation=rotation, translation=_numbers(entry, "translation", (3,), where), **named)
+
+
+def checked_side(side: Any, where: str) -> None:
+    """Raises InputError if this is no number of pixels of a side."""
+    if isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= LARGEST_SIDE:
+        raise InputError(f"{where} = {side!r} is not allowed; allowed: an integer from 1 to {LARGEST_SIDE}")
+
+
+def _numbers(entry: dict[str, Any], key: str, shape: tuple[int, ...], where: str) -> NDArray[np.float64]:
+    size = "x".join(map(str, shape)) or "one"
+    if key not in entry:
+        raise InputError(f"{where}: {key} is missing; allowed: {size} number{'s' if shape else ''}")
+    try:
+        found = np.array(entry[key], np.float64)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    if found.shape != shape or not np.isfinite(found).all():
+        raise InputError(f"{where}: {key} = {entry[key]!r} is not allowed; allowed: {size} finite number(s)")
+    return found
+
+
+def along(cameras: list[Camera], count: int) -> list[Camera]:
+    """`count` cameras along the given ones, the first and the last included; as many as given are those given.
+
+    Positions of the optical centre and intrinsics are interpolated linearly, rotations on the sphere (slerp). The size
+    is that of the first camera.
+    """
+    if len(cameras) == count:
+        return list(cameras)
+    if len(cameras) == 1:
+        return cameras * count
+    from scipy.spatial.transform import Rotation, Slerp
+
+    keys, wanted = np.linspace(0, 1, len(cameras)), np.linspace(0, 1, count) if count > 1 else np.zeros(1)
+    rotations = Slerp(keys, Rotation.from_matrix([c.rotation for c in cameras]))(wanted).as_matrix()
+    centres = np.array([-np.asarray(c.rotation).T @ c.translation for c in cameras])
+    lenses = np.array([(c.fx, c.fy, c.cx, c.cy) for c in cameras])
+    centre = np.stack([np.interp(wanted, keys, column) for column in centres.T], axis=1)
+    lens = np.stack([np.interp(wanted, keys, column) for column in lenses.T], axis=1)
+    like = cameras[0]
+    return [
+        like._replace(rotation=r, translation=-r @ o, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
+        for r, o, (fx, fy, cx, cy) in zip(rotations, centre, lens)
+    ]

@@ -1,0 +1,90 @@
+"""Films: a series of pictures as one mp4, webm or gif file.
+
+In: pictures of one size. Out: a file that appears whole or not at all. mp4 and webm hold VP9, which every current
+browser plays without a plug-in; a gif has 256 colours a picture and plays everywhere.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.report.figures import ByteImage
+from endotsr.runs.files import replace_file
+
+KINDS = (".mp4", ".webm", ".gif")
+GIF_COLOURS = 256
+PALETTE_FRAMES = 8  # pictures that the colours of a gif are chosen from
+HUNDREDTHS = 100  # of a second: the unit of time in a gif
+
+
+def check_film(file: Path, rate: float) -> None:
+    """Raises InputError if this is no name of a film, or no rate that a film can have."""
+    if file.suffix.lower() not in KINDS:
+        raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
+    highest = 50 if file.suffix.lower() == ".gif" else 120
+    if not 0.1 <= rate <= highest:
+        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: 0.1 to {highest} pictures a second")
+
+
+def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
+    """Write a film; returns the number of its pictures.
+
+    pictures   (H, W, 3) uint8 RGB, all of one size; an odd side of an mp4 or webm is repeated by one pixel
+    rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
+    Raises: InputError if there is no picture or this OpenCV cannot encode the film.
+    """
+    counted = _Counted(pictures)
+    writer = _write_gif if file.suffix.lower() == ".gif" else _write_video
+    replace_file(file, lambda temporary: writer(temporary, iter(counted), rate))
+    return counted.count
+
+
+class _Counted:
+    """Pictures, counted while they pass."""
+
+    def __init__(self, pictures: Iterable[ByteImage]) -> None:
+        self.count, self._pictures = 0, pictures
+
+    def __iter__(self) -> Iterator[ByteImage]:
+        for picture in self._pictures:
+            self.count += 1
+            yield picture
+
+
+def _write_video(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
+    from endotsr.opencv import write_video
+
+    write_video(file, (_even(picture) for picture in pictures), rate)
+
+
+def _even(picture: ByteImage) -> ByteImage:
+    """The picture with even sides, which the colour format of a film needs."""
+    rows, columns = picture.shape[0] % 2, picture.shape[1] % 2
+    return np.pad(picture, ((0, rows), (0, columns), (0, 0)), mode="edge") if rows or columns else picture
+
+
+def _write_gif(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
+    from PIL import Image
+
+    frames = [Image.fromarray(picture) for picture in pictures]
+    if not frames:
+        raise InputError(f"{file}: a film needs a picture")
+    palette = _palette(frames)
+    frames = [frame.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for frame in frames]
+    milliseconds = 10 * max(2, round(HUNDREDTHS / rate))  # browsers play a shorter time as a tenth of a second
+    frames[0].save(file, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False)
+
+
+def _palette(frames: list[Any]) -> Any:
+    """One palette for the whole film, of pictures spread over it, so that still parts do not flicker."""
+    from PIL import Image
+
+    chosen = frames[:: max(1, len(frames) // PALETTE_FRAMES)]
+    width, height = chosen[0].size
+    sheet = Image.new("RGB", (width, height * len(chosen)))
+    for k, frame in enumerate(chosen):
+        sheet.paste(frame, (0, k * height))
+    return sheet.quantize(GIF_COLOURS)

@@ -1,0 +1,181 @@
+"""The pictures of views: a folder of PNG and NPY files, a film, or both from the same renders.
+
+In: a scene and its views. Out: colour/, depth/, opacity/ and render.json in a folder, or panels side by side in a film.
+"""
+
+from collections.abc import Callable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.export.files import check_folder_name
+from endotsr.export.scene import MovingScene
+from endotsr.export.times import moments
+from endotsr.opencv import write_png
+from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
+from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
+from endotsr.runs.folder import refuse_existing
+from endotsr.runs.sources import load_run_sequence, remembered_cameras
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderOut
+from endotsr.views.cameras import TURNING, pivot_depth_of
+from endotsr.views.film import ByteImage, check_film, write_film
+from endotsr.views.panels import NEEDS_TRUTH, Panel, normalised_depth, scale_of, side_by_side
+from endotsr.views.plan import Request, View, check_request, views_of
+
+DepthKind = Literal["accumulated", "normalised"]
+ABOUT_DEPTH = {
+    "accumulated": "not normalised by opacity",
+    "normalised": "normalised by opacity",
+}
+
+
+class Look(NamedTuple):
+    """How views are shown."""
+
+    depth: DepthKind = "accumulated"
+    taken_out: tuple[str, ...] = ()  # spectral components to leave out
+    panels: tuple[Panel, ...] = ("render",)  # of a film, from left to right
+
+
+def check_panels(panels: tuple[Panel, ...], views: list[View]) -> None:
+    """Raises InputError for panels that cannot be shown: none, or a truth that the views do not have."""
+    if not panels:
+        raise InputError("render: --panels is empty; allowed: one or more of render, truth, error, depth, opacity")
+    needed = [name for name in panels if name in NEEDS_TRUTH]
+    moved = next((view for view in views if not view.exact), None)
+    if needed and moved is not None:
+        raise InputError(
+            f"render: --panels {needed[0]} at time {moved.time:g}: no frame has this time and camera; "
+            "allowed: the times of frames (--frames), --camera observed, no --offset and no --size"
+        )
+
+
+def requested_views(scene: MovingScene, request: Request, default: str) -> list[View]:
+    """The views of a request on a scene. A path turns around the median depth of the first view.
+
+    default   frames to show if no times are chosen
+    Raises: InputError as `views_of`, before the model is read; and as `MovingScene.model`.
+    """
+    check_request(request, scene.record, default)
+    pivot_depth, _ = 1.0, scene.model
+    if request.camera in TURNING:
+        time, frame, _, _ = moments("render", request.times, scene.record, default)[0]
+        out = scene.render(time, remembered_cameras(scene.record)[frame])
+        pivot_depth = pivot_depth_of(out.depth, out.opacity)
+    return views_of(request, scene.record, pivot_depth, default)
+
+
+def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
+    """Raises InputError if there is nothing to write to, or if a folder or a film cannot be written."""
+    if out is None and film is None:
+        raise InputError("render: --out DIR or --film FILE is missing: where the pictures are written")
+    if out is not None:
+        check_folder_name(out, "pictures", film="--film FILE writes a film")
+        refuse_existing(out)
+    if film is not None:
+        check_film(film, rate)
+        refuse_unwritable(film)
+
+
+def frames_of(scene: MovingScene, panels: tuple[Panel, ...], views: list[View], source: str | None) -> Sequence | None:
+    """The sequence that truth and error are shown from; None if the panels need none.
+
+    source   its current location (default: the recorded one)
+    Raises: InputError for panels that cannot be shown.
+    """
+    check_panels(panels, views)
+    if not set(panels) & set(NEEDS_TRUTH):
+        return None
+    if scene.folder is None:
+        raise InputError("render: --panels truth and error need the frames of a run folder; allowed: a run folder")
+    return load_run_sequence(scene.folder, source)
+
+
+def rendered(scene: MovingScene, views: list[View], look: Look) -> Iterator[tuple[View, RenderOut]]:
+    """Every view with its picture; the depth is the one that is asked for."""
+    for view in views:
+        out = scene.render(view.time, view.camera, look.taken_out)
+        yield view, out if look.depth == "accumulated" else out._replace(depth=normalised_depth(out))
+
+
+def write_pictures(
+    out: Path,
+    scene: MovingScene,
+    pictures: Iterator[tuple[View, RenderOut]],
+    look: Look,
+    npy: bool = False,
+    consume: Callable[[Iterator[tuple[View, RenderOut]]], object] = list,
+) -> int:
+    """Write a folder, which appears whole or not at all; returns the number of pictures.
+
+    npy       also write float arrays
+    consume   gets every picture after it was written, for example to make a film of the same renders
+    """
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
+    entries: list[dict[str, Any]] = []
+    with replacing_folder(out) as target:
+        for name in ("colour", "depth", "opacity"):
+            (target / name).mkdir()
+        first = next(pictures)
+        step = depth_step(scene.record, first[1].depth)
+
+        def written() -> Iterator[tuple[View, RenderOut]]:
+            for view, picture in chain([first], pictures):
+                _write_view(target, view.label, picture, step, npy)
+                entries.append(_entry(view))
+                yield view, picture
+
+        consume(written())
+        unit, kind = scene.record["unit"], ABOUT_DEPTH[look.depth]
+        about = f"depth PNG value x depth_step = view-space z in {unit}, {kind}"
+        write_json(target / "render.json", {"depth_step": step, "about": about, "pictures": entries})
+    return len(entries)
+
+
+def _entry(view: View) -> dict[str, Any]:
+    """The entry of render.json; the camera is named where it is not that of a frame at its own time."""
+    entry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
+    return entry if view.exact else entry | {"camera": _as_json(view.camera)}
+
+
+def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool) -> None:
+    write_png(target / "colour" / f"{label}.png", rgb_bytes(out.colour))
+    write_png(target / "depth" / f"{label}.png", depth_bytes(out.depth, step))
+    write_png(target / "opacity" / f"{label}.png", grey_bytes(out.opacity))
+    if npy:
+        for name in ("colour", "depth", "opacity"):
+            np.save(target / name / f"{label}.npy", getattr(out, name))
+
+
+def _as_json(camera: Camera) -> dict[str, Any]:
+    return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in camera._asdict().items()}
+
+
+def write_views_film(
+    file: Path,
+    pictures: Iterator[tuple[View, RenderOut]],
+    look: Look,
+    rate: float,
+    sequence: Sequence | None = None,
+) -> int:
+    """Write a film of panels; returns the number of its pictures.
+
+    sequence   the frames; needed for the panels truth and error
+    """
+    return write_film(file, film_pictures(pictures, look, sequence), rate)
+
+
+def film_pictures(
+    pictures: Iterator[tuple[View, RenderOut]], look: Look, sequence: Sequence | None = None
+) -> Iterator[ByteImage]:
+    """The panels of every view; depth and error have the same colours in all of them."""
+    scale = None
+    for view, out in pictures:
+        scale = scale or scale_of(out.depth)
+        frame = None if sequence is None else sequence.frame(view.frame)
+        yield side_by_side(look.panels, out, scale, frame)

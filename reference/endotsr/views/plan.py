@@ -1,0 +1,99 @@
+"""Which pictures are made: a time, a camera and a name for each.
+
+In: what the user asks for and the record of the sequence (sequence.json). Out: the views, checked.
+"""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.export.times import Times, moments
+from endotsr.runs.sources import remembered_cameras
+from endotsr.splatting.camera import Camera
+from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
+
+LARGEST_ANGLE = 89.0  # degrees: beyond it a scene that was seen from one side is empty
+
+
+class View(NamedTuple):
+    """Time, camera and name of one picture."""
+
+    time: float
+    frame: int  # whose camera it is, or that the camera path starts from
+    label: str
+    camera: Camera
+    exact: bool  # whether this is the moment of a frame and its own camera, so that it can be compared with it
+
+
+class Request(NamedTuple):
+    """The views that are asked for."""
+
+    times: Times = Times()
+    camera: str = "observed"  # a path, the number of a frame, or a JSON file
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)  # right, down, forward; scene units
+    size: str = ""  # WIDTHxHEIGHT
+    angle: float = 8.0  # degrees, of orbit and sway
+
+
+def check_request(request: Request, record: dict[str, Any], default: str = "test") -> None:
+    """Everything that can be refused without a model and its cameras. Raises: InputError."""
+    moments("render", request.times, record, default)
+    if request.size:
+        read_size(request.size)
+    if not 0.0 <= request.angle <= LARGEST_ANGLE:
+        raise InputError(f"render: --angle {request.angle:g} is not allowed; allowed: 0 to {LARGEST_ANGLE:g} degrees")
+    if not all(math.isfinite(number) for number in request.offset):
+        raise InputError("render: --offset is not allowed; allowed: three finite numbers")
+    camera, count = request.camera, len(record["names"])
+    if camera.lstrip("-").isdecimal() and not 0 <= int(camera) < count:
+        raise InputError(f"render: --camera {camera} is not allowed; allowed: a frame from 0 to {count - 1}")
+    if not (camera in PATHS or camera.isdecimal() or camera.lower().endswith(".json")):
+        allowed = f"{', '.join(PATHS)}, the number of a frame, or a JSON file of cameras"
+        raise InputError(f"render: --camera {camera!r} is not allowed; allowed: {allowed}")
+
+
+def views_of(request: Request, record: dict[str, Any], pivot_depth: float, default: str = "test") -> list[View]:
+    """The views of a request.
+
+    request       checked by `check_request`
+    record        sequence.json
+    pivot_depth   depth of the point around which `orbit` and `sway` turn, scene units
+    default       frames to show if no times are chosen
+
+    Raises: InputError for a file of cameras that cannot be used.
+    """
+    wanted = moments("render", request.times, record, default)
+    observed = remembered_cameras(record)
+    cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth)
+    if any(request.offset):
+        cameras = [shifted(camera, request.offset) for camera in cameras]
+    if request.size:
+        width, height = read_size(request.size)
+        cameras = [fitted(camera, width, height) for camera in cameras]
+    own = own and not any(request.offset) and not request.size
+    if request.camera.isdecimal():
+        wanted = [(t, int(request.camera), label, False) for t, _, label, _ in wanted]
+    return [View(t, i, label, camera, own and exact) for (t, i, label, exact), camera in zip(wanted, cameras)]
+
+
+def _cameras(
+    request: Request, observed: list[Camera], frames: list[int], pivot_depth: float
+) -> tuple[list[Camera], bool]:
+    """One camera for each of the frames, and whether they are those of the frames."""
+    nearest = [observed[i] for i in frames]
+    if request.camera in PATHS:
+        return path_cameras(request.camera, nearest, request.angle, pivot_depth), request.camera == "observed"
+    if request.camera.isdecimal():
+        return [observed[int(request.camera)]] * len(frames), False
+    return along(read_cameras(Path(request.camera), observed[0]), len(frames)), False
+
+
+def read_size(text: str) -> tuple[int, int]:
+    """Width and height of `WIDTHxHEIGHT`. Raises InputError."""
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise InputError(f"render: --size {text!r} is not allowed; allowed: WIDTHxHEIGHT, for example 1280x1024")
+    for side in (width, height):
+        checked_side(int(side), f"render: --size {text}: side")
+    return int(width), int(height)

@@ -1,0 +1,107 @@
+"""The moving Gaussians at key times, rounded to few bytes, for the viewer page.
+
+In: a scene and its cameras. Out: 20 bytes a Gaussian and key time (position and log-scale 16 bits, rotation, colour and
+opacity 8 bits), stored as differences between neighbouring key times and compressed. Between two key times the viewer
+interpolates. The colour of a Gaussian is the one in the direction of the observed camera, exposure included; how it
+changes with the direction is not part of the page.
+"""
+
+import zlib
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.export.scene import MovingScene
+from endotsr.kernels.arrays import FloatArray
+from endotsr.runs.sources import nearest_frame, remembered_cameras
+from endotsr.scene.parameters import exposure_at
+from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.splatting.harmonics import harmonics_forward
+
+LEVELS_16, LEVELS_8 = 65535, 255
+ROTATION_LEVELS = 127  # of a component of a quaternion, either sign
+OPACITY_STEP = 1 / 255  # a Gaussian below it is never drawn
+POSITION, LOG_SCALE, COLOUR = slice(0, 3), slice(3, 6), slice(6, 9)  # rows that are rounded within their range
+COMPRESSION = 6  # of zlib; more takes much longer and gains one per cent
+
+
+class Trajectories(NamedTuple):
+    """N Gaussians at K key times, rounded."""
+
+    times: FloatArray  # (K,) normalised, ascending
+    words: NDArray[np.uint16]  # (6, K, N) position x y z, log-scale
+    bytes: NDArray[np.uint8]  # (8, K, N) quaternion w x y z (two's complement), red, green, blue, opacity
+    low: FloatArray  # (9,) values of level 0 of position, log-scale and colour
+    high: FloatArray  # (9,) values of the largest level
+
+
+def key_times(scene: MovingScene, most: int) -> FloatArray:
+    """Key times: those of the frames and 1, or `most` evenly spaced ones if they are fewer."""
+    times = np.unique(np.append(np.asarray(scene.record["times"], np.float64), 1.0))
+    if scene.model.gaussians.fdm_weight is None and scene.model.gaussians.appearance_coefficients is None:
+        return times[:1] if scene.model.gaussians.motion_coefficients is None else np.linspace(0, 1, most)
+    return times if times.size <= most else np.linspace(0, 1, most)
+
+
+def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
+    """The Gaussians that can be seen, at the key times."""
+    cameras, known = remembered_cameras(scene.record), scene.record["times"]
+    opacity = 1 / (1 + np.exp(-scene.model.gaussians.opacity_logit.astype(np.float64)))
+    seen = opacity >= OPACITY_STEP
+    values = np.empty((9, times.size, np.count_nonzero(seen)), np.float32)
+    rotation = np.empty((4, *values.shape[1:]), np.float32)
+    for k, time in enumerate(times):
+        camera = cameras[nearest_frame(known, float(time))]
+        values[:, k], rotation[:, k] = _moment(scene, float(time), camera, seen)
+    low, high = values.min(axis=(1, 2)).astype(np.float64), values.max(axis=(1, 2)).astype(np.float64)
+    high = np.where(high > low, high, low + 1)
+    levels = np.array([LEVELS_16] * 6 + [LEVELS_8] * 3)[:, None, None]
+    rounded = np.rint((values - low[:, None, None]) / (high - low)[:, None, None] * levels)
+    shown = np.broadcast_to(np.rint(opacity[seen] * LEVELS_8), (1, *values.shape[1:]))
+    rest = np.concatenate([_signed(rotation), rounded[COLOUR], shown]).astype(np.int16).astype(np.uint8)
+    return Trajectories(times, rounded[:6].astype(np.uint16), rest, low, high)
+
+
+def _moment(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+    """Position, log-scale and colour (9, N), and the unit quaternion (4, N), of the Gaussians that are seen."""
+    moment, degree = scene.at(time), scene.model.config.model.harmonics_degree
+    colour = harmonics_forward(moment.harmonics, moment.residual, moment.position, camera_centre(camera), degree)[0]
+    exposure = exposure_at(scene.model.frames, time)
+    if exposure is not None:
+        colour = colour * np.exp(exposure.log_gain)[:, None] + exposure.bias[:, None]
+    norm = np.maximum(np.linalg.norm(moment.quaternion, axis=0), 1e-12)
+    values = np.concatenate([moment.position, moment.log_scale, colour])
+    return values[:, seen], (moment.quaternion / norm)[:, seen]
+
+
+def _signed(rotation: FloatArray) -> FloatArray:
+    """Quaternions as whole numbers up to ROTATION_LEVELS; q and -q turn alike, so a sign that would jump is changed."""
+    largest = np.abs(rotation).max(axis=0)
+    levels = np.rint(rotation / np.where(largest > 0, largest, 1) * ROTATION_LEVELS)
+    for k in range(1, levels.shape[1]):
+        levels[:, k] *= np.where((levels[:, k] * levels[:, k - 1]).sum(axis=0) < 0, -1, 1)
+    return levels
+
+
+def packed(found: Trajectories) -> bytes:
+    """The rounded numbers as compressed bytes: for each row the low bytes and, of words, the high bytes, (K, N) each.
+
+    A key time is stored as the difference to the one before, modulo 256 or 65536: what does not move is zero.
+    """
+    planes = []
+    for row in found.words:
+        steps = np.diff(row, axis=0, prepend=np.zeros_like(row[:1]))
+        planes += [(steps & 255).astype(np.uint8).tobytes(), (steps >> 8).astype(np.uint8).tobytes()]
+    planes += [np.diff(row, axis=0, prepend=np.zeros_like(row[:1])).tobytes() for row in found.bytes]
+    return zlib.compress(b"".join(planes), COMPRESSION)
+
+
+def header(found: Trajectories) -> dict[str, Any]:
+    """What the page needs to unpack the numbers."""
+    return {
+        "count": found.words.shape[2],
+        "times": found.times.tolist(),
+        "low": found.low.tolist(),
+        "high": found.high.tolist(),
+    }

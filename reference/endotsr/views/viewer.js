@@ -1,0 +1,481 @@
+"use strict";
+// The moving scene, drawn with WebGL 2: every Gaussian is a rectangle around its ellipse alpha >= cutoff, drawn from far
+// to near. The formulas are those of the specification: B2 covariance, B3 projection, B5 compositing.
+(async function () {
+const element = (id) => document.getElementById(id);
+const about = JSON.parse(element("about").textContent);
+const N = about.count, K = about.times.length, WIDTH = 1024, ROWS = Math.max(1, Math.ceil(N / WIDTH));
+
+function fail(message) {
+  element("failure").textContent = message;
+  element("failure").hidden = false;
+  element("shown").textContent = "";
+}
+
+// ---------------------------------------------------------------- the numbers
+async function unpack() {
+  const text = element("data").textContent.trim(), raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+  element("data").textContent = "";
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+function summed(planes, row, words) {  // one row (K, N): differences between key times added up
+  const size = K * N, out = words ? new Uint16Array(size) : new Uint8Array(size);
+  for (let i = 0; i < size; i++) {
+    const step = words ? planes[row * size + i] | (planes[(row + 1) * size + i] << 8) : planes[row * size + i];
+    out[i] = i < N ? step : out[i - N] + step;
+  }
+  return out;
+}
+
+let planes;
+try { planes = await unpack(); } catch (error) { return fail("This browser cannot unpack the scene: " + error); }
+const words = [0, 2, 4, 6, 8, 10].map((row) => summed(planes, row, true));
+const small = [0, 1, 2, 3, 4, 5, 6, 7].map((row) => summed(planes, 12 + row, false));
+planes = null;
+
+// ---------------------------------------------------------------- programs
+const canvas = element("scene");
+canvas.width = about.width;
+canvas.height = about.height;
+element("stage").style.setProperty("--widest", `calc(72vh * ${about.width / about.height})`);  // no scrolling
+const gl = canvas.getContext("webgl2", {antialias: false, preserveDrawingBuffer: true});
+if (!gl) return fail("This page needs WebGL 2, which this browser does not offer.");
+const precise = gl.getExtension("EXT_color_buffer_float") !== null;
+
+const SPLAT_VERTEX = `#version 300 es
+precision highp float; precision highp int; precision highp usampler2DArray;
+uniform usampler2DArray first, second, third;
+uniform ivec2 keys; uniform float between; uniform vec3 low[3], range[3];
+uniform mat3 turn; uniform vec3 move; uniform vec4 lens; uniform vec2 size, limit, depths;
+uniform float near, low_pass, cutoff; uniform int layer;
+in uint item;
+out vec2 offset; flat out vec3 conic; flat out vec4 shade;
+float signed8(uint v) { return float(v) - (v > 127u ? 256.0 : 0.0); }
+vec4 rotation(uvec4 b) {
+  return normalize(vec4(signed8(b.z & 255u), signed8(b.z >> 8), signed8(b.w & 255u), signed8(b.w >> 8)));
+}
+void main() {
+  gl_Position = vec4(2, 2, 2, 1); offset = vec2(0); conic = vec3(1, 0, 1); shade = vec4(0);
+  ivec2 at = ivec2(int(item) % ${WIDTH}, int(item) / ${WIDTH});
+  uvec4 a0 = texelFetch(first, ivec3(at, keys.x), 0), a1 = texelFetch(first, ivec3(at, keys.y), 0);
+  uvec4 b0 = texelFetch(second, ivec3(at, keys.x), 0), b1 = texelFetch(second, ivec3(at, keys.y), 0);
+  uvec4 c0 = texelFetch(third, ivec3(at, keys.x), 0), c1 = texelFetch(third, ivec3(at, keys.y), 0);
+  vec3 centre = low[0] + range[0] * mix(vec3(a0.xyz), vec3(a1.xyz), between) / 65535.0;
+  vec3 logs = low[1] + range[1] * mix(vec3(a0.w, b0.xy), vec3(a1.w, b1.xy), between) / 65535.0;
+  vec3 colour = max(low[2] + range[2] * mix(vec3(c0.xyz), vec3(c1.xyz), between) / 255.0, 0.0);
+  float opacity = mix(float(c0.w), float(c1.w), between) / 255.0;
+  vec4 q = normalize(mix(rotation(b0), rotation(b1), between));
+  vec3 p = turn * centre + move;
+  if (p.z <= near || opacity < cutoff) return;
+  mat3 r = mat3(
+    1.0 - 2.0 * (q.z * q.z + q.w * q.w), 2.0 * (q.y * q.z + q.x * q.w), 2.0 * (q.y * q.w - q.x * q.z),
+    2.0 * (q.y * q.z - q.x * q.w), 1.0 - 2.0 * (q.y * q.y + q.w * q.w), 2.0 * (q.z * q.w + q.x * q.y),
+    2.0 * (q.y * q.w + q.x * q.z), 2.0 * (q.z * q.w - q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z));
+  mat3 m = turn * r; vec3 s = exp(logs);
+  m[0] *= s.x; m[1] *= s.y; m[2] *= s.z;
+  vec2 slope = clamp(p.xy / p.z, -limit, limit);
+  vec3 u = lens.x / p.z * (vec3(m[0].x, m[1].x, m[2].x) - slope.x * vec3(m[0].z, m[1].z, m[2].z));
+  vec3 v = lens.y / p.z * (vec3(m[0].y, m[1].y, m[2].y) - slope.y * vec3(m[0].z, m[1].z, m[2].z));
+  float a = low_pass + dot(u, u), b = dot(u, v), c = low_pass + dot(v, v);
+  vec3 w = cross(u, v);
+  float determinant = low_pass * low_pass + low_pass * (dot(u, u) + dot(v, v)) + dot(w, w);
+  conic = vec3(c, -b, a) / determinant;
+  float reach = 2.0 * log(opacity / cutoff);
+  float middle = 0.5 * (a + c), spread = sqrt(max(0.25 * (a - c) * (a - c) + b * b, 0.0));
+  float longer = middle + spread, shorter = determinant / longer;
+  vec2 axis = spread < 1e-6 * middle ? vec2(1, 0) :
+    normalize(abs(a - shorter) > abs(c - shorter) ? vec2(a - shorter, b) : vec2(b, c - shorter));
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  offset = corner.x * (sqrt(reach * longer) + 0.5) * axis
+         + corner.y * (sqrt(reach * shorter) + 0.5) * vec2(-axis.y, axis.x);
+  vec2 pixel = lens.xy * p.xy / p.z + lens.zw + offset;
+  gl_Position = vec4(pixel.x / size.x * 2.0 - 1.0, 1.0 - pixel.y / size.y * 2.0, 0, 1);
+  shade = vec4(layer == 1 ? vec3((p.z - depths.x) / (depths.y - depths.x)) : colour, opacity);
+}`;
+
+const SPLAT_FRAGMENT = `#version 300 es
+precision highp float;
+uniform float cutoff, alpha_max;
+in vec2 offset; flat in vec3 conic; flat in vec4 shade;
+out vec4 result;
+void main() {
+  float q = conic.x * offset.x * offset.x + 2.0 * conic.y * offset.x * offset.y + conic.z * offset.y * offset.y;
+  float alpha = min(alpha_max, shade.a * exp(-0.5 * q));
+  if (!(alpha >= cutoff)) discard;
+  result = vec4(shade.rgb * alpha, alpha);
+}`;
+
+const SHOW_VERTEX = `#version 300 es
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0, 1); }`;
+
+const SHOW_FRAGMENT = `#version 300 es
+precision highp float;
+uniform sampler2D drawn, map, truth; uniform int layer; uniform float error_scale;
+out vec4 result;
+vec3 mapped(float level) { return texelFetch(map, ivec2(int(clamp(level, 0.0, 1.0) * 255.0 + 0.5), 0), 0).rgb; }
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec4 sum = texelFetch(drawn, at, 0);
+  vec3 shown = sum.rgb;
+  if (layer == 1) shown = sum.a > 0.05 ? mapped(sum.r / sum.a) : vec3(0.376, 0.376, 0.4);
+  if (layer == 2) shown = vec3(sum.a);
+  if (layer == 3) {
+    vec4 wanted = texelFetch(truth, ivec2(at.x, textureSize(truth, 0).y - 1 - at.y), 0);
+    vec3 off = abs(clamp(sum.rgb, 0.0, 1.0) - wanted.rgb);
+    shown = wanted.a > 0.5 ? mapped((off.r + off.g + off.b) / 3.0 / error_scale) : vec3(0.376, 0.376, 0.4);
+  }
+  result = vec4(shown, 1);
+}`;
+
+function program(vertex, fragment) {
+  const made = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(made, shader);
+  }
+  gl.linkProgram(made);
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+  const at = {};
+  for (let i = 0; i < gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); i++) {
+    const name = gl.getActiveUniform(made, i).name.replace("[0]", "");
+    at[name] = gl.getUniformLocation(made, name);
+  }
+  return {made, at};
+}
+
+let splat, show;
+try {
+  splat = program(SPLAT_VERTEX, SPLAT_FRAGMENT);
+  show = program(SHOW_VERTEX, SHOW_FRAGMENT);
+} catch (error) { return fail("The shaders cannot be compiled: " + error.message); }
+
+// ---------------------------------------------------------------- textures
+function layered(unit, format, inside, type, fill, Kind) {
+  const texture = gl.createTexture(), layer = new Kind(WIDTH * ROWS * 4);
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
+  gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, inside, WIDTH, ROWS, K);
+  for (let k = 0; k < K; k++) {
+    for (let i = 0; i < N; i++) fill(layer, 4 * i, k * N + i);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, k, WIDTH, ROWS, 1, format, type, layer);
+  }
+  gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+}
+gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+layered(0, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
+  for (let c = 0; c < 4; c++) out[o + c] = words[c][i];
+}, Uint16Array);
+layered(1, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
+  out[o] = words[4][i]; out[o + 1] = words[5][i];
+  out[o + 2] = small[0][i] | (small[1][i] << 8); out[o + 3] = small[2][i] | (small[3][i] << 8);
+}, Uint16Array);
+layered(2, gl.RGBA_INTEGER, gl.RGBA8UI, gl.UNSIGNED_BYTE, (out, o, i) => {
+  for (let c = 0; c < 4; c++) out[o + c] = small[4 + c][i];
+}, Uint8Array);
+const ranges = about.high.map((high, row) => high - about.low[row]);
+
+function flat(unit) {
+  const texture = gl.createTexture();
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  for (const key of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, key, gl.NEAREST);
+  for (const key of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, key, gl.CLAMP_TO_EDGE);
+  return texture;
+}
+const drawn = flat(3);
+if (precise) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, about.width, about.height, 0, gl.RGBA, gl.HALF_FLOAT, null);
+else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, about.width, about.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+const buffer = gl.createFramebuffer();
+gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, drawn, 0);
+const MAPS = {1: "viridis", 3: "magma"};
+flat(4);
+flat(5);
+gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+
+function useMap(name) {
+  gl.activeTexture(gl.TEXTURE4);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB8, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, new Uint8Array(about.maps[name]));
+}
+
+const order = gl.createBuffer(), item = gl.getAttribLocation(splat.made, "item");
+const field = gl.createVertexArray();
+gl.bindVertexArray(field);
+gl.bindBuffer(gl.ARRAY_BUFFER, order);
+gl.bufferData(gl.ARRAY_BUFFER, 4 * Math.max(N, 1), gl.STREAM_DRAW);
+gl.enableVertexAttribArray(item);
+gl.vertexAttribIPointer(item, 1, gl.UNSIGNED_INT, 0, 0);
+gl.vertexAttribDivisor(item, 1);
+const nothing = gl.createVertexArray();
+
+// ---------------------------------------------------------------- time, camera, order
+const state = {time: 0, yaw: 0, pitch: 0, closer: 1, layer: 0, playing: false, orbiting: false, phase: 0};
+
+function keysAt(time) {
+  const times = about.times;
+  let k = 0;
+  while (k + 2 < K && times[k + 1] <= time) k++;
+  if (K < 2) return [0, 0, 0];
+  return [k, k + 1, Math.min(Math.max((time - times[k]) / (times[k + 1] - times[k]), 0), 1)];
+}
+
+function nearestFrame(time) {
+  const times = about.frames.times;
+  let best = 0;
+  for (let i = 1; i < times.length; i++) if (Math.abs(times[i] - time) < Math.abs(times[best] - time)) best = i;
+  return best;
+}
+
+function multiply(a, b) {  // row-major 3x3
+  const out = new Array(9);
+  for (let r = 0; r < 3; r++) for (let c = 0; c < 3; c++)
+    out[3 * r + c] = a[3 * r] * b[c] + a[3 * r + 1] * b[3 + c] + a[3 * r + 2] * b[6 + c];
+  return out;
+}
+
+function apply(a, v) {
+  return [0, 3, 6].map((r) => a[r] * v[0] + a[r + 1] * v[1] + a[r + 2] * v[2]);
+}
+
+function cameraNow() {  // the observed camera, turned about the pivot on its axis, and moved along the axis
+  const frame = about.cameras.length > 1 ? nearestFrame(state.time) : 0, numbers = about.cameras[frame];
+  const [sy, cy, sp, cp] = [Math.sin(state.yaw), Math.cos(state.yaw), Math.sin(state.pitch), Math.cos(state.pitch)];
+  const turn = multiply([1, 0, 0, 0, cp, sp, 0, -sp, cp], [cy, 0, sy, 0, 1, 0, -sy, 0, cy]);
+  const pivot = [0, 0, about.pivot_depth], t = numbers.slice(9, 12);
+  const moved = apply(turn, [t[0], t[1], t[2] - pivot[2]]);
+  moved[2] += pivot[2] * state.closer;
+  return {rotation: multiply(turn, numbers.slice(0, 9)), translation: moved, lens: numbers.slice(12, 16)};
+}
+
+const depthBits = new Uint32Array(N), depth = new Float32Array(depthBits.buffer);
+const sorted = new Uint32Array(N), other = new Uint32Array(N), counts = new Uint32Array(65537);
+
+function sortByDepth(camera, [k0, k1, f]) {  // from far to near: two passes of 16 bits over the bits of the depth
+  const r = camera.rotation, scale = [0, 1, 2].map((c) => r[6 + c] * ranges[c] / 65535);
+  const base = camera.translation[2] + r[6] * about.low[0] + r[7] * about.low[1] + r[8] * about.low[2];
+  const [x, y, z] = words, a = k0 * N, b = k1 * N, g = 1 - f;
+  for (let i = 0; i < N; i++) {
+    const value = base + scale[0] * (g * x[a + i] + f * x[b + i]) + scale[1] * (g * y[a + i] + f * y[b + i])
+      + scale[2] * (g * z[a + i] + f * z[b + i]);
+    depth[i] = value > 0 ? value : 0;
+    other[i] = N - 1 - i;  // of two at one depth the later one is farther back
+  }
+  for (const [from, to, shift] of [[other, sorted, 0], [sorted, other, 16]]) {
+    counts.fill(0);
+    for (let i = 0; i < N; i++) counts[((~depthBits[from[i]] >>> shift) & 65535) + 1]++;
+    for (let i = 0; i < 65536; i++) counts[i + 1] += counts[i];
+    for (let i = 0; i < N; i++) to[counts[(~depthBits[from[i]] >>> shift) & 65535]++] = from[i];
+  }
+  return other;
+}
+
+// ---------------------------------------------------------------- a picture
+function draw() {
+  const camera = cameraNow(), keys = keysAt(state.time), {made, at} = splat, raster = about.raster;
+  const size = [about.width, about.height];
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+  gl.viewport(0, 0, ...size);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT);
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  gl.useProgram(made);
+  gl.bindVertexArray(field);
+  gl.bindBuffer(gl.ARRAY_BUFFER, order);
+  gl.bufferSubData(gl.ARRAY_BUFFER, 0, sortByDepth(camera, keys));
+  for (const [name, unit] of [["first", 0], ["second", 1], ["third", 2]]) gl.uniform1i(at[name], unit);
+  gl.uniform2i(at.keys, keys[0], keys[1]);
+  gl.uniform1f(at.between, keys[2]);
+  gl.uniform3fv(at.low, about.low);
+  gl.uniform3fv(at.range, ranges);
+  gl.uniformMatrix3fv(at.turn, true, camera.rotation);
+  gl.uniform3fv(at.move, camera.translation);
+  gl.uniform4fv(at.lens, camera.lens);
+  gl.uniform2fv(at.size, size);
+  const clamp = raster.jacobian_clamp > 0 ? raster.jacobian_clamp / 2 : 1e9;
+  gl.uniform2f(at.limit, clamp * size[0] / camera.lens[0], clamp * size[1] / camera.lens[1]);
+  gl.uniform2fv(at.depths, about.depth_range);
+  gl.uniform1f(at.near, raster.near);
+  gl.uniform1f(at.low_pass, raster.low_pass);
+  gl.uniform1f(at.cutoff, raster.alpha_cutoff);
+  gl.uniform1f(at.alpha_max, raster.alpha_max);
+  gl.uniform1i(at.layer, state.layer);
+  gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, N);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.disable(gl.BLEND);
+  gl.useProgram(show.made);
+  gl.bindVertexArray(nothing);
+  gl.uniform1i(show.at.drawn, 3);
+  gl.uniform1i(show.at.map, 4);
+  gl.uniform1i(show.at.truth, 5);
+  gl.uniform1i(show.at.layer, state.layer);
+  gl.uniform1f(show.at.error_scale, about.error_scale);
+  gl.drawArrays(gl.TRIANGLES, 0, 3);
+  describe();
+}
+
+// ---------------------------------------------------------------- the page
+let held = null;  // the held-out frame that is shown beside the scene
+const moved = () => state.yaw !== 0 || state.pitch !== 0 || state.closer !== 1;
+const short = (number) => Number(number.toPrecision(4)).toString();
+
+function describe() {
+  element("slider").value = state.time;
+  const frame = about.frames.names[nearestFrame(state.time)];
+  element("time").textContent = "t = " + state.time.toFixed(3);
+  element("shown").textContent = (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame;
+}
+
+function choose(layer) {
+  state.layer = layer;
+  element("layer").value = ["colour", "depth", "opacity", "error"][layer];
+  element("legend").hidden = !(layer in MAPS);
+  if (layer in MAPS) {
+    useMap(MAPS[layer]);
+    const strip = element("strip").getContext("2d"), picture = strip.createImageData(256, 1);
+    about.maps[MAPS[layer]].forEach((v, i) => { picture.data[Math.floor(i / 3) * 4 + i % 3] = v; });
+    for (let i = 0; i < 256; i++) picture.data[4 * i + 3] = 255;
+    strip.putImageData(picture, 0, 0);
+    element("low").textContent = layer === 1 ? short(about.depth_range[0]) : "0";
+    element("high").textContent = layer === 1 ? short(about.depth_range[1]) + " " + about.unit : about.error_scale + " or more";
+  }
+}
+
+function leave() {  // no frame has this time and camera
+  held = null;
+  element("beside").hidden = true;
+  element("stage").classList.remove("two");
+  element("layer").options[3].disabled = true;
+  if (state.layer === 3) choose(0);
+  for (const chip of element("chips").querySelectorAll("button")) chip.classList.remove("on");
+}
+
+function go(time) {
+  state.time = time;
+  if (held && held.time !== time) leave();
+}
+
+async function visit(frame, chip) {
+  stop();
+  look(0, 0, 1);
+  leave();
+  state.time = frame.time;
+  held = frame;
+  chip.classList.add("on");
+  element("truth").src = frame.picture;
+  element("truth_name").textContent = "Held-out frame " + frame.name + "; grey is excluded";
+  element("beside").hidden = false;
+  element("stage").classList.add("two");
+  const bytes = await (await fetch(frame.picture)).blob();
+  const picture = await createImageBitmap(bytes, {premultiplyAlpha: "none", colorSpaceConversion: "none"});
+  gl.activeTexture(gl.TEXTURE5);
+  gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+  element("layer").options[3].disabled = false;
+  draw();
+}
+
+function look(yaw, pitch, closer) {
+  const most = 1.2;
+  state.yaw = Math.max(-most, Math.min(most, yaw));
+  state.pitch = Math.max(-most, Math.min(most, pitch));
+  state.closer = Math.max(0.2, Math.min(4, closer));
+  if (moved() && held) leave();
+}
+
+function stop() {
+  state.playing = state.orbiting = false;
+  element("play").textContent = "Play";
+  element("orbit").classList.remove("on");
+}
+
+let before = 0;
+function tick(now) {
+  const seconds = Math.min((now - before) / 1000, 0.1);
+  before = now;
+  if (state.playing) go((state.time + seconds / 4) % 1);
+  if (state.orbiting) {
+    state.phase += seconds * 0.8;
+    look(0.2 * Math.sin(state.phase), 0.12 * Math.cos(state.phase), state.closer);
+  }
+  draw();
+  if (state.playing || state.orbiting) requestAnimationFrame(tick);
+}
+
+function toggle(name, button) {
+  const running = state.playing || state.orbiting;
+  state[name] = !state[name];
+  element("play").textContent = state.playing ? "Stop" : "Play";
+  element("orbit").classList.toggle("on", state.orbiting);
+  if (!running) requestAnimationFrame((now) => { before = now; tick(now); });
+}
+
+element("play").onclick = () => toggle("playing");
+element("orbit").onclick = () => toggle("orbiting");
+element("reset").onclick = () => { state.orbiting = false; element("orbit").classList.remove("on"); look(0, 0, 1); draw(); };
+element("slider").oninput = (event) => { go(Number(event.target.value)); draw(); };
+element("layer").onchange = (event) => { choose(event.target.selectedIndex); draw(); };
+canvas.onpointerdown = (event) => canvas.setPointerCapture(event.pointerId);
+canvas.onpointermove = (event) => {
+  if (!canvas.hasPointerCapture(event.pointerId)) return;
+  look(state.yaw - event.movementX * 0.004, state.pitch - event.movementY * 0.004, state.closer);
+  draw();
+};
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  look(state.yaw, state.pitch, state.closer * Math.exp(event.deltaY * 0.001));
+  draw();
+}, {passive: false});
+canvas.onkeydown = (event) => {
+  const steps = {ArrowLeft: [-0.05, 0, 1], ArrowRight: [0.05, 0, 1], ArrowUp: [0, -0.05, 1], ArrowDown: [0, 0.05, 1],
+    "+": [0, 0, 0.95], "-": [0, 0, 1 / 0.95]}[event.key];
+  if (!steps) return;
+  event.preventDefault();
+  look(state.yaw + steps[0], state.pitch + steps[1], state.closer * steps[2]);
+  draw();
+};
+for (const frame of about.held_out) {
+  const chip = document.createElement("button");
+  chip.textContent = frame.time.toFixed(3);
+  chip.title = frame.name;
+  chip.onclick = () => visit(frame, chip);
+  element("chips").append(chip);
+  element("chips").hidden = false;
+}
+element("note").textContent = N.toLocaleString("en") + " Gaussians, " + K + " key times, lengths in " + about.unit +
+  ". Between key times the page interpolates. Drag to turn, turn the wheel to come closer.";
+if (K < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
+
+// `#t=0.4&layer=depth&yaw=0.2` opens the page at a moment; `probe` adds the drawn picture and its time as text.
+const asked = new URLSearchParams(location.hash.slice(1));
+state.time = Math.max(0, Math.min(1, Number(asked.get("t")) || 0));
+look(Number(asked.get("yaw")) || 0, Number(asked.get("pitch")) || 0, 1);
+const layer = ["colour", "depth", "opacity"].indexOf(asked.get("layer"));
+choose(layer > 0 ? layer : 0);
+draw();
+if (asked.has("held_out")) {
+  const k = Number(asked.get("held_out")), chips = element("chips").querySelectorAll("button");
+  if (chips[k]) await visit(about.held_out[k], chips[k]);
+  if (asked.get("layer") === "error") { choose(3); draw(); }
+}
+if (asked.has("probe")) {
+  const text = document.createElement("pre"), began = performance.now(), pixel = new Uint8Array(4), pictures = 10;
+  text.id = "probe";
+  text.hidden = true;
+  const shown = canvas.toDataURL("image/png");
+  for (let k = 0; k < pictures; k++) {
+    draw();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);  // waits until the picture is drawn
+  }
+  const milliseconds = (performance.now() - began) / pictures;
+  text.textContent = JSON.stringify({picture: shown, milliseconds, errors: gl.getError(), precise});
+  document.body.append(text);
+}
+})();

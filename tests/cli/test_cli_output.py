@@ -1,0 +1,89 @@
+"""`-q`, `--log-file`, the short and the whole help, and completion scripts."""
+
+import shutil
+import subprocess
+
+import pytest
+from tiny import assert_refused
+
+from endotsr.cli.main import COMMANDS, main
+from endotsr.cli.parts.completion import ALWAYS, SCRIPTS, words_of
+from endotsr.cli.parts.fields import fields_of
+from endotsr.cli.parts.output import Output, split_output
+from endotsr.cli.train import TrainOptions
+
+
+def test_quiet_prints_nothing_but_errors(capsys):
+    assert main(["-q", "render", "--help"]) == 0 and capsys.readouterr().out == ""
+    assert main(["render", "--quiet"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.startswith("endotsr: error: ") and said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_a_log_file_gets_what_is_printed_and_errors(quiet, tmp_path, capsys):
+    file = tmp_path / "a.log"
+    assert main([*quiet, "--log-file", str(file), "render", "--help"]) == 0
+    assert "usage: endotsr render" in file.read_text()
+    assert ("usage: endotsr render" in capsys.readouterr().out) == (not quiet)
+    assert main(["render", f"--log-file={file}", *quiet]) == 2
+    assert file.read_text() == capsys.readouterr().err, "written from its beginning"
+
+
+def test_a_log_file_that_cannot_be_written_is_refused(tmp_path, capsys):
+    assert_refused(capsys, ["--log-file", str(tmp_path / "no" / "a.log"), "render"], "a.log: cannot be written")
+    assert_refused(capsys, ["render", "--log-file"], "--log-file: missing value FILE")
+
+
+def test_other_words_keep_their_order():
+    output, words = split_output(["train", "x", "-q", "--out", "y", "--log-file=z", "--seed", "-1"])
+    assert words == ["train", "x", "--out", "y", "--seed", "-1"] and output.quiet and output.log_file.name == "z"
+    assert split_output(["a"]) == (Output(), ["a"])
+
+
+def test_the_short_help_is_short_and_names_the_whole_one(capsys):
+    assert main(["train", "--help"]) == 0
+    short = capsys.readouterr().out
+    assert main(["train", "--help-all"]) == 0
+    whole = capsys.readouterr().out
+    options = [line.split()[0] for line in short.splitlines() if line.startswith("  -")]
+    assert 15 <= len(options) <= 28 and "--iterations" in options and "--model.[no-]appearance" in options
+    hidden = len(fields_of(TrainOptions)) - sum(field.name in short or field.off in short for field in
+                                                fields_of(TrainOptions))  # fmt: skip
+    assert "--model.bases" not in short and "--model.bases" in whole and hidden > 50
+    assert "`endotsr train --help-all` lists" in short and "--help-all` lists" not in whole
+    assert main(["demo", "--help-all"]) == 0 and "--model.bases" in capsys.readouterr().out
+
+
+def test_every_command_has_words_of_its_own():
+    assert [name for name in COMMANDS if len(words_of(name)) <= len(ALWAYS)] == []
+
+
+@pytest.mark.parametrize("shell", SCRIPTS)
+def test_a_script_names_every_command_and_its_options(shell, capsys):
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    for name in COMMANDS:
+        assert name in script
+        for word in words_of(name):
+            assert word.removeprefix("--") in script
+    assert "model.bases" in script and "--film" in words_of("render")
+    assert_refused(capsys, ["completion", "tcsh"], "'tcsh' is not allowed; allowed: bash, zsh, fish")
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [("endotsr ren", "render"), ("endotsr render run --fi", "--film"), ("endotsr golden ju", "judge")],
+)
+def test_bash_completes(line, expected):
+    if shutil.which("bash") is None:
+        pytest.skip("no bash")
+    words = line.split()
+    script = (
+        SCRIPTS["bash"]()
+        + f"""
+COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _endotsr; echo "${{COMPREPLY[@]}}"
+"""
+    )
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=30)
+    assert done.stdout.split() == [expected] and done.stderr == ""

@@ -1,0 +1,94 @@
+"""`evaluate --pictures` and `compare`: any method's renders beside the baselines of a run."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from tiny import assert_refused, written_folder
+
+from endotsr.cli.main import main
+from endotsr.config import SequenceConfig
+from endotsr.evaluation.baselines import flow_interpolation
+from endotsr.runs.folder import open_run
+from endotsr.runs.sources import load_run_sequence
+from endotsr.sequences.endonerf import read_endonerf
+
+
+@pytest.fixture(scope="module")
+def flow_pictures(finished_run, tmp_path_factory):
+    """Float pictures of the flow baseline on the held-out frames of the run."""
+    folder = tmp_path_factory.mktemp("pictures") / "flow"
+    folder.mkdir()
+    sequence = load_run_sequence(open_run(finished_run))
+    for i in sequence.test_index:
+        np.save(folder / f"{sequence.names[i]}.npy", flow_interpolation(sequence, int(i)))
+    return folder
+
+
+def test_pictures_of_the_flow_baseline_equal_its_row(finished_run, flow_pictures, tmp_path, capsys):
+    before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
+    words = ["--json", str(tmp_path / "m.json"), "--csv", str(tmp_path / "m.csv"), "--label", "mine"]
+    assert main(["evaluate", str(finished_run), "--pictures", str(flow_pictures), *words]) == 0
+    said = capsys.readouterr().out
+    rows = {line[:40].strip(): line[40:].split() for line in said.splitlines()}
+    assert rows["mine"] == rows["Optical-flow interpolation (DIS)"], said
+    metrics = json.loads((tmp_path / "m.json").read_text())
+    run = json.loads((finished_run / "metrics.json").read_text())
+    assert metrics["held_out"]["mean"] == run["baselines"]["flow_interpolation"]["mean"]
+    assert metrics["baselines"] == run["baselines"] and metrics["label"] == "mine"
+    table = list(csv.DictReader((tmp_path / "m.csv").open()))
+    assert [row["method"] for row in table][:2] == ["mine", "Temporal mean of the training frames"]
+    assert before == {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}, "the run is not changed"
+
+
+def test_pictures_on_a_named_sequence(tmp_path, capsys):
+    folder = written_folder(tmp_path)
+    sequence = read_endonerf(folder, SequenceConfig(scale=0.5))
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for i in sequence.test_index:
+        np.save(pictures / f"{i}.npy", flow_interpolation(sequence, int(i)))
+    words = ["evaluate", "--pictures", str(pictures), "--sequence", str(folder), "--sequence.scale", "0.5"]
+    assert main([*words, "--json", str(tmp_path / "m.json")]) == 0
+    found = json.loads((tmp_path / "m.json").read_text())
+    assert found["held_out"]["mean"] == found["baselines"]["flow_interpolation"]["mean"]
+    assert "pictures, paired" in capsys.readouterr().out
+    words[-1] = "0.75"
+    assert_refused(capsys, words, f"{pictures}", "a picture of 36x24")
+
+
+def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tmp_path, capsys):
+    run, pictures = str(finished_run), str(flow_pictures)
+    assert_refused(capsys, ["evaluate"], "evaluate: RUN is missing", "--pictures FOLDER")
+    assert_refused(capsys, ["evaluate", "--pictures", pictures], "--sequence is missing")
+    assert_refused(capsys, ["evaluate", run, "--sequence.scale", "0.5"], "--sequence.*", "the run has fixed")
+    words = ["evaluate", run, "--pictures", pictures]
+    assert_refused(capsys, [*words, "--sequence.scale", "0.5"], "--sequence.*", "the run has fixed")
+    assert_refused(capsys, [*words, "--csv", str(tmp_path / "no" / "m.csv")], "m.csv: cannot be written")
+    assert_refused(capsys, [*words[:-1], str(tmp_path)], f"{tmp_path}: holds no picture")
+
+
+def test_compare_runs_and_pictures(finished_run, flow_pictures, tmp_path, capsys):
+    words = ["compare", f"ours={finished_run}", str(flow_pictures), "--json", str(tmp_path / "c.json")]
+    assert main([*words, "--csv", str(tmp_path / "c.csv")]) == 0
+    said = capsys.readouterr().out
+    assert "differences to ours, frame by frame" in said
+    rows = {(row["label"], row["metric"]): row for row in json.loads((tmp_path / "c.json").read_text())["rows"]}
+    ours, flow = rows["ours", "psnr_tissue"], rows["flow", "psnr_tissue"]
+    assert flow["difference"]["mean"] == pytest.approx(flow["mean"] - ours["mean"])
+    assert rows["Optical-flow interpolation (DIS)", "psnr_tissue"]["difference"] == flow["difference"]
+    assert (tmp_path / "c.csv").read_text().startswith("method,metric,mean,difference")
+    assert main([*words[:3], "--no-baselines"]) == 0
+    assert "Optical-flow" not in capsys.readouterr().out
+
+
+def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp_path, capsys):
+    run, pictures = str(finished_run), str(flow_pictures)
+    assert_refused(capsys, ["compare"], "missing: METHOD")
+    assert_refused(capsys, ["compare", pictures], "--sequence is missing")
+    assert_refused(capsys, ["compare", run, run], "two methods are called 'run'")
+    assert_refused(capsys, ["compare", run, str(tmp_path / "none.json")], "none.json: cannot be read")
+    assert_refused(capsys, ["compare", run, "--seed", "-1"], "--seed -1 is not allowed")
+    (tmp_path / "m.json").write_text("{}")
+    assert_refused(capsys, ["compare", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")

@@ -1,0 +1,107 @@
+"""`render`: cameras, sizes, depth and films of a trained run, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from tiny import assert_refused
+
+from endotsr.cli.main import main
+from endotsr.opencv import read_png, read_video
+
+
+def render(run, out, *words):
+    assert main(["render", str(run), "--out", str(out), *words]) == 0
+    return json.loads((out / "render.json").read_text())
+
+
+def test_a_shifted_camera_moves_the_picture_and_is_named(finished_run, tmp_path):
+    at = ("--times", "0.5", "--npy")
+    render(finished_run, tmp_path / "a", *at)
+    about = render(finished_run, tmp_path / "b", *at, "--offset", "4", "0", "0")
+    a, b = (np.load(tmp_path / name / "colour" / "00000.npy") for name in "ab")
+    assert not np.array_equal(a, b)
+    assert about["pictures"][0]["camera"]["translation"][0] == pytest.approx(-4)
+
+
+def test_another_size_shows_the_same_scene(finished_run, tmp_path):
+    at = ("--times", "0.5", "--npy")
+    render(finished_run, tmp_path / "a", *at)
+    render(finished_run, tmp_path / "b", *at, "--size", "96x64")
+    a, b = (np.load(tmp_path / name / "colour" / "00000.npy") for name in "ab")
+    assert b.shape == (3, 64, 96)
+    halved = b.reshape(3, 32, 2, 48, 2).mean(axis=(2, 4))
+    assert np.abs(halved - a).mean() < 0.5 * np.abs(halved - a[:, ::-1]).mean()
+
+
+def test_normalised_depth_is_the_accumulated_one_over_the_opacity(finished_run, tmp_path):
+    at = ("--times", "0.5", "--npy")
+    render(finished_run, tmp_path / "a", *at)
+    about = render(finished_run, tmp_path / "b", *at, "--depth", "normalised")
+    depth, opacity = (np.load(tmp_path / "a" / name / "00000.npy") for name in ("depth", "opacity"))
+    normalised = np.load(tmp_path / "b" / "depth" / "00000.npy")
+    assert np.allclose(normalised * opacity, depth, atol=1e-4)
+    assert about["about"].endswith(", normalised by opacity")
+
+
+@pytest.mark.parametrize("camera", ["orbit", "sway"])
+def test_a_path_gives_every_picture_its_camera(camera, finished_run, tmp_path):
+    about = render(finished_run, tmp_path / "a", "--count", "4", "--camera", camera, "--angle", "20")
+    rotations = [tuple(np.ravel(p["camera"]["rotation"])) for p in about["pictures"]]
+    assert len(set(rotations)) > 2
+    colours = [read_png(tmp_path / "a" / "colour" / p["file"]).mean() for p in about["pictures"]]
+    assert min(colours) > 20, "the scene stays in the picture"
+
+
+def test_cameras_of_a_file_that_render_json_names_give_the_same_picture(finished_run, tmp_path):
+    about = render(finished_run, tmp_path / "a", "--count", "3", "--camera", "orbit")
+    file = tmp_path / "path.json"
+    file.write_text(json.dumps({"cameras": [p["camera"] for p in about["pictures"]]}))
+    render(finished_run, tmp_path / "b", "--count", "3", "--camera", str(file))
+    for picture in about["pictures"]:
+        a, b = (read_png(tmp_path / name / "colour" / picture["file"]) for name in "ab")
+        assert np.array_equal(a, b)
+
+
+def test_a_film_of_panels_beside_its_pictures(finished_run, tmp_path, capsys):
+    film = tmp_path / "film.webm"
+    words = ["--frames", "train", "--film", str(film), "--panels", "render", "truth", "error", "depth"]
+    render(finished_run, tmp_path / "a", *words)
+    read = read_video(film)
+    assert len(read) == 8 and read[0].shape == (32, 4 * 48 + 3 * 4, 3)
+    assert f"{film}: 8 pictures" in capsys.readouterr().out
+    first = sorted((tmp_path / "a" / "colour").iterdir())[0]
+    assert np.abs(read[0][:, :48].astype(float) - read_png(first)).mean() < 12
+
+
+def test_a_film_alone_shows_all_frames(finished_run, tmp_path):
+    assert main(["render", str(finished_run), "--film", str(tmp_path / "film.gif")]) == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ["--out", "{}/film.mp4"],
+            "film.mp4: --out is a folder of pictures, and this is the name of a .mp4 file; --film",
+        ),
+        (["--out", "{}/a.png"], "the name of a .png file"),
+        (["--film", "{}/a.avi"], "a.avi: not a film; allowed: a name that ends in .mp4, .webm, .gif"),
+        (["--film", "{}/none/a.mp4"], "a.mp4: cannot be written"),
+        (["--film", "{}/a.mp4", "--rate", "0"], "--rate 0 is not allowed"),
+        (["--film", "{}/a.mp4", "--panels"], "--panels is empty"),
+        (["--film", "{}/a.mp4", "--panels", "truth", "--count", "5"], "--panels truth at time 0.25: no frame has"),
+        (["--film", "{}/a.mp4", "--panels", "error", "--offset", "1", "0", "0"], "--panels error at time 0:"),
+        (["--out", "{}/a", "--camera", "circle"], "--camera 'circle' is not allowed; allowed: observed, orbit, sway"),
+        (["--out", "{}/a", "--camera", "{}/no.json"], "no.json: cannot be read"),
+        (["--out", "{}/a", "--camera", "-1"], "--camera -1 is not allowed; allowed: a frame from 0 to 8"),
+        (["--out", "{}/a", "--size", "12"], "--size '12' is not allowed; allowed: WIDTHxHEIGHT"),
+        (["--out", "{}/a", "--size", "0x9"], "allowed: an integer from 1 to 16384"),
+        (["--out", "{}/a", "--angle", "90"], "--angle 90 is not allowed"),
+        (["--out", "{}/a", "--offset", "nan", "0", "0"], "--offset is not allowed"),
+    ],
+)
+def test_render_refuses_in_one_line_and_leaves_nothing(words, said, finished_run, tmp_path, capsys):
+    assert_refused(capsys, ["render", str(finished_run), *(word.format(tmp_path) for word in words)], said)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,44 @@
+"""A headless browser that opens the viewer page and hands back what it drew."""
+
+import base64
+import html
+import io
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+VIRTUAL_MILLISECONDS = 30000  # of the page's own clock; the browser ends as soon as nothing is left to do
+
+
+def browser() -> str:
+    """The program, or the test is skipped."""
+    found = next((path for name in NAMES if (path := shutil.which(name))), None)
+    if found is None:
+        pytest.skip(f"no browser found: {', '.join(NAMES)}")
+    return found
+
+
+def dom(page: Path, moment: str) -> str:
+    """The document after the page has drawn."""
+    words = [browser(), *FLAGS, f"--user-data-dir={page.parent / 'profile'}"]
+    words += [f"--virtual-time-budget={VIRTUAL_MILLISECONDS}", "--dump-dom", f"{page.as_uri()}#{moment}"]
+    return subprocess.run(words, capture_output=True, text=True, timeout=200).stdout
+
+
+def drawn(page: Path, moment: str) -> np.ndarray:
+    """The picture of the page at `t=0.4&layer=depth`, (H, W, 3) uint8."""
+    content = dom(page, f"{moment}&probe")
+    found = re.search(r'<pre id="probe"[^>]*>(.*?)</pre>', content, re.S)
+    assert found, content[-2000:] if "WebGL" not in content else re.findall(r'id="failure"[^>]*>([^<]*)', content)
+    probe = json.loads(html.unescape(found[1]))
+    assert probe["errors"] == 0, "an error of WebGL"
+    picture = Image.open(io.BytesIO(base64.b64decode(probe["picture"].split(",")[1])))
+    return np.asarray(picture.convert("RGB"))
