@@ -117,7 +117,7 @@ def test_arrays_that_are_no_pictures_are_refused(array, said, tmp_path):
 
 def test_a_file_that_is_no_array_is_refused(tmp_path):
     (tmp_path / "0.npy").write_bytes(b"not an array")
-    with pytest.raises(InputError, match=r"0\.npy: cannot be read"):
+    with pytest.raises(InputError, match=r"0\.npy: not a plain NumPy array file"):
         read_picture(tmp_path / "0.npy", (3, 32, 48))
 
 

@@ -58,7 +58,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     except InputError:
         raise
     except (Refused, KeyError) as error:
-        reason = error.args[0] if isinstance(error, KeyError) else error
+        reason = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
         raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
     for name, rest in ARRAYS.items():
         expected = (len(found["xyz"]), *rest)

@@ -130,9 +130,8 @@ def _read_levels(file: Path) -> FloatArray:
 def _read_array(file: Path) -> Array:
     array = read_npy(file, LARGEST_FILE)
     if array.dtype not in (np.float32, np.float64):
-        raise InputError(
-            f"{file}: holds {array.dtype}; allowed: an array of float32 or float64 in display units [0, 1]"
-        )
+        kinds = "an array of float32 or float64 in display units [0, 1]"
+        raise InputError(f"{file}: holds {array.dtype}; allowed: {kinds}")
     if not np.isfinite(array).all():
         raise InputError(f"{file}: holds values that are not finite; allowed: display units [0, 1]")
     if array.size and np.abs(array).max() > LARGEST:

@@ -98,10 +98,8 @@ def load_slim_model(path: Path) -> SlimModel:
     if entries:
         raise InputError(f"{path}: {next(iter(entries))} is foreign to a slim model")
     spectral = spectral_from(config.model, np.array(record["times"], np.float64)[record["train_index"]])
-    return SlimModel(
-        Model(gaussians, spectral, config, integer(header["iteration"], f"{path}: header: iteration", low=0), frames),
-        record,
-    )
+    iteration = integer(header["iteration"], f"{path}: header: iteration", low=0)
+    return SlimModel(Model(gaussians, spectral, config, iteration, frames), record)
 
 
 def _record(record: Any, path: Path) -> dict[str, Any]:
