@@ -113,7 +113,7 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
     rows = max(1, BLOCK_PIXELS // camera.width)  # blocks of rows that stay in the processor's cache
     blocks = [
-        _see_rays(surface, camera, t, *np.meshgrid(ray_x, ray_y[top : top + rows]))
+        see_rays(surface, camera, t, *np.meshgrid(ray_x, ray_y[top : top + rows]))
         for top in range(0, camera.height, rows)
     ]
     view = View(*(np.concatenate(parts, axis=-2) for parts in zip(*blocks)))
@@ -123,7 +123,8 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     return view
 
 
-def _see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
+def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
+    """The view along chosen rays (ray_x, ray_y, 1) in camera axes, each array of one shape. Raises as `see` does."""
     a, b = _start(surface, camera, ray_x, ray_y)
     for _ in range(MOST_STEPS):
         point, along_a, along_b = _evaluate(surface, a, b, t)
