@@ -56,11 +56,12 @@ def test_positions_are_those_of_the_formula_and_project_to_the_pixels(scene):
 
 def test_a_point_is_visible_where_the_picture_shows_it(scene, centres):
     rows, columns = centres
-    beyond = np.array([[-900.0], [0.0]])
+    beyond = np.array([[-900.0, 900.0, 0.0, 0.0], [0.0, 0.0, -900.0, 900.0]])
     material = np.concatenate([material_at(scene, np.stack([columns + 0.5, rows + 0.5]), 3), beyond], axis=1)
     visible = material_tracks(scene, material).visible[3]
-    np.testing.assert_array_equal(visible[:-1], ~scene.truth.instrument[3][rows, columns])
-    assert not visible[-1] and 0 < visible[:-1].sum() < len(rows)
+    wound = np.isnan(scene.truth.material_coordinates[3]).any(axis=0)[rows, columns]
+    np.testing.assert_array_equal(visible[:-4], ~scene.truth.instrument[3][rows, columns] & ~wound)
+    assert not visible[-4:].any() and wound.any() and 0 < visible[:-4].sum() < len(rows)
 
 
 def test_without_motion_nothing_moves():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.simulate import SimulatedSequence
-from endotsr.simulator.surface import see_rays, to_camera
+from endotsr.simulator.views import see_rays, to_camera
 
 
 class MaterialTracks(NamedTuple):
@@ -30,7 +30,7 @@ def material_at(simulated: SimulatedSequence, pixel: FloatArray, frame: int = 0)
 
     pixel    (2, P) px, x first; the centre of the first pixel is (0.5, 0.5); positions outside the picture are allowed
     frame    index of the frame; frame 0 shows the tissue at rest
-    returns  (2, P) mm. Behind an instrument they are those of the hidden tissue.
+    returns  (2, P) mm. Behind an instrument they are those of the hidden tissue; NaN in the wound of a slit.
 
     Raises:  IndexError for a frame that the sequence does not have; InputError where the ray misses the tissue.
     """
@@ -40,7 +40,8 @@ def material_at(simulated: SimulatedSequence, pixel: FloatArray, frame: int = 0)
     camera = sequence.cameras[frame]
     x, y = np.asarray(pixel, float)
     ray_x, ray_y = (x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy
-    return see_rays(simulated.truth.surface, camera, float(sequence.times[frame]), ray_x, ray_y).material
+    view = see_rays(simulated.truth.surface, camera, float(sequence.times[frame]), ray_x, ray_y)
+    return view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
 
 
 def material_tracks(simulated: SimulatedSequence, material: FloatArray) -> MaterialTracks:
