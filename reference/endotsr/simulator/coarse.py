@@ -17,20 +17,22 @@ from endotsr.simulator.views import View, put, rotate, see_side, see_wound
 from endotsr.splatting.camera import Camera
 
 STEP = 4  # pixels between two nodes
+GEOMETRY = ("material", "point", "normal", "depth")
 
 
 def see_coarsely(surface: Surface, camera: Camera, t: float) -> View:
     """As `views.see`, good to a hundredth of a pixel. Raises InputError as `see_rays` does."""
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
-    rays = np.meshgrid(ray_x, ray_y)
+    x, y = np.meshgrid(ray_x, ray_y)
+    rays = (x, y)
     slit = surface.slit
     if slit is None or not is_open(slit, t):
         return _spread_view(surface, camera, t, rays, None)
     view = _spread_view(surface, camera, t, rays, 1.0)
     minus = _spread_view(surface, camera, t, rays, -1.0)
     missed = slit_coordinates(slit, *view.material)[1] < 0
-    put(view, missed, View(*(None if part is None else part[..., missed] for part in minus)))
+    put(view, missed, minus._replace(**{name: getattr(minus, name)[..., missed] for name in GEOMETRY}))
     gap = missed & (slit_coordinates(slit, *minus.material)[1] > 0)
     view = view._replace(wound=gap)
     if gap.any():
@@ -84,7 +86,9 @@ def _node_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
     return x, y
 
 
-def _spread_view(surface: Surface, camera: Camera, t: float, rays: list[FloatArray], side: float | None) -> View:
+def _spread_view(
+    surface: Surface, camera: Camera, t: float, rays: tuple[FloatArray, FloatArray], side: float | None
+) -> View:
     ray_x, ray_y = _node_rays(camera)
     sides = None if side is None else np.full_like(ray_x, side)
     coarse = see_side(surface, camera, t, ray_x, ray_y, sides)

@@ -59,6 +59,7 @@ class SimulatedFrame(NamedTuple):
     depth: FloatArray  # (H, W) true view-space z of the tissue, mm
     material: FloatArray  # (2, H, W) material point at the pixel centre, mm; NaN in the wound of a slit
     covered: BoolArray  # (H, W) pixels that an instrument covers, margin not included
+    excluded: BoolArray  # (H, W) the same with the margin
     highlight: FloatArray | None  # (H, W) linear light of the highlights on the tissue; None while they are off
 
 
@@ -98,12 +99,11 @@ def _frame(scene: Scene, left: Eye, right: Eye | None, i: int) -> SimulatedFrame
         light, _ = _light(scene, right, left.camera, draw(settings, t, shift), blocker, t)
         image_right = _picture(settings, light, RIGHT_NOISE, i)
     covered = np.zeros(view.depth.shape, bool) if tools is None else tools.coverage > 0
-    tissue = np.ones(view.depth.shape, bool) if tools is None else ~tools.excluded & ~covered
-    prior = _depth_prior(settings, view.depth, tissue, i)
-    if settings.stereo.on:
-        tissue = tissue & (prior > 0)
+    excluded = covered if tools is None else tools.excluded | covered
+    prior = _depth_prior(settings, view.depth, ~excluded, i)
+    tissue = ~excluded & (prior > 0) if settings.stereo.on else ~excluded
     material = view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
-    return SimulatedFrame(image, image_right, tissue, prior, view.depth, material, covered, highlight)
+    return SimulatedFrame(image, image_right, tissue, prior, view.depth, material, covered, excluded, highlight)
 
 
 def _light(

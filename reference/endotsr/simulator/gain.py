@@ -69,7 +69,9 @@ def gain_spectrum(gain: FloatArray) -> GainSpectrum:
     twice[0] = 1.0
     if n % 2 == 0:
         twice[-1] = 1.0  # the Nyquist cosine stands for itself
-    return GainSpectrum(np.arange(len(transform)), twice[:, None] * transform.real, -twice[:, None] * transform.imag)
+    return GainSpectrum(
+        np.arange(len(transform)) + 0.0, twice[:, None] * transform.real, -twice[:, None] * transform.imag
+    )
 
 
 def to_display(light: FloatArray) -> FloatArray:

@@ -22,6 +22,9 @@ Weight = Callable[
     [FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
 ]  # (a, b) -> weight, its derivatives by a and b
 
+PULSATION_CENTRE = (-0.2, 0.1)  # of the regions that beat and are pulled, distances of the camera
+PULL_CENTRE = (0.06, 0.04)
+
 
 class Motion(NamedTuple):
     """One term s(t) w(a, b) v."""
@@ -123,7 +126,7 @@ def _breathing(settings: SimulatorSettings) -> Motion:
 
 def _pulsation(settings: SimulatorSettings) -> Motion:
     part = settings.pulsation
-    centre = (-0.2 * settings.distance, 0.1 * settings.distance)
+    centre = (PULSATION_CENTRE[0] * settings.distance, PULSATION_CENTRE[1] * settings.distance)
     direction = np.array([0.5, 0.2, -0.84])
     course = lambda t: (
         part.amplitude * (np.sin(2 * np.pi * part.cycles * t) + 0.4 * np.sin(4 * np.pi * part.cycles * t))
@@ -133,7 +136,7 @@ def _pulsation(settings: SimulatorSettings) -> Motion:
 
 def _pull(settings: SimulatorSettings) -> Motion:
     part = settings.pull
-    centre = (0.06 * settings.distance, 0.04 * settings.distance)
+    centre = (PULL_CENTRE[0] * settings.distance, PULL_CENTRE[1] * settings.distance)
     direction = np.array([0.75, 0.3, -0.59])
 
     def course(t: float) -> float:

@@ -34,8 +34,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     """The texture of the part of the sheet that the camera can see, with a margin for motion."""
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
-    half_a = 0.5 * settings.width * pixel * 1.2 + 8.0
-    half_b = 0.5 * settings.height * pixel * 1.2 + 8.0
+    half_a, half_b = half_extent(settings)
     # linspace: the ends, and with them all random draws, are the same for every image size
     a = np.linspace(-half_a, half_a, round(2 * half_a / step) + 1)
     b = np.linspace(-half_b, half_b, round(2 * half_b / step) + 1)
@@ -44,6 +43,12 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     slope_a, slope_b = _fine_relief(a, b, rng)
     values = np.concatenate([colour, slope_a[None], slope_b[None]]).astype(np.float32)
     return Texture(values, (float(a[0]), float(b[0])), (float(a[1] - a[0]), float(b[1] - b[0])))
+
+
+def half_extent(settings: SimulatorSettings) -> tuple[float, float]:
+    """The texture reaches this far to each side of the middle, along a and b, mm."""
+    pixel = settings.distance / (settings.focal * settings.width)
+    return 0.5 * settings.width * pixel * 1.2 + 8.0, 0.5 * settings.height * pixel * 1.2 + 8.0
 
 
 def sample(texture: Texture, material: FloatArray) -> FloatArray:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.simulate import SimulatedSequence
+from endotsr.simulator.surface import Surface, surface_point
 from endotsr.simulator.views import see_rays, to_camera
+from endotsr.splatting.camera import Camera
 
 
 class MaterialTracks(NamedTuple):
@@ -49,20 +51,32 @@ def material_tracks(simulated: SimulatedSequence, material: FloatArray) -> Mater
 
     Edges:   no point gives arrays without points. A point behind the camera is not visible, and its pixel is NaN.
     """
-    sequence = simulated.sequence
+    sequence, truth = simulated.sequence, simulated.truth
+    tracks = empty_tracks(material, sequence.count)
+    for i, (camera, t) in enumerate(zip(sequence.cameras, sequence.times)):
+        follow(tracks, i, truth.surface, camera, float(t), truth.instrument[i])
+    return tracks
+
+
+def empty_tracks(material: FloatArray, count: int) -> MaterialTracks:
+    """Tracks of material points (2, P) over `count` frames, to be filled by `follow`."""
     material = np.asarray(material, float)
-    n, points = sequence.count, material.shape[1]
-    tracks = MaterialTracks(
+    n, points = count, material.shape[1]
+    return MaterialTracks(
         material, np.empty((n, 3, points)), np.empty((n, 2, points)), np.empty((n, points)), np.empty((n, points), bool)
     )
-    for i, (camera, t) in enumerate(zip(sequence.cameras, sequence.times)):
-        tracks.position[i] = simulated.surface_point(material, float(t))
-        x, y, z = to_camera(camera, tracks.position[i])
-        in_front = np.where(z > 0, z, np.nan)
-        tracks.pixel[i] = camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy
-        tracks.depth[i] = z
-        tracks.visible[i] = _visible(tracks.pixel[i], simulated.truth.instrument[i])
-    return tracks
+
+
+def follow(
+    tracks: MaterialTracks, i: int, surface: Surface, camera: Camera, t: float, covered: NDArray[np.bool_]
+) -> None:
+    """Fill frame i of the tracks. covered (H, W): the pixels that an instrument covers."""
+    tracks.position[i] = surface_point(surface, tracks.material, t)
+    x, y, z = to_camera(camera, tracks.position[i])
+    in_front = np.where(z > 0, z, np.nan)
+    tracks.pixel[i] = camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy
+    tracks.depth[i] = z
+    tracks.visible[i] = _visible(tracks.pixel[i], covered)
 
 
 def _visible(pixel: FloatArray, covered: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -49,7 +49,9 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
         see_rays(surface, camera, t, *np.meshgrid(ray_x, ray_y[top : top + rows]))
         for top in range(0, camera.height, rows)
     ]
-    view = View(*(None if parts[0] is None else np.concatenate(parts, axis=-2) for parts in zip(*blocks)))
+    material, point, normal, depth = (np.concatenate(parts, axis=-2) for parts in list(zip(*blocks))[:4])
+    wounds = [block.wound for block in blocks if block.wound is not None]
+    view = View(material, point, normal, depth, np.concatenate(wounds) if wounds else None)
     a, b = view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
     if np.nanmin(np.diff(a, axis=1)) <= 0 or np.nanmin(np.diff(b, axis=0)) <= 0:
         raise InputError(f"simulator: at t = {t:g} the sheet folds over itself: motion or relief is too strong")
@@ -123,6 +125,15 @@ def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
     if gap.any():
         put(view, gap, see_wound(surface, camera, t, ray_x[gap], ray_y[gap]))
     return view
+
+
+def view_of_points(surface: Surface, camera: Camera, material: FloatArray, t: float) -> View:
+    """The view of given material points (2, P), as a picture of one row, whether or not the camera sees them."""
+    a, b = material[:, None]
+    point, along_a, along_b = evaluate(surface, a, b, t)
+    normal = np.stack(_cross(along_b, along_a))
+    normal /= np.sqrt((normal**2).sum(axis=0))
+    return View(material[:, None], point, normal, to_camera(camera, point)[2])
 
 
 def put(view: View, where: BoolArray, other: View) -> None:
