@@ -23,7 +23,8 @@ from endotsr.simulator.texture import half_extent
 from endotsr.simulator.views import see_rays, to_camera
 
 GRID = (24, 20)  # rays across and down the picture
-HALVINGS = 20  # of the interval that holds the largest allowed value
+SMALLEST = 1e-6  # a size at which an effect has no extent
+HALVINGS = 16  # of the interval that holds the largest allowed value
 
 Fits = Callable[[SimulatorSettings], bool]
 Points = Callable[[SimulatorSettings], FloatArray]
@@ -31,20 +32,35 @@ Points = Callable[[SimulatorSettings], FloatArray]
 
 def check_field_of_view(settings: SimulatorSettings) -> None:
     """Raises InputError if an effect leaves the picture, or if the camera sees beyond the simulated tissue."""
-    for section, (key, points) in ABOUT.items():
-        if getattr(settings, section).on and not _points_fit(settings, points):
-            raise _refusal(settings, section, key, partial(_points_fit, points=points))
-    if not _wrists_fit(settings):
-        raise _refusal(settings, "instrument", "travel", _wrists_fit)
-    if not _tissue_fits(settings):
-        moving = [name for name in ("camera_motion", "pull", "breathing", "pulsation") if getattr(settings, name).on]
-        for section in moving:
-            if _tissue_fits(_changed(settings, section, "amplitude", 0.0)):
-                raise _refusal(settings, section, "amplitude", _tissue_fits)
-        raise InputError(
-            f"simulator: the camera sees beyond the simulated tissue; allowed: smaller amplitudes of"
-            f" {', '.join(moving) or 'relief'}"
-        )
+    for fits, sizes in _requirements(settings):
+        _require(fits, settings, sizes)
+
+
+def _requirements(settings: SimulatorSettings) -> list[tuple[Fits, list[tuple[str, str]]]]:
+    """What has to fit, and the sizes (section, key) that may be the reason why it does not."""
+    moving = [(name, "amplitude") for name in ("camera_motion", "pull", "pulsation", "breathing")]
+    effects = [
+        (partial(_points_fit, points=points), [(section, key), *moving])
+        for section, (key, points) in ABOUT.items()
+        if getattr(settings, section).on
+    ]
+    return [*effects, (_wrists_fit, [("instrument", "travel")]), (_tissue_fits, moving)]
+
+
+def _all_fit(settings: SimulatorSettings) -> bool:
+    return all(fits(settings) for fits, _ in _requirements(settings))
+
+
+def _require(fits: Fits, settings: SimulatorSettings, sizes: list[tuple[str, str]]) -> None:
+    """Raises InputError if the settings do not fit, for the first of the sizes (section, key) without which they do."""
+    if fits(settings):
+        return
+    for section, key in sizes:
+        without = _changed(settings, section, key, SMALLEST)
+        if fits(without):
+            raise _refusal(settings, section, key, _all_fit if _all_fit(without) else fits)
+    tried = ", ".join(f"{section}.{key}" for section, key in sizes)
+    raise InputError(f"simulator: the scene leaves the field of view; allowed: a smaller focal, or smaller {tried}")
 
 
 def _slit_ends(settings: SimulatorSettings) -> FloatArray:
@@ -111,11 +127,9 @@ def _changed(settings: SimulatorSettings, section: str, key: str, value: float) 
 def _refusal(settings: SimulatorSettings, section: str, key: str, fits: Fits) -> InputError:
     """The error that names the setting, its value and, found by halving, the largest value that fits."""
     value = getattr(getattr(settings, section), key)
-    low, high = 0.0, value
+    low, high = SMALLEST, value
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if fits(_changed(settings, section, key, middle)) else (low, middle)
-    allowed = (
-        f"at most {np.floor(low * 100) / 100:g}" if low > 0.01 else "a smaller distance of its place to the middle"
-    )
-    return InputError(f"simulator: {section}.{key} = {value:g} leaves the field of view; allowed: {allowed}")
+    largest = np.floor(low * 100) / 100
+    return InputError(f"simulator: {section}.{key} = {value:g} leaves the field of view; allowed: at most {largest:g}")
