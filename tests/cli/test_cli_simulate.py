@@ -1,11 +1,11 @@
 """`endotsr simulate`: a folder that `train` reads, and refusals of one line that leave nothing behind."""
 
 import pytest
+from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
 from endotsr.simulator.scenes import IN_FILES
 from endotsr.simulator.truth import read_truth
-from tiny import SETTINGS, assert_refused
 
 SMALL = ["--width", "40", "--height", "32", "--frames", "4", "--focal", "1.5"]
 
@@ -47,7 +47,7 @@ def test_a_list_of_effects_is_a_scene_too(tmp_path):
     ],
 )
 def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named):
-    assert_refused(capsys, ["simulate", *words, "--out", str(tmp_path / "out")], *named)
+    assert_refused(capsys, ["simulate", *SMALL, *words, "--out", str(tmp_path / "out")], *named)
     assert list(tmp_path.iterdir()) == []
 
 

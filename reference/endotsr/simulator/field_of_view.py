@@ -22,7 +22,7 @@ from endotsr.simulator.surface import PULL_CENTRE, PULSATION_CENTRE, make_surfac
 from endotsr.simulator.texture import half_extent
 from endotsr.simulator.views import see_rays, to_camera
 
-GRID = (24, 20)  # rays across and down the picture
+GRID = (9, 8)  # rays across and down the picture
 SMALLEST = 1e-6  # a size at which an effect has no extent
 HALVINGS = 16  # of the interval that holds the largest allowed value
 
