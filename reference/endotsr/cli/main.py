@@ -19,6 +19,7 @@ from endotsr.untrusted.names import plain_line
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "train": "train on an EndoNeRF folder, or on a simulated sequence",
+    "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render pictures and films at any time in [0, 1], from any camera",
     "view": "write a page with the moving scene, which opens in any browser without a network",

@@ -2,5 +2,16 @@
 
 from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
 from endotsr.simulator.simulate import SimulatedSequence, Truth, simulate
+from endotsr.simulator.trajectories import MaterialTracks, material_at, material_tracks
 
-__all__ = ["EFFECTS", "SimulatedSequence", "SimulatorSettings", "Truth", "simulate", "with_effects"]
+__all__ = [
+    "EFFECTS",
+    "MaterialTracks",
+    "SimulatedSequence",
+    "SimulatorSettings",
+    "Truth",
+    "material_at",
+    "material_tracks",
+    "simulate",
+    "with_effects",
+]

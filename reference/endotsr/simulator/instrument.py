@@ -1,63 +1,144 @@
-"""A grasper between camera and tissue, drawn in the image plane: shaft, wrist and two jaws.
+"""Graspers between camera and tissue, drawn in the image plane: shaft, wrist and two jaws.
 
-In: settings, image size, time. Out: its linear light, its coverage and the pixels that the mask excludes.
+In: settings, image size, time. Out: their linear light, their coverage and the pixels that the mask excludes.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.simulator.blur import moments, open_span
 from endotsr.simulator.settings import SimulatorSettings
 
-ENTRY = np.array([1.12, 0.78])  # where the shaft leaves the picture, image widths
-HOME = np.array([0.70, 0.52])  # middle of the path of the wrist
 SHAFT, WRIST, JAW = 0.042, 0.036, 0.017  # half widths, image widths
 JAW_LENGTH = 0.105
 METAL = np.array([0.42, 0.43, 0.45])  # linear light
 SLEEVE = np.array([0.045, 0.045, 0.05])
 
 
+class Grasper(NamedTuple):
+    """The path of one instrument, image widths of a picture whose height is 0.8 of its width."""
+
+    entry: FloatArray  # where the shaft leaves the picture
+    home: FloatArray  # the wrist, at t = 0
+    phase: float  # of its circular path, radians
+
+
+FIRST = Grasper(np.array([1.12, 0.78]), np.array([0.70, 0.52]), 0.0)
+FURTHER = (
+    Grasper(np.array([-0.12, 0.74]), np.array([0.27, 0.60]), 2.1),
+    Grasper(np.array([0.86, -0.12]), np.array([0.78, 0.17]), 4.0),
+)
+
+
 class Drawing(NamedTuple):
-    """The instrument in one frame."""
+    """Instruments in one frame."""
 
     light: FloatArray  # (3, H, W) linear RGB
     coverage: FloatArray  # (H, W)    0 .. 1, smooth over one pixel at the outline
-    excluded: NDArray[np.bool_]  # (H, W) instrument and margin
+    excluded: BoolArray  # (H, W) instrument and margin
 
 
-def draw(settings: SimulatorSettings, t: float) -> Drawing:
-    """The instrument at time t."""
+def graspers(settings: SimulatorSettings) -> tuple[Grasper, ...]:
+    """The instruments that are switched on."""
+    first = (FIRST,) if settings.instrument.on else ()
+    return first + (FURTHER[: settings.more_instruments.count] if settings.more_instruments.on else ())
+
+
+def draw(settings: SimulatorSettings, t: float, shift: float = 0.0) -> Drawing | None:
+    """All instruments at time t, over one another and blurred by their motion; None without one.
+
+    shift    to the right, image widths: the view of another camera
+    """
+    together: Drawing | None = None
+    for grasper in graspers(settings):
+        one = _blurred(settings, grasper, t, shift)
+        together = one if together is None else _over(one, together)
+    return together
+
+
+def wrist_at(settings: SimulatorSettings, grasper: Grasper, t: float) -> FloatArray:
+    """The wrist of an instrument at time t, image widths, x first."""
     part = settings.instrument
-    angle = 2 * np.pi * part.cycles * t
+    angle = 2 * np.pi * part.cycles * t + grasper.phase
+    turned = np.array([np.cos(angle) - np.cos(grasper.phase), 0.6 * (np.sin(angle) - np.sin(grasper.phase))])
+    return grasper.home * _aspect(settings) + part.travel * turned
+
+
+def _aspect(settings: SimulatorSettings) -> FloatArray:
+    """From a picture whose height is 0.8 of its width to this one."""
     scale = np.array([1.0, settings.height / settings.width])
-    wrist = HOME * [1.0, scale[1] / 0.8] + part.travel * np.array([np.cos(angle) - 1.0, 0.6 * np.sin(angle)])
-    entry = ENTRY * [1.0, scale[1] / 0.8]
+    return np.array([1.0, scale[1] / 0.8])
+
+
+def _blurred(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
+    """One instrument, as the mean over the exposure."""
+    if open_span(settings) == 0.0:
+        return _draw_one(settings, grasper, t, shift)
+    parts = [_draw_one(settings, grasper, t + moment, shift) for moment in moments(settings)]
+    coverage = np.asarray(sum(part.coverage for part in parts)) / len(parts)
+    light = np.asarray(sum(part.light * part.coverage for part in parts)) / len(parts)
+    excluded = np.logical_or.reduce([part.excluded for part in parts])
+    return Drawing(_unmixed(light, coverage), coverage, excluded)
+
+
+def _over(front: Drawing, behind: Drawing) -> Drawing:
+    """One drawing in front of another."""
+    rest = behind.coverage * (1 - front.coverage)
+    coverage = front.coverage + rest
+    light = front.light * front.coverage + behind.light * rest
+    return Drawing(_unmixed(light, coverage), coverage, front.excluded | behind.excluded)
+
+
+def _unmixed(light: FloatArray, coverage: FloatArray) -> FloatArray:
+    """Of a partly covered pixel, the light of the instrument alone; the coverage blends it with the tissue."""
+    return np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
+
+
+def _draw_one(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
+    """One instrument at one moment. Only the part of the picture around it is computed."""
+    part = settings.instrument
+    angle = 2 * np.pi * part.cycles * t + grasper.phase
+    wrist = wrist_at(settings, grasper, t) + [shift, 0.0]
+    entry = grasper.entry * _aspect(settings) + [shift, 0.0]
     along = (wrist - entry) / np.linalg.norm(wrist - entry)
     open_angle = 0.28 + 0.14 * np.cos(angle)
-    x, y = np.meshgrid(
-        (np.arange(settings.width) + 0.5) / settings.width, (np.arange(settings.height) + 0.5) / settings.width
-    )
     grip = wrist + along * 0.05
-    parts = [
-        (_segment(x, y, entry, wrist - along * 0.07), SHAFT, SLEEVE),
-        (_segment(x, y, wrist - along * 0.07, grip), WRIST, METAL),
-        (_segment(x, y, grip, grip + JAW_LENGTH * _turned(along, open_angle)), JAW, METAL * 1.1),
-        (_segment(x, y, grip, grip + JAW_LENGTH * _turned(along, -open_angle)), JAW, METAL * 0.9),
+    tips = [grip + JAW_LENGTH * _turned(along, side * open_angle) for side in (1, -1)]
+    segments = [
+        (entry, wrist - along * 0.07, SHAFT, SLEEVE),
+        (wrist - along * 0.07, grip, WRIST, METAL),
+        (grip, tips[0], JAW, METAL * 1.1),
+        (grip, tips[1], JAW, METAL * 0.9),
     ]
     pixel = 1.0 / settings.width
-    light = np.zeros((3, settings.height, settings.width))
-    coverage = np.zeros((settings.height, settings.width))
+    box = _box(settings, np.stack([entry, wrist, *tips]), SHAFT + part.margin + 3 * pixel)
+    x, y = np.meshgrid(
+        ((np.arange(settings.width) + 0.5) / settings.width)[box[1]],
+        ((np.arange(settings.height) + 0.5) / settings.width)[box[0]],
+    )
+    light, coverage = np.zeros((3, *x.shape)), np.zeros(x.shape)
     outline = np.full_like(coverage, np.inf)
-    for (distance, side), half_width, colour in parts:
+    for start, end, half_width, colour in segments:
+        distance, side = _segment(x, y, start, end)
         cover = np.clip(0.5 - (distance - half_width) / pixel, 0.0, 1.0)
         light = light * (1 - cover) + colour[:, None, None] * (_sheen(side / half_width) * cover)
         coverage = cover + coverage * (1 - cover)
         outline = np.minimum(outline, distance - half_width)
-    # a partly covered pixel has the light of the instrument alone; the coverage blends it with the tissue
-    light = np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
-    return Drawing(light, coverage, outline < part.margin + pixel)
+    whole = (settings.height, settings.width)
+    drawing = Drawing(np.zeros((3, *whole)), np.zeros(whole), np.zeros(whole, bool))
+    drawing.light[:, *box], drawing.coverage[box] = _unmixed(light, coverage), coverage
+    drawing.excluded[box] = outline < part.margin + pixel
+    return drawing
+
+
+def _box(settings: SimulatorSettings, points: FloatArray, border: float) -> tuple[slice, slice]:
+    """Rows and columns of the picture around points (P, 2), image widths, with a border."""
+    low = np.floor((points.min(axis=0) - border) * settings.width).astype(int)
+    high = np.ceil((points.max(axis=0) + border) * settings.width).astype(int)
+    (left, top), (right, bottom) = np.maximum(low, 0), np.maximum(high, 0)
+    return slice(int(top), int(bottom)), slice(int(left), int(right))
 
 
 def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""Settings of the simulator: the scene, and one section with a switch for every effect.
+"""Settings of the simulator: the scene, and one section with a switch for every effect (sections.py).
 
 Lengths are in millimetres, times in cycles per sequence (the unit of the model's frequencies; t = i / n). An effect
 that is off is exactly absent: no part of it is computed, and no random number is drawn for it.
@@ -8,128 +8,34 @@ from typing import Annotated
 
 import msgspec
 
-from endotsr.config import Count, Fraction, NonNegative, Positive, Section
+from endotsr.config import Count, NonNegative, Positive, Section
+from endotsr.errors import InputError
+from endotsr.simulator.sections import (
+    AutoExposure,
+    Bleeding,
+    Breathing,
+    Brightening,
+    CameraMotion,
+    Cutting,
+    DepthErrors,
+    DepthRounding,
+    Exposure,
+    Highlights,
+    Instrument,
+    MoreInstruments,
+    MotionBlur,
+    Noise,
+    Pull,
+    Pulsation,
+    SecondLight,
+    Shadows,
+    Smoke,
+    Stereo,
+    Vignetting,
+)
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]
-
-
-class Breathing(Section, frozen=True, kw_only=True):
-    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
-
-    on: bool = True
-    """switch"""
-    amplitude: NonNegative = 2.5
-    """largest displacement, mm"""
-    cycles: Positive = 1.5
-    """breaths per sequence"""
-
-
-class Pulsation(Section, frozen=True, kw_only=True):
-    """A round region beats; the beat has two harmonics."""
-
-    on: bool = True
-    """switch"""
-    amplitude: NonNegative = 0.7
-    """scale of the displacement, mm (the beat reaches 1.2 times this)"""
-    cycles: Positive = 5.0
-    """beats per sequence"""
-    width: Positive = 9.0
-    """Gaussian radius of the region, mm"""
-
-
-class Pull(Section, frozen=True, kw_only=True):
-    """A spot is pulled sideways and towards the camera, held, and released."""
-
-    on: bool = True
-    """switch"""
-    amplitude: NonNegative = 5.0
-    """displacement of the spot while it is held, mm"""
-    width: Positive = 11.0
-    """Gaussian radius of the tissue that moves along, mm"""
-    start: Fraction = 0.15
-    """normalised time at which the pull begins"""
-    stop: Fraction = 0.9
-    """normalised time at which the tissue is back"""
-
-
-class Exposure(Section, frozen=True, kw_only=True):
-    """The gain of the camera drifts, red and blue slightly apart (white balance)."""
-
-    on: bool = True
-    """switch"""
-    amplitude: Fraction = 0.15
-    """relative change of the gain, linear light"""
-    cycles: Positive = 1.0
-    """cycles per sequence"""
-
-
-class Brightening(Section, frozen=True, kw_only=True):
-    """A region of the tissue itself grows paler and recovers (as under pressure)."""
-
-    on: bool = True
-    """switch"""
-    amplitude: NonNegative = 0.6
-    """relative change at its centre, linear light"""
-    cycles: Positive = 2.0
-    """cycles per sequence"""
-    width: Positive = 8.0
-    """Gaussian radius, mm"""
-
-
-class Highlights(Section, frozen=True, kw_only=True):
-    """Mirror reflections of the light on the wet surface."""
-
-    on: bool = True
-    """switch"""
-    strength: NonNegative = 1.0
-    """brightness, linear light"""
-    exponent: Positive = 150.0
-    """sharpness"""
-
-
-class Instrument(Section, frozen=True, kw_only=True):
-    """A grasper in front of the tissue. It is drawn; the mask and the prior depth exclude its pixels."""
-
-    on: bool = True
-    """switch"""
-    travel: NonNegative = 0.06
-    """radius of the path of its tip, image widths"""
-    cycles: Positive = 1.0
-    """cycles per sequence"""
-    margin: NonNegative = 0.006
-    """width of the masked border around the drawn instrument, image widths"""
-
-
-class CameraMotion(Section, frozen=True, kw_only=True):
-    """The camera swings around the middle of the tissue; off = one Camera object for all frames."""
-
-    on: bool = False
-    """switch"""
-    amplitude: NonNegative = 3.0
-    """largest sideways shift of the camera, mm"""
-    cycles: Positive = 1.0
-    """cycles per sequence"""
-
-
-class Noise(Section, frozen=True, kw_only=True):
-    """Sensor noise in the picture."""
-
-    on: bool = True
-    """switch"""
-    sigma: NonNegative = 0.01
-    """standard deviation, display units [0, 1]"""
-
-
-class DepthErrors(Section, frozen=True, kw_only=True):
-    """Errors of stereo matching in the prior depth. The true depth is stored separately and stays exact."""
-
-    on: bool = False
-    """switch"""
-    sigma: NonNegative = 0.5
-    """standard deviation, mm"""
-    strip: Fraction = 0.07
-    """columns without depth at the left, image widths"""
 
 
 class SimulatorSettings(Section, frozen=True, kw_only=True):
@@ -161,6 +67,17 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     camera_motion: CameraMotion = CameraMotion()
     noise: Noise = Noise()
     depth_errors: DepthErrors = DepthErrors()
+    cutting: Cutting = Cutting()
+    bleeding: Bleeding = Bleeding()
+    second_light: SecondLight = SecondLight()
+    more_instruments: MoreInstruments = MoreInstruments()
+    shadows: Shadows = Shadows()
+    smoke: Smoke = Smoke()
+    vignetting: Vignetting = Vignetting()
+    auto_exposure: AutoExposure = AutoExposure()
+    motion_blur: MotionBlur = MotionBlur()
+    stereo: Stereo = Stereo()
+    depth_rounding: DepthRounding = DepthRounding()
 
 
 EFFECTS = (
@@ -174,16 +91,27 @@ EFFECTS = (
     "camera_motion",
     "noise",
     "depth_errors",
+    "cutting",
+    "bleeding",
+    "second_light",
+    "more_instruments",
+    "shadows",
+    "smoke",
+    "vignetting",
+    "auto_exposure",
+    "motion_blur",
+    "stereo",
+    "depth_rounding",
 )
 
 
 def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
     """The same settings with exactly the named effects on and all others off.
 
-    Raises:  ValueError for a name that is not in EFFECTS.
+    Raises:  InputError for a name that is not in EFFECTS.
     """
     unknown = set(names) - set(EFFECTS)
     if unknown:
-        raise ValueError(f"unknown effects {sorted(unknown)}; allowed: {', '.join(EFFECTS)}")
+        raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; allowed: {', '.join(EFFECTS)}")
     sections = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
     return msgspec.structs.replace(settings, **sections)

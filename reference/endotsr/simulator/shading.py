@@ -1,62 +1,63 @@
-"""From geometry and reflectance to linear light: a point light at the camera, fall-off with distance, highlights.
+"""From geometry and reflectance to linear light: lamps with fall-off, brightening tissue, blood, the wound, highlights.
 
-In: a `View` of the sheet, its texture, the camera, the time. Out: linear RGB, which `to_display` encodes for display.
+In: a `View` of the sheet, its texture, the lamps on it, the time. Out: linear RGB light from the tissue.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.bleeding import with_blood
+from endotsr.simulator.lamps import Blocker, Lit, lit_by_endoscope, lit_by_second, mirrored
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.surface import View, gaussian_weight
+from endotsr.simulator.surface import gaussian_weight
 from endotsr.simulator.texture import Texture, sample
-from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.simulator.views import View
+from endotsr.splatting.camera import Camera
 
-GAIN = 0.95  # linear light of a reflectance of 1, perpendicular to the view, at the scene's distance
-WRAP = 0.15  # light scattered inside the tissue softens the shading
-BEAM = 3.0  # exponent of the lamp's fall-off towards the edge of its cone
-GAMMA = 2.2
+WOUND = np.array([0.30, 0.020, 0.018])  # linear reflectance of tissue that was inside
 
 
-def shade(settings: SimulatorSettings, texture: Texture, view: View, camera: Camera, t: float) -> FloatArray:
-    """Linear light (3, H, W) from the tissue, before exposure.
+class TissueLight(NamedTuple):
+    """Linear light from the tissue."""
 
-    reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.l)^exponent with the same
-    fall-off, where l points to the lamp at the camera, r is its distance and n' is the normal of the fine relief.
+    light: FloatArray  # (3, H, W) highlights included
+    highlight: FloatArray | None  # (H, W) the highlights alone, white; None while they are off
+
+
+def lit_by_all(
+    settings: SimulatorSettings, view: View, camera: Camera, blocker: Blocker | None = None, eye: Camera | None = None
+) -> list[Lit]:
+    """The lamps that are on, the one at the camera first. `eye` is the camera of the view if it is another one."""
+    lamps = [lit_by_endoscope(settings, view, camera, blocker, eye)]
+    if settings.second_light.on:
+        lamps.append(lit_by_second(settings, view, blocker, eye or camera))
+    return lamps
+
+
+def shade(settings: SimulatorSettings, texture: Texture, view: View, lamps: list[Lit], t: float) -> TissueLight:
+    """Linear light from the tissue, before exposure.
+
+    reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.half)^exponent with the same
+    fall-off, where l points to a lamp, r is its distance, half lies half-way between lamp and camera, and n' is the
+    normal of the fine relief; summed over the lamps.
     """
     maps = sample(texture, view.material)
-    towards = camera_centre(camera)[:, None, None] - view.point
-    r = np.sqrt((towards**2).sum(axis=0))
-    towards /= r
-    cosine = (view.normal * towards).sum(axis=0)
-    axis = view.depth / r  # cosine of the angle to the optical axis
-    received = GAIN * (settings.distance / r) ** 2 * axis**BEAM
-    light = maps[:3] * (received * np.maximum(cosine + WRAP, 0.0) / (1 + WRAP))
+    reflectance = maps[:3]
+    if view.wound is not None:
+        reflectance = np.where(view.wound, WOUND[:, None, None], reflectance)
+    if settings.bleeding.on:
+        reflectance = with_blood(settings, reflectance, view.material, t)
+    light = reflectance * (lamps[0].diffuse if len(lamps) == 1 else lamps[0].diffuse + lamps[1].diffuse)
     if settings.brightening.on:
         light = light * _brightening(settings, view.material, t)
-    if settings.highlights.on:
-        bent = view.normal.copy()
-        bent[0] += maps[3]
-        bent[1] += maps[4]
-        bent /= np.sqrt((bent**2).sum(axis=0))
-        mirror = np.maximum((bent * towards).sum(axis=0), 0.0) ** settings.highlights.exponent
-        light = light + settings.highlights.strength * received * mirror
-    return light
-
-
-def exposure_gain(settings: SimulatorSettings, t: float) -> FloatArray:
-    """Gain of the three channels at time t, (3,); exactly 1 while the effect is off."""
-    part = settings.exposure
-    if not part.on:
-        return np.ones(3)
-    angle = 2 * np.pi * part.cycles * t
-    return 1 + part.amplitude * np.array(
-        [np.sin(angle), 0.85 * np.sin(angle), 0.85 * np.sin(angle) + 0.3 * np.sin(angle / 2)]
-    )
-
-
-def to_display(light: FloatArray) -> FloatArray:
-    """Linear light to display values in [0, 1]: clipped at 1, then raised to the power 1/2.2."""
-    return np.clip(light, 0.0, 1.0) ** (1 / GAMMA)
+    if not settings.highlights.on:
+        return TissueLight(light, None)
+    highlight = mirrored(settings, lamps[0], view.normal, maps[3:])
+    for lamp in lamps[1:]:
+        highlight = highlight + mirrored(settings, lamp, view.normal, maps[3:])
+    return TissueLight(light + highlight, highlight)
 
 
 def _brightening(settings: SimulatorSettings, material: FloatArray, t: float) -> FloatArray:

@@ -18,6 +18,7 @@ FAT = np.array([0.85, 0.62, 0.28])
 ARTERY = np.array([0.42, 0.03, 0.03])
 VEIN = np.array([0.26, 0.05, 0.10])
 FINEST_STEP = 0.08  # mm; half the radius of the thinnest vessel
+BLOCK_ROWS = 32
 SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit normals, two dimensions
 
 
@@ -33,8 +34,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     """The texture of the part of the sheet that the camera can see, with a margin for motion."""
     pixel = settings.distance / (settings.focal * settings.width)
     step = max(0.5 * pixel, FINEST_STEP)
-    half_a = 0.5 * settings.width * pixel * 1.2 + 8.0
-    half_b = 0.5 * settings.height * pixel * 1.2 + 8.0
+    half_a, half_b = half_extent(settings)
     # linspace: the ends, and with them all random draws, are the same for every image size
     a = np.linspace(-half_a, half_a, round(2 * half_a / step) + 1)
     b = np.linspace(-half_b, half_b, round(2 * half_b / step) + 1)
@@ -45,18 +45,33 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     return Texture(values, (float(a[0]), float(b[0])), (float(a[1] - a[0]), float(b[1] - b[0])))
 
 
+def half_extent(settings: SimulatorSettings) -> tuple[float, float]:
+    """The texture reaches this far to each side of the middle, along a and b, mm."""
+    pixel = settings.distance / (settings.focal * settings.width)
+    return 0.5 * settings.width * pixel * 1.2 + 8.0, 0.5 * settings.height * pixel * 1.2 + 8.0
+
+
 def sample(texture: Texture, material: FloatArray) -> FloatArray:
     """All five maps at material coordinates (2, H, W): (5, H, W) float64."""
+    found = np.empty((5, *material.shape[1:]))
+    for top in range(0, material.shape[1], BLOCK_ROWS):  # rows that stay in the processor's cache
+        found[:, top : top + BLOCK_ROWS] = _sample_rows(texture, material[:, top : top + BLOCK_ROWS])
+    return found
+
+
+def _sample_rows(texture: Texture, material: FloatArray) -> list[FloatArray]:
     rows, columns = texture.values.shape[1:]
     x = np.clip((material[0] - texture.origin[0]) / texture.step[0], 0, columns - 1.001)
     y = np.clip((material[1] - texture.origin[1]) / texture.step[1], 0, rows - 1.001)
     left, top = x.astype(np.intp), y.astype(np.intp)
     across, down = x - left, y - top
-    flat = texture.values.reshape(5, -1)
-    corner = top * columns + left
-    upper = flat[:, corner] * (1 - across) + flat[:, corner + 1] * across
-    lower = flat[:, corner + columns] * (1 - across) + flat[:, corner + columns + 1] * across
-    return upper * (1 - down) + lower * down
+    near_a, near_b, corner = 1 - across, 1 - down, top * columns + left
+    found = []
+    for texels in texture.values.reshape(5, -1):
+        upper = texels.take(corner) * near_a + texels.take(corner + 1) * across
+        lower = texels.take(corner + columns) * near_a + texels.take(corner + columns + 1) * across
+        found.append(upper * near_b + lower * down)
+    return found
 
 
 def _colour(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -85,7 +100,7 @@ def _fine_relief(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> tupl
 
 def _field(a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float) -> FloatArray:
     """A smooth random field (rows, columns) of deviation about 1 with features of `spacing` mm."""
-    over_a, over_b = _spline_basis(a, spacing)[0], _spline_basis(b, spacing)[0]
+    over_a, over_b = spline_basis(a, spacing)[0], spline_basis(b, spacing)[0]
     return over_b @ _lattice(rng, over_a, over_b) @ over_a.T
 
 
@@ -93,8 +108,8 @@ def _field_slopes(
     a: FloatArray, b: FloatArray, rng: np.random.Generator, spacing: float
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives of such a field by a and by b, per mm."""
-    over_a, slope_a = _spline_basis(a, spacing)
-    over_b, slope_b = _spline_basis(b, spacing)
+    over_a, slope_a = spline_basis(a, spacing)
+    over_b, slope_b = spline_basis(b, spacing)
     lattice = _lattice(rng, over_a, over_b)
     return over_b @ lattice @ slope_a.T, slope_b @ lattice @ over_a.T
 
@@ -103,7 +118,7 @@ def _lattice(rng: np.random.Generator, over_a: FloatArray, over_b: FloatArray) -
     return rng.standard_normal((over_b.shape[1], over_a.shape[1])) / SPLINE_DEVIATION
 
 
-def _spline_basis(x: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
+def spline_basis(x: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
     """Cubic B-splines on knots of `spacing` that cover x, and their derivatives: two (len(x), knots) matrices."""
     position = (x - x[0]) / spacing
     distance = position[:, None] - np.arange(-1, int(position[-1]) + 3)

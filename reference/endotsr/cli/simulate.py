@@ -1,0 +1,65 @@
+"""`endotsr simulate`: writes a simulated sequence and its truth as a folder."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.progress import StepBar
+from endotsr.errors import InputError
+from endotsr.runs.files import os_error_line, replacing_folder
+from endotsr.runs.folder import refuse_existing
+from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
+from endotsr.simulator.settings import SimulatorSettings
+
+STILL = named_scene("still")
+
+
+@dataclass
+class SimulateOptions:
+    """Simulate a scene in which every effect is known, and write it as an EndoNeRF folder with the exact truth beside.
+
+    SCENE is still, breathing, pulling, cutting, smoke, moving-camera or everything; the options change its size, its
+    seed and its effects. `endotsr train OUT` reads the folder. OUT/truth holds depth, motion, light and masks.
+    """
+
+    scene: Annotated[str, Option("[SCENE]", positional=True)] = ""
+    """name of a scene; not needed with --effects"""
+    out: Annotated[Path | None, Option("FOLDER")] = None
+    """sequence folder to create (required)"""
+    effects: Annotated[str | None, Option("NAME,..")] = None
+    """exactly these effects, instead of those of a scene; empty for none"""
+    settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    options = parse(SimulateOptions, words, "simulate")
+    if options.out is None:
+        raise InputError("simulate: --out FOLDER is missing: the sequence folder to create")
+    if not options.scene and options.effects is None:
+        raise InputError(f"simulate: SCENE is missing; allowed: {', '.join(SCENES)}, or --effects NAME,..")
+    base = named_scene(options.scene) if options.scene else STILL
+    base = base if options.effects is None else scene_of(options.effects)
+    settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings
+    _write(options.out, settings, options.scene if options.effects is None else options.effects)
+    print(f"truth in {options.out}/truth; train with: endotsr train {options.out} --out RUN")
+    return 0
+
+
+def _write(out: Path, settings: SimulatorSettings, name: str) -> None:
+    """Refuse what cannot be written before anything is, then write beside the folder's name and rename."""
+    from endotsr.simulator.folder import check_scene, write_sequence
+
+    refuse_existing(out)
+    check_scene(settings)
+    print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)
+    print(f"effects: {', '.join(effects_on(settings))}", flush=True)
+    try:
+        out.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with replacing_folder(out) as folder, StepBar("frames") as bar:
+            bar.begin(settings.frames)
+            write_sequence(folder, settings, name, bar.step)
+    except OSError as error:
+        raise InputError(os_error_line(error, out)) from None

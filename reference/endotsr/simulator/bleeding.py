@@ -1,0 +1,37 @@
+"""Local bleeding: blood spreads over the tissue from one spot and moves with it.
+
+In: material coordinates and a time. Out: the reflectance with the blood over it.
+"""
+
+import numpy as np
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.settings import SimulatorSettings
+
+BLOOD = np.array([0.20, 0.010, 0.009])  # linear reflectance
+CENTRE = (-0.05, -0.02)  # of the spot, distances of the camera
+EDGE = 0.5  # width of the margin of the blood, mm
+LOBES = ((2, 0.14), (3, 0.12), (5, 0.07))  # waves of the margin: number around the spot, relative height
+
+
+def with_blood(settings: SimulatorSettings, reflectance: FloatArray, material: FloatArray, t: float) -> FloatArray:
+    """The reflectance (3, H, W) of tissue and blood at material coordinates (2, H, W)."""
+    cover = blood_cover(settings, material, t)
+    return reflectance * (1 - cover) + BLOOD.reshape(3, *[1] * cover.ndim) * cover
+
+
+def blood_cover(settings: SimulatorSettings, material: FloatArray, t: float) -> FloatArray:
+    """The fraction of the colour that blood replaces, (H, W): 0 before the bleeding begins.
+
+    The area grows in proportion to the time; the margin is wavy, drawn by the seed.
+    """
+    part = settings.bleeding
+    if t <= part.start:
+        return np.zeros(material.shape[1:])
+    da, db = material[0] - CENTRE[0] * settings.distance, material[1] - CENTRE[1] * settings.distance
+    angle = np.arctan2(db, da)
+    phases = np.random.default_rng([settings.seed, 4]).uniform(0, 2 * np.pi, len(LOBES))
+    wave = sum(height * np.sin(lobes * angle + phase) for (lobes, height), phase in zip(LOBES, phases))
+    margin = part.radius * np.sqrt((t - part.start) / (1 - part.start)) * (1 + wave)
+    inside = np.clip((margin - np.hypot(da, db)) / EDGE, 0.0, 1.0)
+    return part.opacity * inside * inside * (3 - 2 * inside)

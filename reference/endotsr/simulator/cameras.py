@@ -1,0 +1,44 @@
+"""The cameras of a simulated sequence: one a frame, and the right one of a stereo pair."""
+
+import numpy as np
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.splatting.camera import Camera
+
+
+def make_cameras(settings: SimulatorSettings, times: FloatArray, right: bool = False) -> list[Camera]:
+    """One camera a frame: at the origin, looking along z; with motion, it swings about the middle of the tissue.
+
+    right    those of the second camera of a rectified pair: the same axes, the baseline to the right
+    """
+    focal = settings.focal * settings.width
+    rest = Camera(
+        np.eye(3), np.zeros(3), focal, focal, settings.width / 2, settings.height / 2, settings.width, settings.height
+    )
+    if right:
+        aside = np.array([settings.stereo.baseline, 0.0, 0.0])
+        return [camera._replace(translation=camera.translation - aside) for camera in make_cameras(settings, times)]
+    if not settings.camera_motion.on:
+        return [rest] * len(times)
+    cameras = []
+    for centre in camera_centres(settings, times):
+        rotation = _looking_at(np.array([0.0, 0.0, settings.distance]) - centre)
+        cameras.append(rest._replace(rotation=rotation, translation=-rotation @ centre))
+    return cameras
+
+
+def camera_centres(settings: SimulatorSettings, times: FloatArray) -> FloatArray:
+    """The places of the cameras, (n, 3) mm: the origin, or on the path of the camera motion."""
+    part = settings.camera_motion
+    angle = 2 * np.pi * part.cycles * np.asarray(times, float)
+    path = np.stack([np.sin(angle), 0.5 * (1 - np.cos(angle)), np.zeros_like(angle)], axis=1)
+    return part.amplitude * path if part.on else np.zeros((len(path), 3))
+
+
+def _looking_at(forward: FloatArray) -> FloatArray:
+    """World-to-camera rotation with z along `forward` and x horizontal."""
+    z = forward / np.linalg.norm(forward)
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])

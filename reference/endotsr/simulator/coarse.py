@@ -1,0 +1,126 @@
+"""Views for pictures alone: solved on every fourth pixel and interpolated between.
+
+The truth of a sequence is solved at every pixel (views.py). The right camera and the motion blur need the same geometry
+only to draw: there the sheet, whose folds are 11 mm long and longer, is interpolated by cubic polynomials through the
+nodes. Left and right of an open slit the nodes are those of one side, continued beyond its edge.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.slit import is_open, slit_coordinates
+from endotsr.simulator.surface import Surface
+from endotsr.simulator.views import View, put, rotate, see_side, see_wound
+from endotsr.splatting.camera import Camera
+
+STEP = 4  # pixels between two nodes
+GEOMETRY = ("material", "point", "normal", "depth")
+
+
+def see_coarsely(surface: Surface, camera: Camera, t: float) -> View:
+    """As `views.see`, good to a hundredth of a pixel. Raises InputError as `see_rays` does."""
+    ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
+    ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
+    x, y = np.meshgrid(ray_x, ray_y)
+    rays = (x, y)
+    slit = surface.slit
+    if slit is None or not is_open(slit, t):
+        return _spread_view(surface, camera, t, rays, None)
+    view = _spread_view(surface, camera, t, rays, 1.0)
+    minus = _spread_view(surface, camera, t, rays, -1.0)
+    missed = slit_coordinates(slit, *view.material)[1] < 0
+    put(view, missed, minus._replace(**{name: getattr(minus, name)[..., missed] for name in GEOMETRY}))
+    gap = missed & (slit_coordinates(slit, *minus.material)[1] > 0)
+    view = view._replace(wound=gap)
+    if gap.any():
+        put(view, gap, see_wound(surface, camera, t, rays[0][gap], rays[1][gap]))
+    return view
+
+
+def views_during(surface: Surface, cameras: list[Camera], view: View, t: float, moments: FloatArray) -> Iterator[View]:
+    """The view at every moment of an exposure: the material seen, with the position and normal of its middle.
+
+    cameras  at the first moment, at t and at the last moment
+    view     the view at t
+    moments  relative to t, normalised time, ascending and symmetrical
+
+    The material coordinates at a pixel run along the parabola in time through those at the three cameras' moments.
+    """
+    slit = surface.slit
+    cut = slit is not None and is_open(slit, t + moments[-1])
+    sides = (1.0, -1.0) if cut else (None,)
+    paths = [
+        [_node_material(surface, camera, t + at, side) for camera, at in zip(cameras, (moments[0], 0.0, moments[-1]))]
+        for side in sides
+    ]
+    for moment in moments / moments[-1]:
+        weights = 0.5 * moment * (moment - 1), 1 - moment**2, 0.5 * moment * (moment + 1)
+        found = [spread(np.asarray(sum(w * m for w, m in zip(weights, path))), cameras[1]) for path in paths]
+        if slit is None or not cut:
+            yield view._replace(material=found[0], wound=None)
+            continue
+        below = slit_coordinates(slit, *found[0])[1] < 0
+        gap = below & (slit_coordinates(slit, *found[1])[1] > 0)
+        yield view._replace(material=np.where(below, found[1], found[0]), wound=gap)
+
+
+def nodes(count: int) -> FloatArray:
+    """Image coordinates of the nodes along a side of `count` pixels: two lie on each side of every pixel centre."""
+    return 0.5 + STEP * (np.arange((count - 1) // STEP + 4) - 1)
+
+
+def spread(values: FloatArray, camera: Camera) -> FloatArray:
+    """Values at the nodes, (C, rows, columns), interpolated at all pixel centres: (C, H, W)."""
+    channels, rows, columns = values.shape
+    across, down = _interpolation(camera.width), _interpolation(camera.height)
+    wide = across @ values.transpose(2, 0, 1).reshape(columns, -1)
+    high = down @ wide.reshape(-1, channels, rows).transpose(2, 1, 0).reshape(rows, -1)
+    return np.ascontiguousarray(high.reshape(camera.height, channels, -1).transpose(1, 0, 2))
+
+
+def _node_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
+    x, y = np.meshgrid((nodes(camera.width) - camera.cx) / camera.fx, (nodes(camera.height) - camera.cy) / camera.fy)
+    return x, y
+
+
+def _spread_view(
+    surface: Surface, camera: Camera, t: float, rays: tuple[FloatArray, FloatArray], side: float | None
+) -> View:
+    ray_x, ray_y = _node_rays(camera)
+    sides = None if side is None else np.full_like(ray_x, side)
+    coarse = see_side(surface, camera, t, ray_x, ray_y, sides)
+    fine = spread(np.concatenate([coarse.material, coarse.normal, coarse.depth[None]]), camera)
+    normal, depth = fine[2:5], fine[5]
+    normal /= np.sqrt((normal**2).sum(axis=0))
+    seen = np.stack([rays[0] * depth, rays[1] * depth, depth]) - camera.translation[:, None, None]
+    return View(fine[:2], rotate(camera.rotation.T, seen), normal, depth)
+
+
+def _node_material(surface: Surface, camera: Camera, t: float, side: float | None) -> FloatArray:
+    """Material coordinates seen at the nodes, (2, rows, columns)."""
+    ray_x, ray_y = _node_rays(camera)
+    sides = None if side is None else np.full_like(ray_x, side)
+    return see_side(surface, camera, t, ray_x, ray_y, sides).material
+
+
+def _interpolation(count: int) -> Any:
+    """Sparse matrix (pixels, nodes) of the cubic polynomial through the four nearest nodes."""
+    from scipy.sparse import csr_array
+
+    pixel = np.arange(count)
+    f = (pixel % STEP) / STEP
+    weights = np.stack(
+        [
+            -f * (f - 1) * (f - 2) / 6,
+            (f + 1) * (f - 1) * (f - 2) / 2,
+            -(f + 1) * f * (f - 2) / 2,
+            (f + 1) * f * (f - 1) / 6,
+        ],
+        axis=1,
+    )
+    columns = (pixel // STEP)[:, None] + np.arange(4)
+    shape = (count, len(nodes(count)))
+    return csr_array((weights.ravel(), columns.ravel(), 4 * np.arange(count + 1)), shape=shape)

@@ -1,0 +1,135 @@
+"""Whether all that a scene is about stays in the picture: refused before anything is rendered or written.
+
+In: settings. Out: nothing, or an `InputError` that names the setting that is too large and the largest allowed value.
+Checked at every frame, on a grid of rays and on the few points that each effect is about.
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import msgspec
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.splits import time_stamps
+from endotsr.simulator.bleeding import CENTRE as BLOOD_CENTRE
+from endotsr.simulator.cameras import make_cameras
+from endotsr.simulator.instrument import graspers, wrist_at
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.slit import make_slit
+from endotsr.simulator.surface import PULL_CENTRE, PULSATION_CENTRE, make_surface, surface_point
+from endotsr.simulator.texture import half_extent
+from endotsr.simulator.views import see_rays, to_camera
+
+GRID = (9, 8)  # rays across and down the picture
+SMALLEST = 1e-6  # a size at which an effect has no extent
+HALVINGS = 16  # of the interval that holds the largest allowed value
+
+Fits = Callable[[SimulatorSettings], bool]
+Points = Callable[[SimulatorSettings], FloatArray]
+
+
+def check_field_of_view(settings: SimulatorSettings) -> None:
+    """Raises InputError if an effect leaves the picture, or if the camera sees beyond the simulated tissue."""
+    for fits, sizes in _requirements(settings):
+        _require(fits, settings, sizes)
+
+
+def _requirements(settings: SimulatorSettings) -> list[tuple[Fits, list[tuple[str, str]]]]:
+    """What has to fit, and the sizes (section, key) that may be the reason why it does not."""
+    moving = [(name, "amplitude") for name in ("camera_motion", "pull", "pulsation", "breathing")]
+    effects = [
+        (partial(_points_fit, points=points), [(section, key), *moving])
+        for section, (key, points) in ABOUT.items()
+        if getattr(settings, section).on
+    ]
+    return [*effects, (_wrists_fit, [("instrument", "travel")]), (_tissue_fits, moving)]
+
+
+def _all_fit(settings: SimulatorSettings) -> bool:
+    return all(fits(settings) for fits, _ in _requirements(settings))
+
+
+def _require(fits: Fits, settings: SimulatorSettings, sizes: list[tuple[str, str]]) -> None:
+    """Raises InputError if the settings do not fit, for the first of the sizes (section, key) without which they do."""
+    if fits(settings):
+        return
+    for section, key in sizes:
+        without = _changed(settings, section, key, SMALLEST)
+        if fits(without):
+            raise _refusal(settings, section, key, _all_fit if _all_fit(without) else fits)
+    tried = ", ".join(f"{section}.{key}" for section, key in sizes)
+    raise InputError(f"simulator: the scene leaves the field of view; allowed: a smaller focal, or smaller {tried}")
+
+
+def _slit_ends(settings: SimulatorSettings) -> FloatArray:
+    slit = make_slit(settings)
+    return slit.centre[:, None] + 0.5 * slit.length * np.outer(slit.along, [-1.0, 1.0])
+
+
+def _blood_rim(settings: SimulatorSettings) -> FloatArray:
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    rim = settings.bleeding.radius * np.stack([np.cos(angle), np.sin(angle)])
+    return settings.distance * np.array(BLOOD_CENTRE)[:, None] + rim
+
+
+# Section -> the key of its size, and the material points (2, P), mm, that it is about.
+ABOUT: dict[str, tuple[str, Points]] = {
+    "breathing": ("amplitude", lambda settings: np.zeros((2, 1))),
+    "pulsation": ("amplitude", lambda settings: settings.distance * np.array(PULSATION_CENTRE)[:, None]),
+    "pull": ("amplitude", lambda settings: settings.distance * np.array(PULL_CENTRE)[:, None]),
+    "cutting": ("length", _slit_ends),
+    "bleeding": ("radius", _blood_rim),
+}
+
+
+def _points_fit(settings: SimulatorSettings, points: Points) -> bool:
+    """Whether the material points lie in the picture at every frame."""
+    surface, times = make_surface(settings), time_stamps(settings.frames)
+    for camera, t in zip(make_cameras(settings, times), times):
+        x, y, z = to_camera(camera, surface_point(surface, points(settings), float(t)))
+        if z.min() <= 0:
+            return False
+        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+        if min(u.min(), v.min(), camera.width - u.max(), camera.height - v.max()) < 0:
+            return False
+    return True
+
+
+def _wrists_fit(settings: SimulatorSettings) -> bool:
+    far = np.array([1.0, settings.height / settings.width])
+    wrists = [wrist_at(settings, one, float(t)) for one in graspers(settings) for t in time_stamps(settings.frames)]
+    return all((wrist >= 0).all() and (wrist <= far).all() for wrist in wrists)
+
+
+def _tissue_fits(settings: SimulatorSettings) -> bool:
+    """Whether every ray of the grid meets tissue that has a texture, at every frame."""
+    surface, times = make_surface(settings), time_stamps(settings.frames)
+    extent = np.array(half_extent(settings))
+    for camera, t in zip(make_cameras(settings, times), times):
+        x = (np.linspace(0, camera.width, GRID[0]) - camera.cx) / camera.fx
+        y = (np.linspace(0, camera.height, GRID[1]) - camera.cy) / camera.fy
+        try:
+            a, b = see_rays(surface, camera, float(t), *np.meshgrid(x, y)).material
+        except InputError:
+            return False
+        if np.abs(a).max() > extent[0] or np.abs(b).max() > extent[1]:
+            return False
+    return True
+
+
+def _changed(settings: SimulatorSettings, section: str, key: str, value: float) -> SimulatorSettings:
+    part = msgspec.structs.replace(getattr(settings, section), **{key: value})
+    return msgspec.structs.replace(settings, **{section: part})
+
+
+def _refusal(settings: SimulatorSettings, section: str, key: str, fits: Fits) -> InputError:
+    """The error that names the setting, its value and, found by halving, the largest value that fits."""
+    value = getattr(getattr(settings, section), key)
+    low, high = SMALLEST, value
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fits(_changed(settings, section, key, middle)) else (low, middle)
+    largest = np.floor(low * 100) / 100
+    return InputError(f"simulator: {section}.{key} = {value:g} leaves the field of view; allowed: at most {largest:g}")

@@ -1,0 +1,117 @@
+"""A simulated scene as a sequence folder: the EndoNeRF layout that the reader takes, with the truth beside it.
+
+    images/ images_right/     left and right picture          poses_bounds.npy   LLFF rows
+    depth/                    prior depth, whole millimetres, 16 bits
+    masks/ gt_masks/          white = excluded: instruments and pixels without depth; instruments alone
+    truth/                    see truth.py
+
+In: settings. Out: files, one frame at a time. A sequence that is read back equals `simulate` with the same settings bit
+for bit, prior depth included, if the reader's clip of the depth (`sequence.depth_percentiles`) is 0 to 100.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.poses import POSE_FILES, rows_from_cameras
+from endotsr.sequences.splits import split_frames
+from endotsr.simulator.cameras import camera_centres
+from endotsr.simulator.field_of_view import check_field_of_view
+from endotsr.simulator.frames import Scene, SimulatedFrame, make_scene, simulated_frames
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.shading import lit_by_all, shade
+from endotsr.simulator.trajectories import empty_tracks, follow
+from endotsr.simulator.truth import TRUTH, write_frame, write_scene
+from endotsr.simulator.views import see_rays, view_of_points
+
+PICTURES = ("images", "images_right", "depth", "masks", "gt_masks")
+TRACKS = (24, 19)  # tracked points, evenly spaced over the first picture, across and down
+
+
+def check_scene(settings: SimulatorSettings) -> None:
+    """Raises InputError for settings that cannot become a sequence folder; nothing is rendered."""
+    part = settings.depth_rounding
+    if not part.on or part.step != round(part.step):
+        found = f"depth_rounding.step = {part.step:g}" if part.on else "depth_rounding.on = False"
+        raise InputError(
+            f"simulator: {found} does not fit a folder, which holds whole millimetres; allowed: 1, 2, 3 .."
+        )
+    if not (settings.stereo.on or settings.instrument.on or settings.more_instruments.on):
+        raise InputError(
+            "simulator: a sequence without an excluded pixel is not read without a flag; allowed: stereo, instrument or"
+            " more_instruments on"
+        )
+    split_frames(settings.frames, "every_eighth", 0)
+    check_field_of_view(settings)
+
+
+def write_sequence(
+    folder: Path, settings: SimulatorSettings, name: str = "", on_frame: Callable[[], object] = lambda: None
+) -> None:
+    """Write a scene and its truth into an existing, empty folder. `on_frame` is called after every frame.
+
+    Raises:  InputError as `check_scene` does, or where the settings fold the tissue over itself.
+    """
+    check_scene(settings)
+    pictures = PICTURES if settings.stereo.on else tuple(n for n in PICTURES if n != "images_right")
+    for inner in (*pictures, f"{TRUTH}/frames", f"{TRUTH}/instrument"):
+        (folder / inner).mkdir(parents=True)
+    scene = make_scene(settings)
+    tracks = empty_tracks(tracked_points(scene), settings.frames)
+    light = np.empty_like(tracks.position)
+    far = np.empty(settings.frames)
+    for i, frame in enumerate(simulated_frames(scene)):
+        _write_pictures(folder, i, frame)
+        write_frame(folder / TRUTH, i, frame)
+        t = float(scene.times[i])
+        follow(tracks, i, scene.surface, scene.cameras[i], t, frame.covered)
+        light[i] = tissue_light(scene, tracks.material, i)
+        far[i] = frame.prior.max()
+        on_frame()
+    np.save(folder / POSE_FILES[0], pose_rows(scene, far))
+    write_scene(folder / TRUTH, scene, name, tracks, light)
+
+
+def tracked_points(scene: Scene) -> FloatArray:
+    """The material points of the tracks, (2, P) mm: those seen on an even grid of places of frame 0."""
+    camera = scene.cameras[0]
+    across, down = TRACKS
+    x = (np.arange(across) + 0.5) / across * camera.width
+    y = (np.arange(down) + 0.5) / down * camera.height
+    u, v = (a.ravel() for a in np.meshgrid(x, y))
+    return see_rays(scene.surface, camera, 0.0, (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy).material
+
+
+def tissue_light(scene: Scene, material: FloatArray, i: int) -> FloatArray:
+    """Linear light (3, P) that material points send to the camera of frame i.
+
+    It holds the lamps, brightening and blood; highlights, shadows, instruments, smoke, lens and gain are left out.
+    """
+    settings = scene.settings
+    plain = msgspec.structs.replace(settings, highlights=msgspec.structs.replace(settings.highlights, on=False))
+    view = view_of_points(scene.surface, scene.cameras[i], material, float(scene.times[i]))
+    lamps = lit_by_all(plain, view, scene.cameras[i])
+    return shade(plain, scene.texture, view, lamps, float(scene.times[i])).light[:, 0]
+
+
+def pose_rows(scene: Scene, far: FloatArray) -> FloatArray:
+    """Pose rows (n, 17) from which the reader makes the very cameras of the scene, to the last bit."""
+    rows = rows_from_cameras(scene.cameras, far)
+    rows[:, :15].reshape(-1, 3, 5)[:, :, 3] = camera_centres(scene.settings, scene.times)
+    return rows
+
+
+def _write_pictures(folder: Path, i: int, frame: SimulatedFrame) -> None:
+    from endotsr.opencv import write_png
+
+    name = f"{i:06d}.png"
+    write_png(folder / "images" / name, frame.image.transpose(1, 2, 0))
+    if frame.image_right is not None:
+        write_png(folder / "images_right" / name, frame.image_right.transpose(1, 2, 0))
+    write_png(folder / "depth" / name, frame.prior.astype(np.uint16))
+    write_png(folder / "masks" / name, np.where(frame.tissue, 0, 255).astype(np.uint8))
+    write_png(folder / "gt_masks" / name, np.where(frame.excluded, 255, 0).astype(np.uint8))

@@ -1,0 +1,114 @@
+"""The lamps: their places, the light that the tissue receives from each, their mirror reflections and their shadows.
+
+In: a view of the sheet. Out: `Lit` for each lamp, and from it the linear light of the highlights.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.views import View, rotate, to_camera
+from endotsr.splatting.camera import Camera, camera_centre
+
+GAIN = 0.95  # linear light of a reflectance of 1, perpendicular to the view, at the scene's distance
+WRAP = 0.15  # light scattered inside the tissue softens the shading
+BEAM = 3.0  # exponent of the lamp's fall-off towards the edge of its cone
+INSTRUMENT_DEPTH = 0.7  # view-space z of the instruments, distances of the scene
+
+
+class Lit(NamedTuple):
+    """What one lamp does at every pixel."""
+
+    diffuse: FloatArray  # (H, W) linear light of a reflectance of 1
+    received: FloatArray  # (H, W) the same before the angle to the surface
+    half: FloatArray  # (3, H, W) unit vectors half-way between lamp and eye
+
+
+class Blocker(NamedTuple):
+    """The instruments of a frame as a screen that throws shadows."""
+
+    cover: FloatArray  # (H, W) 0 .. 1, softened
+    camera: Camera  # in whose picture it lies, at z = INSTRUMENT_DEPTH x distance
+
+
+def lit_by_endoscope(
+    settings: SimulatorSettings, view: View, camera: Camera, blocker: Blocker | None, eye: Camera | None = None
+) -> Lit:
+    """The lamp at the camera: n.l with scattering, (distance / r)^2 and its beam.
+
+    eye      the camera of the view if the lamp is not there
+    """
+    towards = camera_centre(camera)[:, None, None] - view.point
+    r = np.sqrt((towards**2).sum(axis=0))
+    towards /= r
+    cosine = (view.normal * towards).sum(axis=0)
+    axis = view.depth / r  # cosine of the angle to the optical axis
+    received = GAIN * (settings.distance / r) ** 2 * axis**BEAM
+    if blocker is not None:
+        lamp = camera_centre(camera) + camera.rotation.T @ [settings.shadows.offset, 0.0, 0.0]
+        received = received * shadow(settings, blocker, lamp, view)
+    diffuse = received * np.maximum(cosine + WRAP, 0.0) / (1 + WRAP)
+    return Lit(diffuse, received, towards if eye is None else _half_way(view, towards, eye))
+
+
+def lit_by_second(settings: SimulatorSettings, view: View, blocker: Blocker | None, eye: Camera) -> Lit:
+    """The second lamp, at a fixed place and without a beam."""
+    part = settings.second_light
+    lamp = np.array([part.right, part.down, 0.0])
+    towards = lamp[:, None, None] - view.point
+    r = np.sqrt((towards**2).sum(axis=0))
+    towards /= r
+    cosine = (view.normal * towards).sum(axis=0)
+    received = part.strength * GAIN * (settings.distance / r) ** 2
+    if blocker is not None:
+        received = received * shadow(settings, blocker, lamp, view)
+    diffuse = received * np.maximum(cosine + WRAP, 0.0) / (1 + WRAP)
+    return Lit(diffuse, received, _half_way(view, towards, eye))
+
+
+def mirrored(settings: SimulatorSettings, lit: Lit, normal: FloatArray, slopes: FloatArray) -> FloatArray:
+    """The highlights of a lamp, (H, W): strength received (n'.half)^exponent.
+
+    slopes   (2, H, W) of the fine relief, which turn the normal n to n'
+    """
+    bent = normal.copy()
+    bent[0] += slopes[0]
+    bent[1] += slopes[1]
+    bent /= np.sqrt((bent**2).sum(axis=0))
+    mirror = np.maximum((bent * lit.half).sum(axis=0), 0.0) ** settings.highlights.exponent
+    return settings.highlights.strength * lit.received * mirror
+
+
+def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view: View) -> FloatArray:
+    """The factor on the light of a lamp at world position (3,), (H, W): 1 - strength where instruments stand between.
+
+    The line from the lamp to each piece of tissue meets the plane of the instruments; their cover is read there.
+    """
+    from endotsr.opencv import warp_bilinear
+
+    camera = blocker.camera
+    x, y, z = to_camera(camera, view.point)
+    source = rotate(camera.rotation, lamp) + camera.translation
+    plane = INSTRUMENT_DEPTH * settings.distance
+    part = (plane - source[2]) / (z - source[2])
+    u = camera.fx * (source[0] + part * (x - source[0])) / plane + camera.cx - 0.5
+    v = camera.fy * (source[1] + part * (y - source[1])) / plane + camera.cy - 0.5
+    u -= np.arange(camera.width)
+    v -= np.arange(camera.height)[:, None]
+    return 1 - settings.shadows.strength * warp_bilinear(blocker.cover, np.stack([u, v]))
+
+
+def make_blocker(settings: SimulatorSettings, cover: FloatArray, camera: Camera) -> Blocker:
+    """The instruments of a frame, (H, W) in [0, 1], with their softened edge."""
+    from scipy.ndimage import gaussian_filter
+
+    radius = settings.shadows.softness * settings.width
+    return Blocker(gaussian_filter(cover, radius, mode="nearest") if radius > 0 else cover, camera)
+
+
+def _half_way(view: View, towards: FloatArray, eye: Camera) -> FloatArray:
+    back = camera_centre(eye)[:, None, None] - view.point
+    half = towards + back / np.sqrt((back**2).sum(axis=0))
+    return half / np.sqrt((half**2).sum(axis=0))

@@ -1,0 +1,88 @@
+"""True trajectories of material points: where a piece of tissue is at every frame time, in world and picture.
+
+In: a `SimulatedSequence` and material coordinates in millimetres, for example those seen at chosen pixels of a frame
+(`material_at`). Out: `MaterialTracks`. World axes are those of the simulator: x right, y down, z forward of the resting
+camera, in millimetres. The positions are the formula of the surface, without interpolation.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.kernels.arrays import FloatArray
+from endotsr.simulator.simulate import SimulatedSequence
+from endotsr.simulator.surface import Surface, surface_point
+from endotsr.simulator.views import see_rays, to_camera
+from endotsr.splatting.camera import Camera
+
+
+class MaterialTracks(NamedTuple):
+    """Trajectories of P material points over n frames."""
+
+    material: FloatArray  # (2, P)      material coordinates a, b, mm
+    position: FloatArray  # (n, 3, P)   world position at each frame time, mm
+    pixel: FloatArray  # (n, 2, P)   image position, px, x first; the centre of the first pixel is (0.5, 0.5)
+    depth: FloatArray  # (n, P)      view-space z, mm
+    visible: NDArray[np.bool_]  # (n, P)      inside the picture and not covered by an instrument
+
+
+def material_at(simulated: SimulatedSequence, pixel: FloatArray, frame: int = 0) -> FloatArray:
+    """Material coordinates of the tissue at image positions of one frame.
+
+    pixel    (2, P) px, x first; the centre of the first pixel is (0.5, 0.5); positions outside the picture are allowed
+    frame    index of the frame; frame 0 shows the tissue at rest
+    returns  (2, P) mm. Behind an instrument they are those of the hidden tissue; NaN in the wound of a slit.
+
+    Raises:  IndexError for a frame that the sequence does not have; InputError where the ray misses the tissue.
+    """
+    sequence = simulated.sequence
+    if not 0 <= frame < sequence.count:
+        raise IndexError(f"frame {frame} of a sequence of {sequence.count}")
+    camera = sequence.cameras[frame]
+    x, y = np.asarray(pixel, float)
+    ray_x, ray_y = (x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy
+    view = see_rays(simulated.truth.surface, camera, float(sequence.times[frame]), ray_x, ray_y)
+    return view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
+
+
+def material_tracks(simulated: SimulatedSequence, material: FloatArray) -> MaterialTracks:
+    """The trajectories of material points (2, P), mm, at the times of all frames.
+
+    Edges:   no point gives arrays without points. A point behind the camera is not visible, and its pixel is NaN.
+    """
+    sequence, truth = simulated.sequence, simulated.truth
+    tracks = empty_tracks(material, sequence.count)
+    for i, (camera, t) in enumerate(zip(sequence.cameras, sequence.times)):
+        follow(tracks, i, truth.surface, camera, float(t), truth.instrument[i])
+    return tracks
+
+
+def empty_tracks(material: FloatArray, count: int) -> MaterialTracks:
+    """Tracks of material points (2, P) over `count` frames, to be filled by `follow`."""
+    material = np.asarray(material, float)
+    n, points = count, material.shape[1]
+    return MaterialTracks(
+        material, np.empty((n, 3, points)), np.empty((n, 2, points)), np.empty((n, points)), np.empty((n, points), bool)
+    )
+
+
+def follow(
+    tracks: MaterialTracks, i: int, surface: Surface, camera: Camera, t: float, covered: NDArray[np.bool_]
+) -> None:
+    """Fill frame i of the tracks. covered (H, W): the pixels that an instrument covers."""
+    tracks.position[i] = surface_point(surface, tracks.material, t)
+    x, y, z = to_camera(camera, tracks.position[i])
+    in_front = np.where(z > 0, z, np.nan)
+    tracks.pixel[i] = camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy
+    tracks.depth[i] = z
+    tracks.visible[i] = _visible(tracks.pixel[i], covered)
+
+
+def _visible(pixel: FloatArray, covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether image positions lie in the picture and on a pixel that no instrument covers. The sheet hides nothing."""
+    height, width = covered.shape
+    x, y = pixel
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    column, row = np.where(inside, x, 0).astype(np.intp), np.where(inside, y, 0).astype(np.intp)
+    return inside & ~covered[row, column]

@@ -1,0 +1,64 @@
+"""`endotsr simulate`: a folder that `train` reads, and refusals of one line that leave nothing behind."""
+
+import pytest
+from tiny import SETTINGS, assert_refused
+
+from endotsr.cli.main import main
+from endotsr.simulator.scenes import IN_FILES
+from endotsr.simulator.truth import read_truth
+
+SMALL = ["--width", "40", "--height", "32", "--frames", "4", "--focal", "1.5"]
+
+
+def test_a_scene_is_written_and_trained_without_a_word_more(tmp_path, capsys):
+    out = tmp_path / "new" / "scene"
+    assert (
+        main(["simulate", "pulling", "--out", str(out), *SMALL, "--seed", "5", "--smoke.on", "--pull.on", "false"]) == 0
+    )
+    assert f"train with: endotsr train {out} --out RUN" in capsys.readouterr().out
+    settings = read_truth(out).settings
+    assert (settings.width, settings.frames, settings.seed) == (40, 4, 5)
+    assert settings.smoke.on and settings.exposure.on and not settings.pull.on and settings.stereo.on
+    assert [path.name for path in out.parent.iterdir()] == ["scene"]
+    assert (
+        main(["train", str(out), "--out", str(tmp_path / "run"), "--no-evaluate", *SETTINGS, "--iterations", "2"]) == 0
+    )
+
+
+def test_a_list_of_effects_is_a_scene_too(tmp_path):
+    assert main(["simulate", "--effects", "noise,vignetting", "--out", str(tmp_path / "a"), *SMALL]) == 0
+    truth = read_truth(tmp_path / "a")
+    on = [name for name in ("breathing", "noise", "vignetting", *IN_FILES) if getattr(truth.settings, name).on]
+    assert on == ["noise", "vignetting", *IN_FILES] and truth.scene == "noise,vignetting"
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["stil"], ("scene 'stil' is not allowed", "allowed: still, breathing, pulling")),
+        ([], ("SCENE is missing", "--effects")),
+        (["still", "--effects", "fog"], ("unknown: fog", "allowed: breathing")),
+        (["still", "--width", "15"], ("width = 15 is not allowed", "an integer >= 16")),
+        (["still", "--frames", "2"], ("frames = 2 is not allowed", "an integer >= 3")),
+        (["breathing", "--breathing.amplitude", "60"], ("breathing.amplitude = 60 leaves", "allowed: at most")),
+        (["still", "--stereo.on", "false"], ("without an excluded pixel", "stereo")),
+        (["still", "--relief", "30"], ("leaves the field of view",)),
+        (["still", "--wdth", "40"], ("--wdth: no such option", "--width")),
+    ],
+)
+def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named):
+    assert_refused(capsys, ["simulate", *SMALL, *words, "--out", str(tmp_path / "out")], *named)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fold_found_while_writing_leaves_nothing(tmp_path, capsys):
+    words = ["--effects", "pull", "--pull.amplitude", "5", "--pull.width", "1.2", "--out", str(tmp_path / "out")]
+    assert_refused(capsys, ["simulate", *words, *SMALL], "simulator: at t = ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_folder_is_refused(tmp_path, capsys):
+    (tmp_path / "there").mkdir()
+    assert_refused(capsys, ["simulate", "still", "--out", str(tmp_path / "there")], "there: exists already")
+    assert_refused(capsys, ["simulate", "still"], "--out FOLDER is missing")
+    assert list((tmp_path / "there").iterdir()) == []
