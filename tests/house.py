@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 # From the ground up. A module imports its own room and the rooms before it, nothing else.
 ROOMS = (
     "errors", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene", "fitting",
-    "simulator", "runs", "evaluation", "report", "stages", "gradcheck", "golden", "bench", "tradeoff", "api", "cli",
+    "simulator", "effects", "runs", "evaluation", "report", "stages", "gradcheck", "golden", "bench", "tradeoff", "api", "cli",
     "__main__",
 )  # fmt: skip
 METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")

@@ -43,7 +43,7 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
     frame_rate   frames a second; with it, rates are also given a minute
 
     Raises: InputError for a frame rate that is not positive and finite.
-    Equal sequences give equal verdicts, bit for bit, for any number of threads.
+    Equal sequences give equal verdicts: the simulated null has a fixed seed.
     """
     if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
         raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames a second")

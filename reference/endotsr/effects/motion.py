@@ -20,6 +20,7 @@ LEAST_MOTION = 0.05  # pixels of the full size
 RIGID_ERROR = 0.25  # fraction of the flow of the camera that errors of the depth and a moving light may leave
 LEAST_TILES = 2
 TILE_FRACTION = 0.02
+EXPLAINED = 0.99  # of the squared motion, by which its half waves are counted
 AFFINE_FRACTION = 0.98  # of the squared flow: above it the picture moves as a whole
 FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
 
@@ -34,11 +35,24 @@ def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks) -> tuple[Verd
     statistic = float(np.sort(ratio)[-needed]) if ratio.size >= needed else 0.0
     moving = tracks._replace(tiles=tiles)
     if statistic < 1.0:
-        return _verdict("none", statistic, clip, moving, size, []), []
+        return _verdict("none", statistic, clip, moving, size, [], 0), []
     filled = filled_tiles(moving, clip.times)
+    waves = half_waves(filled, clip.times, null[tracks.usable])
     lines = spectral_lines(filled, clip.times, clip.frames, null[tracks.usable])
     kind = "periodic" if lines else "rigid" if _affine_fraction(filled, clip, tracks) > AFFINE_FRACTION else "irregular"
-    return _verdict(kind, statistic, clip, moving, size, lines), lines
+    return _verdict(kind, statistic, clip, moving, size, lines, waves), lines
+
+
+def half_waves(filled: FloatArray, times: FloatArray, null: FloatArray) -> int:
+    """The least number of half waves over the clip that explain 99 % of the motion; what noise adds is taken off."""
+    flat = filled.reshape(len(times), -1) - filled.mean(axis=0).ravel()
+    noise, total = len(times) * float((null**2).sum()), float((flat**2).sum())
+    for count in range(1, len(times)):
+        design = np.stack([np.cos(np.pi * k * times) for k in range(count + 1)], axis=1)
+        rest = float(((flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]) ** 2).sum())
+        if rest <= (1 - EXPLAINED) * total + noise * (1 - count / len(times)):
+            return count
+    return len(times)
 
 
 def _root_mean_square(tiles: FloatArray) -> FloatArray:
@@ -79,7 +93,8 @@ def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
     return 1.0 - float((left**2).sum() / max((flat**2).sum(), 1e-30))
 
 
-def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: FloatArray, lines: list[Line]) -> Verdict:
+def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: FloatArray, lines: list[Line],
+             waves: int) -> Verdict:  # fmt: skip
     with np.errstate(all="ignore"):
         path = np.nanmean(np.sqrt((tracks.tiles**2).sum(axis=1)), axis=1)
     largest = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
@@ -94,7 +109,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
     return Verdict(
         "motion", kind != "none", kind, statistic, 1.0, "times the threshold of a tile",
         "root mean square of the flow of a tile over max(2 x flow of noise alone, 0.05 px)",
-        FALSE_POSITIVES, reason, {"largest_px": largest, "lines": [line._asdict() for line in lines]},
+        FALSE_POSITIVES, reason, {"largest_px": largest, "lines": [line._asdict() for line in lines], "half_waves": waves},
         Curve("mean flow, px", "time", clip.times, {"flow": path}),
         Map("flow, RMS over time, px", tile_map(np.where(tracks.usable, size, np.nan), height, width)),
     )  # fmt: skip
