@@ -97,6 +97,8 @@ def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> 
     left = left - left.mean(axis=0)
     m = len(left)
     courses = min(COURSES, (m - 2) // 2)
+    if courses < 1:
+        return np.zeros(left.shape[1], bool), np.zeros(left.shape[1])
     design = np.stack([np.cos(np.pi * k * clip.times) for k in range(courses + 1)], axis=1)
     rest = left - design @ np.linalg.lstsq(design, left, rcond=None)[0]
     free = m - courses - 1

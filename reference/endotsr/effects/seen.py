@@ -62,7 +62,7 @@ def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     fixed = float((sums >= 0.9 * len(share)).sum() / max(int((sums > 0).sum()), 1))
     present = statistic >= LEAST_HIGHLIGHT
     kind = "none" if not present else "fixed" if fixed > 0.5 else "moving"
-    reason = f"{statistic:.2%} of the tissue is saturated and without colour."
+    reason = f"Saturated pixels without colour cover {statistic:.2%} of the tissue."
     side = clip.shrink
     cut = sums[: sums.shape[0] // side * side, : sums.shape[1] // side * side]
     picture = cut.reshape(cut.shape[0] // side, side, cut.shape[1] // side, side).mean(axis=(1, 3))
