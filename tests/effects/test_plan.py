@@ -49,6 +49,23 @@ def test_motion_without_a_rate_keeps_the_deformation_alone():
     assert config.model.deformation and not config.model.spectral_motion
 
 
+def test_fewer_harmonics_keep_the_step_of_the_displayed_colour():
+    """One Adam step of all 16 coefficients along their signs, seen from one pixel, against one of the first alone."""
+    from endotsr.effects.views import harmonic_design, harmonic_sizes
+
+    plan, config = planned("noise")
+    rates = np.full(16, PAPER.optimiser.harmonics_rest)
+    rates[0] = PAPER.optimiser.harmonics_base
+    step = rates @ harmonic_sizes(inspected("noise").clip)
+    assert config.optimiser.harmonics_base * 0.28209479177387814 == pytest.approx(step, rel=1e-3)
+    ahead = np.abs(harmonic_design(np.array([[0.0, 0.0, 1.0]]), 3)[0])
+    assert np.flatnonzero(ahead > 1e-12).tolist() == [0, 2, 6, 12]  # along z the other harmonics vanish
+    assert PAPER.optimiser.harmonics_base * 1.2 < config.optimiser.harmonics_base < PAPER.optimiser.harmonics_base * 2
+    kept, same = planned("noise", explicit=frozenset({"optimiser.harmonics_base"}))
+    assert same.optimiser.harmonics_base == PAPER.optimiser.harmonics_base
+    assert planned("noise", explicit=frozenset({"model.harmonics_degree"}))[1].optimiser == PAPER.optimiser
+
+
 def test_a_plan_never_switches_on_and_never_enlarges():
     small = config_from_dict({"model": {"appearance": False, "exposure": True, "bases": 5, "frequencies": 2}})
     for names in (("noise", "exposure"), ("noise", "pulsation"), ("noise",)):
@@ -57,6 +74,12 @@ def test_a_plan_never_switches_on_and_never_enlarges():
         assert config.model.bases <= 5 and config.model.frequencies <= 2
     assert not planned("noise", config=small)[1].model.exposure
     assert planned("noise", "exposure", config=small)[1].model.exposure
+
+
+def test_highlights_on_moving_tissue_keep_the_harmonics():
+    assert planned("noise", "breathing", "highlights")[1].model.harmonics_degree == 3
+    assert planned("noise", "highlights")[1].model.harmonics_degree == 0
+    assert planned("noise", "breathing")[1].model.harmonics_degree == 0
 
 
 def test_explicit_settings_win_and_both_are_said():

@@ -89,6 +89,13 @@ def test_wider_views_determine_higher_degrees(amplitude, degree):
     assert view_verdict(moved, training_clip(moved)).details["degree"] == degree
 
 
+def test_a_moving_camera_without_depth_leaves_motion_open():
+    """Motion is then assumed, so that no component is switched off by mistake."""
+    sequence = clip("noise", "camera_motion")
+    verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["motion"]
+    assert verdict.present and verdict.kind == "unknown"
+
+
 def test_depth_that_cannot_be_used_is_said():
     sequence = clip("noise")
     verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["depth quality"]

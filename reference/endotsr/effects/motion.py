@@ -7,9 +7,9 @@ is accounted for first: the flow that its poses and the depth predict for rigid 
 
 import numpy as np
 
-from endotsr.effects.clip import Clip, tile_map, tile_means
+from endotsr.effects.clip import TILE, Clip, tile_map, tile_means
 from endotsr.effects.periodic import Line, spectral_lines
-from endotsr.effects.tracks import Tracks, filled_tiles
+from endotsr.effects.tracks import VISIBLE_FRAMES, Tracks, filled_tiles
 from endotsr.effects.verdict import Curve, Map, Verdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
@@ -28,18 +28,21 @@ FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
 def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks) -> tuple[Verdict, list[Line]]:
     """Whether tissue moves, and how; with the lines of its spectrum (empty without periodic motion)."""
     tiles, null = tracks.tiles - camera_flow(sequence, clip, tracks), tracks.null
+    known = np.isfinite(tiles[:, 0]).mean(axis=0) >= VISIBLE_FRAMES  # a tile without depth has no predicted flow
+    moving = tracks._replace(tiles=tiles, usable=tracks.usable & known)
     predicted, size = _root_mean_square(tracks.tiles - tiles), _root_mean_square(tiles)
     limit = np.maximum(NULL_FACTOR * null, LEAST_MOTION) + RIGID_ERROR * predicted
-    ratio = np.where(tracks.usable, size / limit, 0.0)
-    needed = max(LEAST_TILES, round(TILE_FRACTION * int(tracks.usable.sum())))
-    statistic = float(np.sort(ratio)[-needed]) if ratio.size >= needed else 0.0
-    moving = tracks._replace(tiles=tiles)
+    ratio = np.where(moving.usable, size / limit, 0.0)
+    needed = max(LEAST_TILES, round(TILE_FRACTION * int(moving.usable.sum())))
+    if int(moving.usable.sum()) < needed:
+        return _verdict("unknown", 1.0, clip, moving, size, [], clip.count), []
+    statistic = float(np.sort(ratio)[-needed])
     if statistic < 1.0:
         return _verdict("none", statistic, clip, moving, size, [], 0), []
     filled = filled_tiles(moving, clip.times)
-    waves = half_waves(filled, clip.times, null[tracks.usable])
-    lines = spectral_lines(filled, clip.times, clip.frames, null[tracks.usable])
-    kind = "periodic" if lines else "rigid" if _affine_fraction(filled, clip, tracks) > AFFINE_FRACTION else "irregular"
+    waves = half_waves(filled, clip.times, null[moving.usable])
+    lines = spectral_lines(filled, clip.times, clip.frames, null[moving.usable])
+    kind = "periodic" if lines else "rigid" if _affine_fraction(filled, clip, moving) > AFFINE_FRACTION else "irregular"
     return _verdict(kind, statistic, clip, moving, size, lines, waves), lines
 
 
@@ -85,7 +88,7 @@ def camera_flow(sequence: Sequence, clip: Clip, tracks: Tracks) -> FloatArray:
 
 def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
     """Fraction of the squared flow that an affine map of the picture explains, frame by frame."""
-    rows, columns = clip.images.shape[2] // 16, clip.images.shape[3] // 16
+    rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
     place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
     design = np.stack([np.ones(place.shape[1]), *place], axis=1)
     flat = filled.reshape(-1, place.shape[1]).T
@@ -95,11 +98,13 @@ def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
 
 def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: FloatArray, lines: list[Line],
              waves: int) -> Verdict:  # fmt: skip
-    with np.errstate(all="ignore"):
-        path = np.nanmean(np.sqrt((tracks.tiles**2).sum(axis=1)), axis=1)
-    largest = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
+    length = np.sqrt((tracks.tiles**2).sum(axis=1))
+    seen = np.isfinite(length)
+    path = np.where(seen, length, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    largest = float(size[tracks.usable].max(initial=0.0))
     rates = ", ".join(f"{line.cycles:.2g}" for line in lines)
     reason = {
+        "unknown": "Too few tiles of tissue are seen with depth to tell; motion is assumed.",
         "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
         "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), and one affine map of the picture explains the motion.",
         "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",

@@ -1,6 +1,6 @@
 """Rates of periodic motion: lines of the spectrum of the leading modes of the flow.
 
-A mode is a time course shared by many tiles (singular value decomposition). A line is a rate f of at least 2.5 cycles
+A mode is a time course shared by many tiles (singular value decomposition). A line is a rate f of at least three cycles
 in the clip for which sine and cosine of f, 2 f and 3 f explain what slow motion leaves unexplained: F test at 1 % over
 all rates, at least 60 % of the variance, and the same amplitude and phase in the three thirds of the clip. A single
 event, as a pull, fails the last condition.
@@ -13,7 +13,7 @@ from scipy import stats
 
 from endotsr.kernels.arrays import FloatArray
 
-LEAST_CYCLES = 2.5
+LEAST_CYCLES = 3.0
 SLOW = 4  # half waves over the clip that count as slow motion: 0, 1, 2, 3
 MODES = 4
 LEAST_VARIANCE = 0.01  # of a mode, left by slow motion: less is the rounding of a slow course

@@ -1,7 +1,8 @@
 """From verdicts to settings: what to switch off or make smaller, why, and the saving to expect.
 
 In: an `Inspection` and the configuration that would be used without it. Out: a `Plan`, a list of changed settings. A
-plan never switches on what the configuration leaves off, and never makes anything larger.
+plan never switches on what the configuration leaves off, and never adds a coefficient. It leaves the time bases as they
+are: fewer of them save memory and fit worse after the same number of iterations.
 """
 
 from typing import Any, NamedTuple
@@ -12,12 +13,11 @@ import numpy as np
 from endotsr.config import Config, config_from_dict
 from endotsr.effects.inspect import Inspection
 from endotsr.effects.savings import memory_fraction, time_fraction
+from endotsr.effects.views import harmonic_sizes
 from endotsr.equations.dictionary import AtomReport, frequencies, report_atoms
 
 MOST_CONDITION = 100.0  # of the dictionary over the training stamps; above it, noise is amplified too much
 SAMPLES_A_CYCLE = 2.0  # Nyquist: fewer frames cannot carry a cycle
-LEAST_BASES = 5
-SPARE_BASES = 3  # beyond one base for every half wave of the motion
 
 
 class Change(NamedTuple):
@@ -60,17 +60,15 @@ def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] =
     explicit   keys that were given on the command line or in a file: these stay, and the plan says so
     """
     motion, light = inspection.verdicts["motion"], inspection.verdicts["photometric"]
-    views, depth = inspection.verdicts["view change"], inspection.verdicts["depth quality"]
+    depth = inspection.verdicts["depth quality"]
     dictionary = carried(inspection, config)
     wanted: list[tuple[str, Any, str, tuple[str, ...]]] = [
         ("model.deformation", motion.present, motion.reason, ("motion",)),
         ("model.spectral_motion", _periodic(inspection, dictionary), _about_rates(inspection, dictionary), ("motion",)),
         ("model.appearance", light.present, light.reason, ("photometric",)),
         ("model.exposure", light.present, light.reason, ("photometric",)),
-        ("model.harmonics_degree", views.details["degree"], views.reason, ("view change",)),
+        ("model.harmonics_degree", *_degree(inspection, config), ("view change", "highlights", "motion")),
     ]
-    if motion.present:
-        wanted.append(("model.bases", *_bases(inspection), ("motion",)))
     if not depth.details["usable"]:
         wanted.append(("loss.depth_weight", 0.0, depth.reason, ("depth quality",)))
         wanted.append(("loss.smoothness_weight", 0.0, depth.reason, ("depth quality",)))
@@ -80,7 +78,37 @@ def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] =
     )
     wanted.append(("model.frequencies", dictionary.frequencies, about, ("motion", "photometric")))
     wanted.append(("model.frequency_max", dictionary.frequency_max, about, ("motion", "photometric")))
-    return _assembled(wanted, config, explicit, inspection, dictionary)
+    plan = _assembled(wanted, config, explicit, inspection, dictionary)
+    return plan._replace(changes=plan.changes + _colour_rate(plan, config, explicit, inspection))
+
+
+def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspection: Inspection) -> tuple[Change, ...]:
+    """The rate of the degree-0 coefficient with which a step of Adam changes the displayed colour as much as before.
+
+    Adam moves every coefficient by about its rate, whatever its gradient. Seen from one direction n, the coefficients
+    h_k move the colour together by sum_k rate_k |Y_k(n)|: without the higher degrees the colour would learn more slowly.
+    """
+    lower = next((c for c in plan.changes if c.key == "model.harmonics_degree" and not c.given), None)
+    base, rest = config.optimiser.harmonics_base, config.optimiser.harmonics_rest
+    if lower is None or base <= 0:
+        return ()
+    sizes = harmonic_sizes(inspection.clip)
+    removed = sizes[(lower.value + 1) ** 2 : (lower.before + 1) ** 2].sum()
+    value = float(f"{base + rest * removed / sizes[0]:.4g}")
+    reason = f"With degree {lower.value} this rate keeps the step of the displayed colour."
+    given = "optimiser.harmonics_base" in explicit
+    return (Change("optimiser.harmonics_base", value, base, reason, ("view change",), 0.0, 0.0, given),)
+
+
+def _degree(inspection: Inspection, config: Config) -> tuple[int, str]:
+    """The degree that the views determine; all of them where highlights wander over moving tissue.
+
+    There a point turns towards and away from the camera, and the direction from which it is seen follows its motion.
+    """
+    views, highlights = inspection.verdicts["view change"], inspection.verdicts["highlights"]
+    if highlights.present and highlights.kind == "moving" and inspection.verdicts["motion"].present:
+        return config.model.harmonics_degree, f"{highlights.reason[:-1]} and wander with its motion."
+    return views.details["degree"], views.reason
 
 
 def _assembled(
@@ -147,12 +175,6 @@ def _about_rates(inspection: Inspection, dictionary: Dictionary) -> str:
     return f"The rates found lie above the {dictionary.frequency_max:g} cycles that the stamps can carry."
 
 
-def _bases(inspection: Inspection) -> tuple[int, str]:
-    """Time bases: one for every half wave of the motion, and a few more."""
-    waves = int(inspection.verdicts["motion"].details["half_waves"])
-    return max(LEAST_BASES, waves + SPARE_BASES), f"{waves} half waves over time hold 99 % of the motion."
-
-
 def _remarks(inspection: Inspection) -> tuple[str, ...]:
     """What was found and is answered by no component."""
     verdicts = inspection.verdicts
@@ -161,6 +183,10 @@ def _remarks(inspection: Inspection) -> tuple[str, ...]:
         for name in ("topology change", "smoke", "blur")
         if verdicts[name].present
     ]
+    motion = verdicts["motion"]
+    if motion.present:
+        waves = motion.details["half_waves"]
+        said.append(f"{waves} half waves over time hold 99 % of the motion; a time base resolves about one.")
     if verdicts["highlights"].present:
         said.append(f"{verdicts['highlights'].reason} Highlights that move are fitted as colour of the surface.")
     if not verdicts["occluders"].present:

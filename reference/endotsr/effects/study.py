@@ -19,7 +19,7 @@ FRAMES = 40
 FOUND = (*EFFECTS, "periodic motion")
 MOTIONS = ("breathing", "pulsation", "pull")
 LIGHTS = ("exposure", "brightening")
-BEATING = {"breathing": {"cycles": 3.0}}  # breaths that a clip can hold often enough to call them periodic
+BEATING = {"breathing": {"cycles": 4.0}}  # breaths that a clip can hold often enough to call them periodic
 SWEEPS: dict[str, tuple[float, ...]] = {
     "breathing": (0.05, 0.1, 0.2, 0.4, 2.5),
     "pulsation": (0.05, 0.1, 0.2, 0.4, 0.7),
@@ -73,7 +73,7 @@ def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
     light: bool | None = bool(on & set(LIGHTS)) or (None if moves or "camera_motion" in on else False)
     return {
         "motion": moves,
-        "periodic motion": bool(on & {"breathing", "pulsation"}) if not (on & {"pull", "camera_motion"}) else None,
+        "periodic motion": _beats(on),
         "photometric": light,
         "highlights": "highlights" in on,
         "occluders": "instrument" in on,
@@ -84,6 +84,12 @@ def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
         "smoke": False,
         "blur": False,
     }
+
+
+def _beats(on: set[str]) -> bool | None:
+    """A rate is expected, or none; beside a pull or a moving camera, a beat may be hidden: not counted."""
+    beats = bool(on & {"breathing", "pulsation"})
+    return None if beats and on & {"pull", "camera_motion"} else beats
 
 
 def trials(seeds: range, frames: int) -> Iterator[Trial]:

@@ -70,6 +70,16 @@ def harmonic_design(directions: FloatArray, degree: int) -> FloatArray:
     return np.array(rows)[:, : (degree + 1) ** 2]
 
 
+def harmonic_sizes(clip: Clip) -> FloatArray:
+    """Mean of |Y_k| over the directions of the pixels of the reference camera, in world axes, (16,)."""
+    camera = clip.cameras[clip.reference]
+    u, v = (np.linspace(0, side - 1, 9).ravel() for side in (camera.width, camera.height))
+    column, row = (axis.ravel() for axis in np.meshgrid(u, v))
+    away = backproject(camera, column, row, np.ones(column.size)).T - camera_centre(camera)
+    directions = away / np.linalg.norm(away, axis=1, keepdims=True)
+    return np.abs(harmonic_design(directions, HIGHEST)).mean(axis=0)
+
+
 def _spread(directions: FloatArray) -> float:
     """Largest angle to the first direction, radians."""
     return float(np.arccos(np.clip(directions @ directions[0], -1, 1)).max())
