@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 # From the ground up. A module imports its own room and the rooms before it, nothing else.
 ROOMS = (
     "errors", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene", "fitting",
-    "simulator", "effects", "runs", "evaluation", "report", "stages", "gradcheck", "golden", "bench", "tradeoff", "api", "cli",
-    "__main__",
+    "simulator", "effects", "runs", "evaluation", "report", "stages", "gradcheck", "golden", "bench", "tradeoff", "api",
+    "cli", "__main__",
 )  # fmt: skip
 METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")
 LONGEST_FUNCTION = 40  # lines

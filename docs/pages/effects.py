@@ -1,4 +1,4 @@
-"""Measure what `endotsr inspect` finds and what `--effects auto` costs or saves, and write the tables of docs/effects.md.
+"""Measure what `endotsr inspect` finds and what `--effects auto` saves, and write the tables of docs/effects.md.
 
     python docs/pages/effects.py detect [SEEDS]   simulated clips: detections, false positives, smallest amplitudes
     python docs/pages/effects.py train [SEEDS]    held-out PSNR and time, `auto` against `everything`

@@ -1,4 +1,4 @@
-"""Generated parts of docs/effects.md as Markdown; the input is the JSON of docs/pages/effects.py and of `bench effects`."""
+"""Generated parts of docs/effects.md as Markdown, from the JSON of docs/pages/effects.py and `bench effects`."""
 
 import math
 from typing import Any
@@ -46,9 +46,9 @@ def costs(result: dict[str, Any]) -> str:
     equal = "the same memory" if sizes == {1.0} else "other memory"
     note = (
         f"Time is processor time of an iteration with {result['gaussians']} Gaussians at "
-        f"{result['width']}x{result['height']} ({machine(result)}); memory is that of Gaussians and optimiser. In the same "
-        f"run an iteration with a part off took {min(ratios):.3f} to {max(ratios):.3f} times that of a build in which the "
-        f"functions of the part do not exist, and {equal}."
+        f"{result['width']}x{result['height']} ({machine(result)}); memory is that of Gaussians and optimiser. In the "
+        f"same run an iteration with a part off took {min(ratios):.3f} to {max(ratios):.3f} times that of a build in "
+        f"which the functions of the part do not exist, and {equal}."
     )
     return f"{table}\n\n{note}"
 
@@ -71,7 +71,8 @@ def amplitudes(result: dict[str, Any]) -> str:
     """The smallest amplitude that every seed shows, and the next smaller one."""
     rows = []
     for effect, found in result["sweeps"].items():
-        always = [x for x in found if all(y["detected"] == y["clips"] for y in found if y["size"] >= x["size"])]
+        missed = max((x["size"] for x in found if x["detected"] < x["clips"]), default=-1.0)
+        always = [x for x in found if x["size"] > missed]
         smallest = f"{min(x['size'] for x in always):.2g} {UNITS[effect]}" if always else "none"
         curve = ", ".join(f"{x['size']:.2g}: {x['detected']}/{x['clips']}" for x in found)
         rows.append((effect, ANSWERS[effect], smallest, curve))
@@ -92,8 +93,8 @@ def training(result: dict[str, Any]) -> str:
         rows.append((name, f"{level:.2f}", f"{mean:+.2f} ± {half:.2f}", f"{time:.0%}", f"{memory:.0%}"))
     heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
     note = (
-        f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; preset "
-        f"`demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of the "
+        f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
+        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of the "
         f"training ({machine(result)})."
     )
     return f"{markdown(heads, rows)}\n\n{note}"
@@ -125,7 +126,9 @@ def real(result: dict[str, Any]) -> str:
             for c in clip["plan"]["changes"]
         ]
         plan = "\n".join(changes) or "- nothing"
-        parts.append(f"**`{name}`**: {clip['training_frames']} training frames.\n\n{table}\n\nThe plan changes:\n\n{plan}")
+        parts.append(
+            f"**`{name}`**: {clip['training_frames']} training frames.\n\n{table}\n\nThe plan changes:\n\n{plan}"
+        )
     return "\n\n".join(parts)
 
 

@@ -25,7 +25,9 @@ def read_sinus(folder: Path) -> Sequence:
         poses, k, points, visible = (stored[name] for name in ("w2c", "K", "points", "visible"))
     paths = sorted((folder / "images").iterdir())
     images = np.stack([_small(np.asarray(Image.open(path).convert("RGB"))) for path in paths])
-    mask = _small(np.repeat(np.asarray(Image.open(folder / "mask.png").convert("L"))[..., None], 3, axis=2))[..., 0] == 255
+    mask = (
+        _small(np.repeat(np.asarray(Image.open(folder / "mask.png").convert("L"))[..., None], 3, axis=2))[..., 0] == 255
+    )
     count, (height, width) = len(paths), mask.shape
     numbers = (k[0, 0], k[1, 1], k[0, 2] + 0.5, k[1, 2] + 0.5)
     cameras = [
@@ -34,10 +36,17 @@ def read_sinus(folder: Path) -> Sequence:
     depth = np.stack([_depth(camera, points[visible[:, i] > 0], mask) for i, camera in enumerate(cameras)])
     train, test = split_frames(count, "every_eighth", 8)
     return Sequence(
-        images=np.ascontiguousarray(images.transpose(0, 3, 1, 2)), masks=np.broadcast_to(mask, (count, height, width)).copy(),
-        depth=depth, times=time_stamps(count), cameras=cameras, names=[path.stem for path in paths], unit="units",
-        static_camera=False, train_index=train, test_index=test,
-    )  # fmt: skip
+        images=np.ascontiguousarray(images.transpose(0, 3, 1, 2)),
+        masks=np.broadcast_to(mask, (count, height, width)).copy(),
+        depth=depth,
+        times=time_stamps(count),
+        cameras=cameras,
+        names=[path.stem for path in paths],
+        unit="units",
+        static_camera=False,
+        train_index=train,
+        test_index=test,
+    )
 
 
 def _small(picture: np.ndarray) -> np.ndarray:

@@ -59,7 +59,11 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
     absent = _prepared(case, changed(config, part))
     seconds: dict[str, list[float]] = {"everything": [], "off": [], "absent": []}
     for turn in range(repeats + 2):
-        for name, pair, missing in (("everything", everything, ()), ("off", off, ()), ("absent", absent, part.functions)):
+        for name, pair, missing in (
+            ("everything", everything, ()),
+            ("off", off, ()),
+            ("absent", absent, part.functions),
+        ):
             taken = _iteration(*pair, missing)
             if turn >= 2:  # after compilation and one warm turn
                 seconds[name].append(taken)

@@ -12,6 +12,8 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.simulator.settings import SimulatorSettings
 
+DEMONSTRATION = SimulatorSettings()
+
 
 @dataclass
 class InspectOptions:
@@ -38,7 +40,7 @@ class InspectOptions:
     masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
     """mask folder (= --sequence.masks)"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
-    simulator: SimulatorSettings = SimulatorSettings()
+    simulator: SimulatorSettings = DEMONSTRATION
     """contents of the `simulated` sequence"""
 
 

@@ -2,9 +2,9 @@
 
 The sharpness of a frame is the mean square of its Laplacian over tissue, at full size, with the part of noise removed,
 over its squared brightness, so that a change of gain leaves it as it is. A blurred frame has less of it and the same
-darkest tissue. Smoke adds light everywhere: the dark channel (the smallest channel, lowest tenth of the tissue) rises as
-well. Both are found only where they vary: a clip that is blurred from the first frame to the last has no sharp frame to
-compare with.
+darkest tissue. Smoke adds light everywhere: the dark channel (the smallest channel, lowest tenth of the tissue) rises
+as well. Both are found only where they vary: a clip that is blurred from the first frame to the last has no sharp frame
+to compare with.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Verd
     rise = series.dark - np.percentile(series.dark, 25)
     spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / 0.6745
     score = np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL)
-    smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of the sharpness",
+    smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of sharpness",
                      clip, {"dark channel": series.dark})  # fmt: skip
     clear = np.where(score >= 1.0, 0.0, fall)
     blur = _verdict("blur", clear, max(BLUR, spread), "natural logarithm", "fall of the log sharpness below its"
@@ -56,7 +56,9 @@ def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float,
     energy = float((curved[inner] ** 2).mean()) - 20.0 * sigma**2 / 3.0
     bright = float(grey[1:-1, 1:-1][inner].mean())
     least = 0.1 * 20.0 * sigma**2 / 3.0 + 1e-8  # energy below a tenth of that of the noise is not measured
-    return float(np.log(max(energy, least) / max(bright, 1e-3) ** 2)), float(np.percentile(image.min(axis=0)[mask], 10)) / 255
+    return float(np.log(max(energy, least) / max(bright, 1e-3) ** 2)), float(
+        np.percentile(image.min(axis=0)[mask], 10)
+    ) / 255
 
 
 def _local_median(course: FloatArray) -> FloatArray:

@@ -106,7 +106,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
     reason = {
         "unknown": "Too few tiles of tissue are seen with depth to tell; motion is assumed.",
         "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
-        "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), and one affine map of the picture explains the motion.",
+        "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), all of it along one affine map of the picture.",
         "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",
         "irregular": f"Tissue moves by up to {largest:.2g} px (RMS), and no rate stands out of the spectrum.",
     }[kind]
@@ -114,7 +114,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
     return Verdict(
         "motion", kind != "none", kind, statistic, 1.0, "times the threshold of a tile",
         "root mean square of the flow of a tile over max(2 x flow of noise alone, 0.05 px)",
-        FALSE_POSITIVES, reason, {"largest_px": largest, "lines": [line._asdict() for line in lines], "half_waves": waves},
+        FALSE_POSITIVES, reason, {"largest_px": largest, "half_waves": waves},
         Curve("mean flow, px", "time", clip.times, {"flow": path}),
         Map("flow, RMS over time, px", tile_map(np.where(tracks.usable, size, np.nan), height, width)),
     )  # fmt: skip

@@ -86,7 +86,7 @@ def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspectio
     """The rate of the degree-0 coefficient with which a step of Adam changes the displayed colour as much as before.
 
     Adam moves every coefficient by about its rate, whatever its gradient. Seen from one direction n, the coefficients
-    h_k move the colour together by sum_k rate_k |Y_k(n)|: without the higher degrees the colour would learn more slowly.
+    h_k move the colour together by sum_k rate_k |Y_k(n)|: without the higher degrees the colour would learn slower.
     """
     lower = next((c for c in plan.changes if c.key == "model.harmonics_degree" and not c.given), None)
     base, rest = config.optimiser.harmonics_base, config.optimiser.harmonics_rest

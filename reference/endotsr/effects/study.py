@@ -185,9 +185,10 @@ def run_study(seeds: int, frames: int, on_message: Callable[[str], object]) -> d
         scenes.setdefault(trial.scene, []).append(wrong)
         noise.append(inspection.noise.level)
         on_message(f"{trial.scene} {trial.amplitude:g}: {', '.join(wrong) or 'right'}")
+    swept = {name: [_row(amplitude, rows) for amplitude, rows in found.items()] for name, found in sweeps.items()}
     return {
         "seeds": seeds, "frames": frames, "clips": len(noise), "noise": float(np.median(noise)), "effects": counts,
-        "sweeps": {name: [_row(amplitude, rows) for amplitude, rows in found.items()] for name, found in sweeps.items()},
+        "sweeps": swept,
     }  # fmt: skip
 
 

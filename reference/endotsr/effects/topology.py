@@ -39,7 +39,7 @@ def topology_verdict(clip: Clip, tracks: Tracks, noise: Noise) -> Verdict:
     )
     course = (lost & textured).sum(axis=1) / max(int(textured.sum()), 1)
     return Verdict("topology change", present, "suspected" if present else "none", statistic, 1.0,
-                   "times the threshold", "tiles whose structure is lost in a sixth of the frames, over 2 % of the tiles",
+                   "times the threshold", "tiles that lose their structure in a sixth of the frames, over 2 %",
                    0.05, reason, {"tiles": int(gone.sum())},
                    Curve("tiles without the structure of the reference, percent", "time", clip.times,
                          {"lost": 100 * course}),

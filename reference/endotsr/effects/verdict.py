@@ -1,5 +1,7 @@
 """The answer of one test: whether an effect is present, how sure that is, and a picture or a curve that shows it."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from endotsr.kernels.arrays import FloatArray
@@ -34,7 +36,7 @@ class Verdict(NamedTuple):
     test: str  # what the statistic is, in words
     false_positive_rate: float  # designed rate; 0 where the answer is a fact and no estimate
     reason: str  # one sentence
-    details: dict[str, Any] = {}  # JSON-able numbers, by name
+    details: Mapping[str, Any] = MappingProxyType({})  # JSON-able numbers, by name
     curve: Curve | None = None
     map: Map | None = None
 
@@ -53,4 +55,5 @@ class Verdict(NamedTuple):
 def verdict_record(verdict: Verdict) -> dict[str, Any]:
     """The verdict as JSON-able data, without picture and curve."""
     fields = verdict._asdict()
-    return {k: v for k, v in fields.items() if k not in ("curve", "map")} | {"confidence": verdict.confidence}
+    kept = {k: v for k, v in fields.items() if k not in ("curve", "map", "details")}
+    return kept | {"details": dict(verdict.details), "confidence": verdict.confidence}

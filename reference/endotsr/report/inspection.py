@@ -44,14 +44,17 @@ def inspection_text(inspection: Inspection, plan: Plan) -> str:
     lines = [head, found, *(f"rate: {rate}" for rate in rates)]
     lines.append("plan:" if plan.changes else "plan: nothing to switch off")
     lines += [
-        f"  {c.key} = {_value(c.value)} (now {_value(c.before)}), saves {c.time:.0%} time, {c.memory:.0%} memory: "
-        f"{c.reason}"
+        f"  {c.key} = {_value(c.value)} (now {_value(c.before)}){_saving(c.time, c.memory)}: {c.reason}"
         for c in plan.changes
     ]
     lines += [f"  {key} stays: {reason}" for key, reason in plan.kept]
     lines += [f"  {remark}" for remark in plan.remarks]
     lines.append(f"expected saving: {plan.time:.0%} of the time and {plan.memory:.0%} of the memory of an iteration")
     return "\n".join(lines)
+
+
+def _saving(time: float, memory: float) -> str:
+    return f", saves {time:.0%} time, {memory:.0%} memory" if time > 0 or memory > 0 else ""
 
 
 def _rate(inspection: Inspection, cycles: float, harmonics: int) -> str:
@@ -94,7 +97,8 @@ def _verdicts(inspection: Inspection) -> str:
     ]  # fmt: skip
     columns = ("Effect", "Found", "Statistic", "Threshold", "Unit", "False positives by design", "Confidence")
     reasons = "".join(
-        f"<dt>{parts.text(v.effect)}</dt><dd>{parts.text(v.reason)}</dd>" for v in inspection.verdicts.values()
+        f"<dt>{parts.text(v.effect)}</dt><dd>{parts.text(v.reason)} <small>{parts.text(v.test)}</small></dd>"
+        for v in inspection.verdicts.values()
     )
     note = (
         "Every test reads training frames only. Confidence is the distance of the statistic from its threshold: 0.5 at "
@@ -106,14 +110,14 @@ def _verdicts(inspection: Inspection) -> str:
 def _plan(plan: Plan) -> str:
     rows = [
         [f"<code>{parts.text(c.key)}</code>", _value(c.before), f"<b>{_value(c.value)}</b>", f"{c.time:.0%}",
-         f"{c.memory:.0%}", parts.text(c.reason)]
+         f"{c.memory:.0%}", parts.text(f"Kept as given. {c.reason}" if c.given else c.reason)]
         for c in plan.changes
     ]  # fmt: skip
     table = tables.html_table(("Setting", "Now", "Plan", "Time saved", "Memory saved", "Reason"), rows) if rows else ""
     kept = "".join(f"<dt><code>{parts.text(key)}</code></dt><dd>{parts.text(reason)}</dd>" for key, reason in plan.kept)
     stays = f"<h3>What stays</h3><dl>{kept}</dl>" if kept else ""
     remarks = "".join(f'<p class="note">{parts.text(remark)}</p>' for remark in plan.remarks)
-    note = "`endotsr train --effects auto` follows this plan; a setting that is given explicitly stays as it is."
+    note = "<code>endotsr train --effects auto</code> follows this plan; a setting that is given explicitly stays."
     return parts.section("The plan", table or "<p>Nothing to switch off.</p>", stays, remarks, note=note)
 
 

@@ -89,7 +89,9 @@ def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
     asked = read_toml(sources.config) if sources.config else {}
     in_file = {f"{section}.{key}" for section, values in asked.items() if isinstance(values, dict) for key in values}
     given = given_keys(options, words)
-    return frozenset(in_file | {key for key in given if "." in key} | {SHORT_NAMES[k] for k in given & set(SHORT_NAMES)})
+    return frozenset(
+        in_file | {key for key in given if "." in key} | {SHORT_NAMES[k] for k in given & set(SHORT_NAMES)}
+    )
 
 
 def with_short_names(config: Config, given: dict[str, Any]) -> Config:
