@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 # From the ground up. A module imports its own room and the rooms before it, nothing else.
 ROOMS = (
     "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene",
-    "fitting", "simulator", "runs", "evaluation", "report", "export", "views", "stages", "gradcheck", "golden", "bench",
-    "tradeoff", "api", "cli", "__main__",
+    "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views", "stages", "gradcheck",
+    "golden", "bench", "tradeoff", "api", "cli", "__main__",
 )  # fmt: skip
 METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")
 LONGEST_FUNCTION = 40  # lines

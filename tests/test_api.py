@@ -1,6 +1,7 @@
 """The Python interface: the same numbers as the command line, stable names, and an import that loads nothing heavy."""
 
 import dataclasses
+import json
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 import endotsr
 from endotsr.cli.main import main
+from endotsr.runs.files import finite
 from endotsr.sequences.endonerf import write_endonerf
 
 SIMULATOR = {"width": 48, "height": 32, "frames": 9}
@@ -264,3 +266,25 @@ def test_a_run_in_memory_renders_with_the_exposure_of_its_frames(tmp_path):
     run = endotsr.train(sequence, iterations=2, on_message=lambda line: None, **settings)
     again = endotsr.open_run(run.save(tmp_path / "run"))
     assert (run.render(0.3).colour == again.render(0.3).colour).all()
+
+
+def test_inspect_gives_what_the_command_writes(tmp_path, capsys):
+    page = tmp_path / "found.json"
+    words = ["--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"]
+    assert main(["inspect", "simulated", *words, "--json", str(page)]) == 0
+    loaded = endotsr.load_sequence("simulated", simulator=SIMULATOR)
+    assert json.loads(page.read_text()) == finite(endotsr.inspect(loaded))
+
+
+def test_effects_auto_follows_the_plan_and_given_keys_stay(capsys):
+    still = {name: {"on": False} for name in ("breathing", "pulsation", "pull", "exposure", "brightening")}
+    loaded = endotsr.load_sequence("simulated", simulator=SIMULATOR | still)
+    said = []
+    short = {"checkpoint_every": 4}
+    run = endotsr.train(
+        loaded, iterations=4, effects="auto", on_message=said.append, model={"appearance": True}, training=short
+    )
+    assert not run.config.model.deformation and run.config.model.appearance
+    assert run.record["effects"]["plan"]["changes"] and said[0] == "effects: auto"
+    with pytest.raises(endotsr.InputError, match="effects = 'some'"):
+        endotsr.train(loaded, effects="some")

@@ -19,7 +19,7 @@ TYPE_CHECKING = False  # as in `typing`, whose import would be the heaviest part
 if TYPE_CHECKING:
     from typing import Any
 
-    from endotsr.api import LoadedSequence, Run, StopTraining, load_sequence, make_config, open_run, train
+    from endotsr.api import LoadedSequence, Run, StopTraining, inspect, load_sequence, make_config, open_run, train
     from endotsr.config import Config
     from endotsr.errors import CalibrationError, InputError
     from endotsr.sequences.sequence import Sequence
@@ -39,6 +39,7 @@ __all__ = [
     "Sequence",
     "StopTraining",
     "__version__",
+    "inspect",
     "load_sequence",
     "make_config",
     "open_run",
@@ -55,6 +56,7 @@ _MODULES = {
     "Run": "endotsr.api",
     "Sequence": "endotsr.sequences.sequence",
     "StopTraining": "endotsr.api",
+    "inspect": "endotsr.api",
     "load_sequence": "endotsr.api",
     "make_config": "endotsr.api",
     "open_run": "endotsr.api",

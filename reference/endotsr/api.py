@@ -133,6 +133,7 @@ def train(
     iterations: int | None = None,
     on_iteration: OnIteration | None = None,
     on_message: OnMessage = print,
+    effects: Literal["everything", "auto"] = "everything",
     **sections: Mapping[str, Any],
 ) -> "Run":
     """Train on a sequence; returns the trained run. The numbers are those of `endotsr train` with these settings.
@@ -144,6 +145,7 @@ def train(
                    gaussians, seconds, and every tenth time psnr. `raise StopTraining` in it ends the training. What it
                    returns is ignored
     on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
+    effects        "auto" trains only what the clip calls for, as `train --effects auto`; keys in `sections` stay
 
     The number of kernel threads of the calling thread is set to `training.threads` (0 = all cores).
     A KeyboardInterrupt ends the training at once, without a run; `StopTraining` keeps it.
@@ -166,12 +168,48 @@ def train(
     if loaded:
         config = msgspec.structs.replace(config, sequence=sequence.settings)
     config = lengthened(config, len(sequence.train_index))
+    config, found = _called_for(sequence, config, effects, sections, on_message)
     state = new_training(sequence, config)
     about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)
-    record = new_record(["endotsr.train"], config, threads, about)
+    record = new_record(["endotsr.train"], config, threads, about) | found
     run = Run(config, record, sources.sequence_record(sequence), [], _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message)
+
+
+def _called_for(
+    sequence: Sequence, config: Config, effects: str, sections: Mapping[str, Mapping[str, Any]], say: OnMessage
+) -> tuple[Config, dict[str, Any]]:
+    """The settings that the clip calls for, and verdicts and plan for the record; with "everything", as they are."""
+    if effects not in ("everything", "auto"):
+        raise InputError(f"train: effects = {effects!r} is not allowed; allowed: everything, auto")
+    if effects == "everything":
+        return config, {}
+    from endotsr.effects.auto import planned_settings
+
+    explicit = frozenset(f"{section}.{key}" for section, values in sections.items() for key in values)
+    config, lines, found = planned_settings(sequence, config, explicit)
+    for line in lines:
+        say(line)
+    return config, found
+
+
+def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: float | None = None) -> dict[str, Any]:
+    """What a clip shows and which components it calls for, as `endotsr inspect --json` writes it.
+
+    config       settings that the plan is relative to; default: preset `paper`
+    frame_rate   frames a second; rates are then also given a minute
+
+    returns      "noise", "verdicts" by effect (present, kind, statistic, threshold, reason, ...), "rates", and "plan"
+                 with its changes, their reasons and the expected savings
+
+    Raises: InputError for a frame rate that is not positive and finite.
+    """
+    from endotsr.effects.inspect import inspect_sequence, inspection_record
+    from endotsr.effects.plan import make_plan, plan_record
+
+    found = inspect_sequence(sequence, frame_rate)
+    return inspection_record(found) | {"plan": plan_record(make_plan(found, PAPER if config is None else config))}
 
 
 def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":

@@ -6,6 +6,7 @@ from typing import Any
 
 from endotsr.cli.parts.bench_options import (
     AllOptions,
+    EffectsOptions,
     IterationOptions,
     PeersOptions,
     ScalingOptions,
@@ -106,6 +107,16 @@ def _stages(options: StagesOptions) -> None:
         charts.stage_bars(result["cases"], options.plot)
 
 
+def _effects(options: EffectsOptions) -> None:
+    from endotsr.bench.effects import benchmark_effects, table
+    from endotsr.kernels.threads import use_threads
+
+    use_threads(options.threads)
+    result = benchmark_effects(options.gaussians, options.repeats, options.width, options.height)
+    print(table(result))
+    _record(options.json, result | {"threads": options.threads})
+
+
 def _scaling(options: ScalingOptions) -> None:
     from endotsr.bench import charts, scaling
 
@@ -141,6 +152,7 @@ def _all(options: AllOptions) -> None:
 MEASURES: dict[str, tuple[type, Callable[[Any], None]]] = {
     "iteration": (IterationOptions, _iteration),
     "stages": (StagesOptions, _stages),
+    "effects": (EffectsOptions, _effects),
     "scaling": (ScalingOptions, _scaling),
     "peers": (PeersOptions, _peers),
     "start": (StartOptions, _start),

@@ -20,6 +20,7 @@ COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "train": "train on an EndoNeRF folder, or on a simulated sequence",
     "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",
+    "inspect": "test a clip for motion, light, instruments and more, and plan the components that it calls for",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render pictures and films at any time in [0, 1], from any camera",
     "view": "write a page with the moving scene, which opens in any browser without a network",
@@ -87,7 +88,7 @@ def _main(words: list[str]) -> int:
         _fail(f"training diverged: non-finite values: {error}; a smaller learning rate may help")
         return 1
     except MemoryError:
-        return _fail(f"not enough memory; {LESS_MEMORY.get(argv[0], OTHER_PROGRAMS)}")
+        return _fail(f"not enough memory; {LESS_MEMORY.get(words[0], OTHER_PROGRAMS)}")
 
 
 def _command(name: str):

@@ -2,10 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.options import asked_settings, base_settings, differences, with_short_names
+from endotsr.cli.parts.options import (
+    asked_settings,
+    base_settings,
+    differences,
+    explicit_settings,
+    with_short_names,
+)
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
 from endotsr.config import PAPER, PRESETS, Config, lengthened
@@ -48,6 +54,8 @@ class TrainOptions:
     """seed of every random draw (= --training.seed)"""
     threads: int | None = None
     """threads, 0 = all cores (= --training.threads)"""
+    effects: Literal["everything", "auto"] = "everything"
+    """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
     resume: bool = False
     """continue the run in --out"""
     evaluate: bool = True
@@ -92,6 +100,7 @@ def _settings(options: TrainOptions) -> Config:
 
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
     """Check everything, print the settings and the sequence, and train to the end."""
+    from endotsr.effects.auto import planned_settings
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.files import refuse_inside
     from endotsr.runs.sources import SIMULATED, load_sequence
@@ -106,11 +115,17 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
         refuse_inside(options.out, Path(source), "the sequence")
     sequence = load_sequence(source, config, options.simulator)
     config = lengthened(config, len(sequence.train_index))
+    threads = use_threads(config.training.threads)
+    found: dict[str, Any] = {}
+    lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
+    if options.effects == "auto":
+        config, lines, found = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
     _say_settings(config, schedule_note)
     _say_sequence(source, sequence)
-    threads = use_threads(config.training.threads)
+    for line in lines:
+        print(line)
     print("starting", flush=True)
-    record = start_record(["endotsr", "train", *words], source, sequence, config, options.simulator, threads)
+    record = start_record(["endotsr", "train", *words], source, sequence, config, options.simulator, threads) | found
     return train_new_run(options.out, record, sequence, config, Progress(config.training.iterations)), sequence
 
 

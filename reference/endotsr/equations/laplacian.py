@@ -104,6 +104,15 @@ def _expand_support(valid: BoolArray, shape: tuple[int, ...], upsampling: Upsamp
     return valid
 
 
+def _full_bands(shape: tuple[int, ...], levels: int) -> tuple[BoolArray, ...]:
+    """Bands without an invalid pixel."""
+    bands = []
+    for _ in range(levels):
+        bands.append(np.ones(shape, np.bool_))
+        shape = tuple(coarse_length(side) for side in shape)
+    return tuple(bands)
+
+
 def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling = "co_sited") -> SupportMasks:
     """Valid pixels of every band: the mask passed through the operations of the pyramid as a boolean.
 
@@ -115,6 +124,8 @@ def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling 
     """
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
     bands, valid = [], mask
+    if mask.all():  # nothing to propagate: every band pixel is valid
+        return SupportMasks(mask, _full_bands(mask.shape, levels), upsampling)
     for _ in range(levels):
         coarse = _reduce_support(valid)
         bands.append(np.ascontiguousarray(valid & _expand_support(coarse, valid.shape, upsampling)))

@@ -64,7 +64,9 @@ def smoothness_forward(
     depth = check_plane("rendered_depth", rendered_depth, mask.shape)
     smooth = mask & ~check_plane("edges", edges, mask.shape)
     mask = np.ascontiguousarray(mask)
-    saved = SmoothnessSaved(depth, rendered, mask, smooth, float(total_variation_factor))
+    # without an excluded pixel the total variation and its gradient are exactly 0
+    factor = 0.0 if mask.all() else float(total_variation_factor)
+    saved = SmoothnessSaved(depth, rendered, mask, smooth, factor)
     loss = _squared_steps_kernel(depth, smooth) * _smooth_weight(smooth)
     if saved.total_variation_factor != 0:
         loss += saved.total_variation_factor * (_total_variation(depth[None], mask) + _total_variation(rendered, mask))

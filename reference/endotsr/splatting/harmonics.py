@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
-from endotsr.kernels.groups import GROUP, column, keep, keep_where, kept, write_group
+from endotsr.kernels.groups import GROUP, column, keep, kept, write_group
 from endotsr.kernels.jit import jit, jit_inline
 from endotsr.kernels.sums import sum_columns
 from endotsr.kernels.threads import parallel_for
@@ -122,8 +122,8 @@ def _colour_reverse(
         count = min(GROUP, stop - start)
         if degree > 0:
             _fill_basis_kernel(position, centre, start, count, directions, basis)
-        for place in range(BASIS):
-            d_basis[_U64(place)] = zero
+            for place in range(BASIS):
+                d_basis[_U64(place)] = zero
         for channel in range(3):
             for item in range(count):
                 i = _U64(start + item)
@@ -131,10 +131,14 @@ def _colour_reverse(
             _colour_channel_reverse_kernel(
                 harmonics, channel, start, count, terms, basis, d_sums, d_harmonics, d_residual, d_basis
             )
-        for item in range(count):
-            x, y, z, inverse = kept(directions, 4, item)
-            d_direction = harmonic_basis_reverse(degree, x, y, z, kept(d_basis, 15, item))
-            keep_where(degree > 0, results, item, direction_reverse(x, y, z, inverse, d_direction))
+        if degree > 0:
+            for item in range(count):
+                x, y, z, inverse = kept(directions, 4, item)
+                d_direction = harmonic_basis_reverse(degree, x, y, z, kept(d_basis, 15, item))
+                keep(results, item, direction_reverse(x, y, z, inverse, d_direction))
+        else:
+            for place in range(POSITION):
+                results[_U64(place)] = zero
         write_group(results, start, count, d_position)
 
 

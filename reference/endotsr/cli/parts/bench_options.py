@@ -55,6 +55,24 @@ class StagesOptions:
 
 
 @dataclass
+class EffectsOptions:
+    """Measure what each part that can be switched off takes of an iteration, and that a part that is off is free."""
+
+    gaussians: int = 20_000
+    """Gaussians of the common workload"""
+    width: int = 320
+    """columns of the picture"""
+    height: int = 256
+    """rows of the picture"""
+    repeats: int = 15
+    """timed turns of each state"""
+    threads: int = 1
+    """threads, 0 = all cores; times are processor times of all threads"""
+    json: File = None
+    """also write the figures as JSON"""
+
+
+@dataclass
 class ScalingOptions:
     """Measure cost against each size alone, with fitted exponents, and memory per Gaussian."""
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from endotsr.cli.parts.parser import parse_known
+from endotsr.cli.parts.parser import given_keys, parse_known
 from endotsr.config import (
     MILESTONES,
     Config,
@@ -81,6 +81,17 @@ def asked_settings(words: list[str], kept: Config) -> Config:
     if sources.preset or "preset" in asked:
         data["preset"] = wanted["preset"]
     return config_from_dict(data, str(sources.config or "command line"))
+
+
+def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
+    """Keys of the settings that the command line or its TOML file names: `model.bases`. A preset names none."""
+    sources = parse_known(Sources, words)
+    asked = read_toml(sources.config) if sources.config else {}
+    in_file = {f"{section}.{key}" for section, values in asked.items() if isinstance(values, dict) for key in values}
+    given = given_keys(options, words)
+    return frozenset(
+        in_file | {key for key in given if "." in key} | {SHORT_NAMES[k] for k in given & set(SHORT_NAMES)}
+    )
 
 
 def with_short_names(config: Config, given: dict[str, Any]) -> Config:

@@ -51,6 +51,13 @@ def parse_known(options: type[T], words: list[str]) -> T:
     return _built(options, fields, _given(fields, words)[0], None)
 
 
+def given_keys(options: type, words: list[str]) -> frozenset[str]:
+    """Keys of the options that the words name: `model.bases` for `--model.bases 9`, `seed` for `--seed 3`."""
+    fields = fields_of(options)
+    named = {field.path: field.key for field in fields}
+    return frozenset(named[path] for path in _given(fields, words)[0])
+
+
 def _given(fields: list[Field], words: list[str]) -> tuple[dict[tuple[str, ...], Any], list[str]]:
     """Path -> converted value of every option that was given, and the words that belong to none."""
     by_path = {".".join(field.path): field for field in fields}

@@ -1,0 +1,145 @@
+"""Generated parts of docs/effects.md as Markdown, from the JSON of docs/pages/effects.py and `bench effects`."""
+
+import math
+from typing import Any
+
+from endotsr.effects.study import ANSWERS, UNITS
+from endotsr.report.tables import markdown
+
+ANSWERED = {
+    "motion": ("Pixels of tissue move", "time bases (`model.deformation`)", "deformation",
+               "any motion above a twentieth of a pixel"),
+    "periodic motion": ("The same motion returns at a rate", "Fourier translation (`model.spectral_motion`)",
+                        "spectral_motion", "a rate of three cycles or more in the clip"),
+    "photometric": ("The light changes: gain, white balance, or in places", "Fourier colour (`model.appearance`)",
+                    "appearance", "a change of one grey level or more"),
+    "view change": ("A point is seen from several directions", "harmonics above degree 0 (`model.harmonics_degree`)",
+                    "harmonics", "views that differ by several degrees"),
+    "occluders": ("Masks exclude instruments", "mask propagation and total variation under the masks", "",
+                  "any excluded pixel; a full mask is recognised and costs nothing"),
+    "depth quality": ("Depth has holes, steps or flicker", "smoothness (`loss.smoothness_weight`)", "smoothness",
+                      "always, unless no frame has usable depth"),
+    "highlights": ("White spots on wet tissue", "none: they are fitted as colour", "", "-"),
+    "topology change": ("Tissue is cut, or folds over", "none", "", "leave the frames out, or expect errors there"),
+    "smoke": ("A grey veil", "none", "", "leave the frames out"),
+    "blur": ("Single frames without detail", "none", "", "leave the frames out"),
+}  # fmt: skip
+
+
+def machine(result: dict[str, Any]) -> str:
+    """Date and machine of a measurement."""
+    about = result["machine"]
+    return f"{about['processor']} ({about['cores']} cores), {result['date'][:10]}"
+
+
+def costs(result: dict[str, Any]) -> str:
+    """Effect, what it looks like, the component that answers it, its cost, when it is worth it."""
+    rows = []
+    for effect, (looks, component, part, worth) in ANSWERED.items():
+        measured = result["parts"].get(part)
+        time = f"{measured['saved']:.0%}" if measured else "-"
+        memory = f"{measured['memory_saved']:.0%}" if measured else "-"
+        rows.append((effect, looks, component, time, memory, worth))
+    table = markdown(("Effect", "What it looks like", "Component", "Time", "Memory", "Worth it with"), rows)
+    parts = result["parts"].values()
+    ratios, sizes = [x["off_over_absent"] for x in parts], {x["memory_over_absent"] for x in parts}
+    equal = "the same memory" if sizes == {1.0} else "other memory"
+    note = (
+        f"Time is processor time of an iteration with {result['gaussians']} Gaussians at "
+        f"{result['width']}x{result['height']} ({machine(result)}); memory is that of Gaussians and optimiser. In the "
+        f"same run an iteration with a part off took {min(ratios):.3f} to {max(ratios):.3f} times that of a build in "
+        f"which the functions of the part do not exist, and {equal}."
+    )
+    return f"{table}\n\n{note}"
+
+
+def detections(result: dict[str, Any]) -> str:
+    """Detections at full amplitude and false positives of each test."""
+    rows = [
+        (name, _of(x["detected"], x["positives"]), _of(x["false"], x["negatives"]), _upper(x["false"], x["negatives"]))
+        for name, x in result["effects"].items()
+    ]
+    table = markdown(("Test", "Detected", "False positives", "95 % upper limit"), rows)
+    note = (
+        f"{result['clips']} simulated clips of {result['frames']} frames, {result['seeds']} seeds, noise of "
+        f"{255 * result['noise']:.1f} grey levels ({machine(result)})."
+    )
+    return f"{table}\n\n{note}"
+
+
+def amplitudes(result: dict[str, Any]) -> str:
+    """The smallest amplitude that every seed shows, and the next smaller one."""
+    rows = []
+    for effect, found in result["sweeps"].items():
+        missed = max((x["size"] for x in found if x["detected"] < x["clips"]), default=-1.0)
+        always = [x for x in found if x["size"] > missed]
+        smallest = f"{min(x['size'] for x in always):.2g} {UNITS[effect]}" if always else "none"
+        curve = ", ".join(f"{x['size']:.2g}: {x['detected']}/{x['clips']}" for x in found)
+        rows.append((effect, ANSWERS[effect], smallest, curve))
+    return markdown(("Effect", "Test", "Smallest amplitude found in every seed", "Found at each amplitude"), rows)
+
+
+def training(result: dict[str, Any]) -> str:
+    """`auto` against `everything`, paired by clip and seed."""
+    rows = []
+    for name, pairs in result["scenes"].items():
+        gain = [pair["auto"]["psnr"] - pair["everything"]["psnr"] for pair in pairs]
+        mean, half = interval(gain)
+        time = 1 - sum(p["auto"]["seconds"] for p in pairs) / sum(p["everything"]["seconds"] for p in pairs)
+        memory = 1 - sum(p["auto"]["numbers"] * p["auto"]["gaussians"] for p in pairs) / sum(
+            p["everything"]["numbers"] * p["everything"]["gaussians"] for p in pairs
+        )
+        level = sum(pair["everything"]["psnr"] for pair in pairs) / len(pairs)
+        rows.append((name, f"{level:.2f}", f"{mean:+.2f} ± {half:.2f}", f"{time:.0%}", f"{memory:.0%}"))
+    heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
+    note = (
+        f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
+        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of the "
+        f"training ({machine(result)})."
+    )
+    return f"{markdown(heads, rows)}\n\n{note}"
+
+
+def interval(values: list[float]) -> tuple[float, float]:
+    """Mean and half width of its 95 % interval (t distribution); nan for one value."""
+    from scipy import stats
+
+    n = len(values)
+    mean = sum(values) / n
+    if n < 2:
+        return mean, math.nan
+    spread = math.sqrt(sum((v - mean) ** 2 for v in values) / (n - 1) / n)
+    return mean, float(stats.t.ppf(0.975, n - 1)) * spread
+
+
+def real(result: dict[str, Any]) -> str:
+    """Verdicts on real clips, and their plans."""
+    parts = []
+    for name, clip in result["clips"].items():
+        rows = [
+            (effect, v["kind"], f"{v['statistic']:.3g}", f"{v['threshold']:.3g}", v["reason"])
+            for effect, v in clip["verdicts"].items()
+        ]
+        table = markdown(("Effect", "Found", "Statistic", "Threshold", "Reason"), rows)
+        changes = [
+            f"- `{c['key']}` = {str(c['value']).lower()} (was {str(c['before']).lower()}): {c['reason']}"
+            for c in clip["plan"]["changes"]
+        ]
+        plan = "\n".join(changes) or "- nothing"
+        parts.append(
+            f"**`{name}`**: {clip['training_frames']} training frames.\n\n{table}\n\nThe plan changes:\n\n{plan}"
+        )
+    return "\n\n".join(parts)
+
+
+def _of(count: int, total: int) -> str:
+    return f"{count} of {total}" if total else "-"
+
+
+def _upper(count: int, total: int) -> str:
+    """Exact (Clopper-Pearson) one-sided 95 % upper limit of a rate."""
+    from scipy import stats
+
+    if total == 0:
+        return "-"
+    return f"{float(stats.beta.ppf(0.95, count + 1, total - count)) if count < total else 1.0:.1%}"

@@ -1,0 +1,130 @@
+"""`endotsr bench effects`: what every part that can be switched off takes of an iteration, and that off is free.
+
+For each part two states of the common workload take turns, one with everything and one with the part off, so that other
+work on the machine disturbs both alike. A third takes turns with them: the part off, in a build in which the functions
+of the part do not exist. It must take the same time and memory as the second.
+"""
+
+import statistics
+import time
+from contextlib import ExitStack
+from typing import Any, NamedTuple
+from unittest import mock
+
+import msgspec
+
+from endotsr.bench.case import Case, representative
+from endotsr.config import PAPER, Config, config_from_dict
+from endotsr.fitting import model, objective
+from endotsr.fitting.fused import step
+from endotsr.report.tables import plain
+from endotsr.scene import workload
+from endotsr.scene.gaussians import arrays
+
+
+class Part(NamedTuple):
+    """A part, the setting that turns it off, and the functions that only it calls."""
+
+    name: str
+    key: str
+    off: Any
+    functions: tuple[tuple[Any, str], ...]
+
+
+PARTS = (
+    Part("deformation", "model.deformation", False,
+         ((model, "deformation_forward"), (step, "deformation_adam_step"))),
+    Part("spectral_motion", "model.spectral_motion", False, ((model, "motion_forward"),)),
+    Part("appearance", "model.appearance", False, ((model, "appearance_forward"),)),
+    Part("harmonics", "model.harmonics_degree", 0, ()),
+    Part("laplacian", "model.laplacian", False, ((objective, "laplacian_loss_forward"),)),
+    Part("depth", "loss.depth_weight", 0.0, ((objective, "normalised_depth_forward"),)),
+    Part("smoothness", "loss.smoothness_weight", 0.0, ((objective, "smoothness_forward"),)),
+)  # fmt: skip
+
+
+def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, config: Config = PAPER) -> dict[str, Any]:
+    """Seconds of processor time of an iteration with everything, with a part off, and without its functions.
+
+    returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved"}}, medians of
+             `repeats` turns; sizes
+    """
+    found = {part.name: _one(part, gaussians, repeats, width, height, config) for part in PARTS}
+    return {"gaussians": gaussians, "width": width, "height": height, "repeats": repeats, "parts": found}
+
+
+def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
+    case = Case(gaussians=gaussians, width=width, height=height)
+    everything, off, absent = _prepared(case, config), _prepared(case, changed(config, part)), None
+    absent = _prepared(case, changed(config, part))
+    seconds: dict[str, list[float]] = {"everything": [], "off": [], "absent": []}
+    for turn in range(repeats + 2):
+        for name, pair, missing in (
+            ("everything", everything, ()),
+            ("off", off, ()),
+            ("absent", absent, part.functions),
+        ):
+            taken = _iteration(*pair, missing)
+            if turn >= 2:  # after compilation and one warm turn
+                seconds[name].append(taken)
+    pairs = list(zip(seconds["off"], seconds["absent"]))
+    medians = {name: statistics.median(values) for name, values in seconds.items()}
+    sizes = {name: _numbers(pair[0]) for name, pair in (("everything", everything), ("off", off), ("absent", absent))}
+    return {
+        "everything_ms": 1e3 * medians["everything"],
+        "off_ms": 1e3 * medians["off"],
+        "absent_ms": 1e3 * medians["absent"],
+        "saved": 1.0 - statistics.median([o / e for o, e in zip(seconds["off"], seconds["everything"])]),
+        "off_over_absent": statistics.median([o / a for o, a in pairs]),
+        "memory_saved": 1.0 - sizes["off"] / sizes["everything"],
+        "memory_over_absent": sizes["off"] / sizes["absent"],
+    }
+
+
+def changed(config: Config, part: Part) -> Config:
+    """The configuration with a part off."""
+    data = msgspec.to_builtins(config)
+    section, name = part.key.split(".")
+    data[section][name] = part.off
+    return config_from_dict(data, "bench effects")
+
+
+def _prepared(case: Case, config: Config) -> tuple[Any, Any]:
+    """State at a representative iteration of the published schedule, and its workshop."""
+    from endotsr.fitting.state import bench_state, workshop
+
+    shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
+    for index in shop.sequence.train_index:
+        shop.targets_of(int(index))
+    return bench_state(workload.gaussians(case.gaussians, config), config, representative(PAPER)), shop
+
+
+def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> float:
+    from endotsr.fitting.trainer import training_step
+
+    iteration = state.iteration
+    with ExitStack() as stack:
+        for module, name in missing:
+            stack.enter_context(mock.patch.object(module, name, None))
+        began = time.process_time()
+        training_step(state, shop)
+        taken = time.process_time() - began
+    state.iteration = iteration
+    return taken
+
+
+def _numbers(state: Any) -> int:
+    """Bytes of the Gaussians and of their moments."""
+    moments = [*state.adam.first.values(), *state.adam.second.values()]
+    return sum(a.nbytes for a in (*arrays(state.gaussians).values(), *moments))
+
+
+def table(result: dict[str, Any]) -> str:
+    """The result as a table for the terminal."""
+    rows = [
+        [name, f"{x['everything_ms']:.1f}", f"{x['off_ms']:.1f}", f"{x['saved']:.1%}", f"{x['off_over_absent']:.3f}",
+         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}"]
+        for name, x in result["parts"].items()
+    ]  # fmt: skip
+    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent")
+    return plain(heads, rows)

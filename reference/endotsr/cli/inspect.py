@@ -1,0 +1,70 @@
+"""`endotsr inspect`: what a clip shows, and which components it calls for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.options import base_settings, with_short_names
+from endotsr.cli.parts.parser import parse
+from endotsr.config import PAPER, Config
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.simulator.settings import SimulatorSettings
+
+DEMONSTRATION = SimulatorSettings()
+
+
+@dataclass
+class InspectOptions:
+    """Test the training frames of a sequence for every effect, and plan the components that they call for.
+
+    The plan is relative to the settings given here (preset, TOML file, options), as `endotsr train` would use them.
+    `endotsr train --effects auto` follows it.
+    """
+
+    sequence: Annotated[str, Option("SEQUENCE", positional=True)]
+    """EndoNeRF folder, or `simulated`"""
+    out: Annotated[Path | None, Option("report.html")] = None
+    """write a self-contained page with pictures"""
+    json: Annotated[Path | None, Option("FILE")] = None
+    """write verdicts and plan as JSON"""
+    frame_rate: Annotated[float | None, Option("FPS")] = None
+    """frames a second; rates are then also given a minute"""
+    config: Annotated[Path | None, Option("FILE.toml")] = None
+    """settings to start from"""
+    scale: float | None = None
+    """image scale (= --sequence.scale)"""
+    frames: Annotated[str | None, Option("A:B[:S]")] = None
+    """frame range (= --sequence.frames)"""
+    masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
+    """mask folder (= --sequence.masks)"""
+    settings: Annotated[Config, Option(flat=True)] = PAPER
+    simulator: SimulatorSettings = DEMONSTRATION
+    """contents of the `simulated` sequence"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    from endotsr.effects.inspect import inspect_sequence, inspection_record
+    from endotsr.effects.plan import make_plan, plan_record
+    from endotsr.report.inspection import inspection_text, write_inspection
+    from endotsr.runs.sources import load_sequence
+
+    base, _ = base_settings(words)
+    options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
+    if not options.sequence:
+        raise InputError("inspect: SEQUENCE is missing: an EndoNeRF folder, or the word `simulated`")
+    names = ("scale", "frames", "masks")
+    config = with_short_names(options.settings, {name: getattr(options, name) for name in names})
+    refuse_unwritable(options.out, options.json)
+    sequence = load_sequence(options.sequence, config, options.simulator)
+    inspection = inspect_sequence(sequence, options.frame_rate)
+    plan = make_plan(inspection, config)
+    print(inspection_text(inspection, plan))
+    if options.out:
+        write_inspection(options.out, Path(options.sequence).name, inspection, plan)
+        print(f"report: {options.out}")
+    if options.json:
+        write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})
+    return 0

@@ -1,0 +1,25 @@
+"""`--effects auto`: inspect a sequence, plan, and change the settings, in one call."""
+
+from typing import Any
+
+from endotsr.config import Config
+from endotsr.effects.inspect import inspect_sequence, inspection_record
+from endotsr.effects.plan import apply_plan, make_plan, plan_record
+from endotsr.sequences.sequence import Sequence
+
+
+def planned_settings(
+    sequence: Sequence, config: Config, explicit: frozenset[str] = frozenset()
+) -> tuple[Config, list[str], dict[str, Any]]:
+    """The settings that the clip calls for.
+
+    explicit   keys that were given on the command line or in a file, which the plan leaves alone
+    returns    the settings; lines that say every change, its reason, and what was left alone; and {"effects": verdicts
+               and plan} for the record of a run
+    """
+    inspection = inspect_sequence(sequence)
+    plan = make_plan(inspection, config, explicit)
+    settings, lines = apply_plan(plan, config)
+    head = "effects: auto" if lines else "effects: auto; the clip calls for everything that the settings have"
+    record = {"effects": inspection_record(inspection) | {"plan": plan_record(plan)}}
+    return settings, [head, *(f"  {line}" for line in lines)], record

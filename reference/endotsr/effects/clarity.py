@@ -1,0 +1,80 @@
+"""Smoke and blur: frames whose fine contrast is far below that of the others.
+
+The sharpness of a frame is the mean square of its Laplacian over tissue, at full size, with the part of noise removed,
+over its squared brightness, so that a change of gain leaves it as it is. A blurred frame has less of it and the same
+darkest tissue. Smoke adds light everywhere: the dark channel (the smallest channel, lowest tenth of the tissue) rises
+as well. Both are found only where they vary: a clip that is blurred from the first frame to the last has no sharp frame
+to compare with.
+"""
+
+import numpy as np
+
+from endotsr.effects.clip import Clip
+from endotsr.effects.noise import Noise
+from endotsr.effects.verdict import Curve, Verdict
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.sequence import Sequence
+
+BLUR = np.log(2.0)  # fall of the log sharpness below the median frame
+SMOKE_FALL = np.log(1.5)
+SMOKE_RISE = 0.05  # of the dark channel, display units
+SCATTER = 4.0  # deviations (MAD) of the frames, which a single frame must exceed as well
+NEIGHBOURS = 4  # frames on either side: slow change, as of the view, is no blur
+
+
+class _Series:
+    """Sharpness and dark channel of the training frames."""
+
+    def __init__(self, sequence: Sequence, clip: Clip, noise: Noise) -> None:
+        rows = [_measures(sequence.images[i], sequence.masks[i], noise.level) for i in sequence.train_index]
+        self.sharpness, self.dark = (np.array(column) for column in zip(*rows))
+
+
+def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Verdict, Verdict]:
+    """Verdicts on smoke and on blur."""
+    series = _Series(sequence, clip, noise)
+    fall = _local_median(series.sharpness) - series.sharpness
+    slow_fall = np.percentile(series.sharpness, 75) - series.sharpness
+    rise = series.dark - np.percentile(series.dark, 25)
+    spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / 0.6745
+    score = np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL)
+    smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of sharpness",
+                     clip, {"dark channel": series.dark})  # fmt: skip
+    clear = np.where(score >= 1.0, 0.0, fall)
+    blur = _verdict("blur", clear, max(BLUR, spread), "natural logarithm", "fall of the log sharpness below its"
+                    " neighbours", clip, {"log sharpness": series.sharpness})  # fmt: skip
+    return smoke, blur
+
+
+def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float, float]:
+    """Log sharpness and dark channel of a frame (3, H, W) uint8."""
+    inner = mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
+    if not inner.any():
+        return 0.0, 0.0
+    grey = image.mean(axis=0, dtype=np.float32) / np.float32(255)
+    curved = 4 * grey[1:-1, 1:-1] - grey[:-2, 1:-1] - grey[2:, 1:-1] - grey[1:-1, :-2] - grey[1:-1, 2:]
+    energy = float((curved[inner] ** 2).mean()) - 20.0 * sigma**2 / 3.0
+    bright = float(grey[1:-1, 1:-1][inner].mean())
+    least = 0.1 * 20.0 * sigma**2 / 3.0 + 1e-8  # energy below a tenth of that of the noise is not measured
+    return float(np.log(max(energy, least) / max(bright, 1e-3) ** 2)), float(
+        np.percentile(image.min(axis=0)[mask], 10)
+    ) / 255
+
+
+def _local_median(course: FloatArray) -> FloatArray:
+    from scipy.ndimage import median_filter
+
+    return median_filter(course, size=2 * NEIGHBOURS + 1, mode="nearest")
+
+
+def _verdict(
+    effect: str, score: FloatArray, threshold: float, unit: str, test: str, clip: Clip, lines: dict[str, FloatArray]
+) -> Verdict:
+    bad = np.flatnonzero(score >= threshold)
+    statistic = float(score.max()) if score.size else 0.0
+    word = {"smoke": "smoke", "blur": "blur"}[effect]
+    reason = (
+        f"{len(bad)} of {clip.count} training frames show {word}." if bad.size else f"No training frame shows {word}."
+    )
+    return Verdict(effect, bool(bad.size), word if bad.size else "none", statistic, threshold, unit, test, 0.01, reason,
+                   {"frames": bad.tolist()}, Curve(", ".join(lines), "time", clip.times, lines))  # fmt: skip

@@ -1,0 +1,87 @@
+"""The training frames of a sequence at the working size of all tests.
+
+In: a `Sequence`. Out: arrays of its m training frames; a picture that is wider than `WIDEST` is averaged over squares
+of pixels. Held-out frames are never read. Tests of fine structure (highlights, blur) read the full size instead.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
+
+WIDEST = 320  # columns of the working size
+TILE = 16  # side of the tiles over which pixels are averaged, working pixels
+TILE_TISSUE = 0.5  # a tile counts where at least this fraction of its pixels is tissue
+LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)
+
+
+class Clip(NamedTuple):
+    """m training frames at the working size h x w."""
+
+    images: NDArray[np.float32]  # (m, 3, h, w) display units
+    masks: BoolArray  # (m, h, w) True where all pixels of the square are tissue
+    depth: NDArray[np.float32]  # (m, h, w) scene units, one sample of each square; 0 = no depth
+    times: NDArray[np.float64]  # (m,) normalised, ascending
+    cameras: list[Camera]  # m, at full size
+    shrink: int  # side of the averaged squares, pixels of the full size
+    frames: int  # of the whole sequence, held-out frames included
+
+    @property
+    def count(self) -> int:
+        """Number of training frames m."""
+        return len(self.images)
+
+    @property
+    def reference(self) -> int:
+        """The training frame that the others are compared with: the middle one."""
+        return self.count // 2
+
+    @property
+    def luminance(self) -> NDArray[np.float32]:
+        """(m, h, w) display units."""
+        return np.einsum("c,mchw->mhw", LUMINANCE, self.images, optimize=True)
+
+
+def training_clip(sequence: Sequence) -> Clip:
+    """The training frames of a sequence, averaged to at most `WIDEST` columns."""
+    index, side = sequence.train_index, -(-sequence.width // WIDEST)
+    height, width = sequence.height // side, sequence.width // side
+    rows, columns = height * side, width * side
+    images = np.empty((len(index), 3, height, width), np.float32)
+    for k, i in enumerate(index):
+        picture = sequence.images[i][:, :rows, :columns].reshape(3, height, side, width, side)
+        images[k] = picture.mean(axis=(2, 4), dtype=np.float32) / np.float32(255)
+    masks = sequence.masks[index][:, :rows, :columns].reshape(-1, height, side, width, side).all(axis=(2, 4))
+    depth = sequence.depth[index][:, side // 2 : rows : side, side // 2 : columns : side]
+    cameras = [sequence.cameras[i] for i in index]
+    return Clip(images, masks, depth, sequence.times[index], cameras, side, sequence.count)
+
+
+def tile_means(values: FloatArray, weights: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Mean of `values` (..., h, w) over the True pixels of `weights` (h, w) in each tile, and the pixels counted.
+
+    returns  (..., T) means, nan for a tile with less than `TILE_TISSUE` of its pixels; (T,) counts
+    """
+    height, width = weights.shape
+    rows, columns = height // TILE * TILE, width // TILE * TILE
+
+    def totals(a: FloatArray) -> FloatArray:
+        cut = a[..., :rows, :columns].reshape(*a.shape[:-2], rows // TILE, TILE, columns // TILE, TILE)
+        return cut.sum(axis=(-3, -1), dtype=np.float64).reshape(*a.shape[:-2], -1)
+
+    counts = totals(weights.astype(np.float64))
+    sums = totals(np.where(weights, values, 0.0))
+    enough = counts >= TILE_TISSUE * TILE * TILE
+    return np.where(enough, sums / np.maximum(counts, 1.0), np.nan), counts
+
+
+def tile_map(values: FloatArray, height: int, width: int) -> FloatArray:
+    """Values of the tiles (T,) as a picture (h, w); pixels beyond the last whole tile are nan."""
+    rows, columns = height // TILE, width // TILE
+    picture = np.full((height, width), np.nan)
+    picture[: rows * TILE, : columns * TILE] = np.kron(values.reshape(rows, columns), np.ones((TILE, TILE)))
+    return picture

@@ -1,0 +1,77 @@
+"""All tests of a clip, in order: the noise, then motion, on which the test of light depends, then the others."""
+
+from typing import Any, NamedTuple
+
+from endotsr.effects.clarity import clarity_verdicts
+from endotsr.effects.clip import Clip, training_clip
+from endotsr.effects.depth_quality import depth_verdict
+from endotsr.effects.motion import motion_verdict
+from endotsr.effects.noise import Noise, estimate_noise
+from endotsr.effects.periodic import Line
+from endotsr.effects.photometric import photometric_verdict
+from endotsr.effects.seen import camera_verdict, highlight_verdict, occluder_verdict
+from endotsr.effects.topology import topology_verdict
+from endotsr.effects.tracks import make_tracks
+from endotsr.effects.verdict import Verdict, verdict_record
+from endotsr.effects.views import view_verdict
+from endotsr.errors import InputError
+from endotsr.sequences.sequence import Sequence
+
+EFFECTS = (
+    "motion", "photometric", "highlights", "occluders", "camera motion", "view change", "depth quality",
+    "topology change", "smoke", "blur",
+)  # fmt: skip
+
+
+class Inspection(NamedTuple):
+    """Everything that was found in a clip."""
+
+    clip: Clip
+    noise: Noise
+    verdicts: dict[str, Verdict]  # by effect, in the order of `EFFECTS`
+    lines: list[Line]  # rates of the motion
+    frame_rate: float | None  # frames a second, if it is known
+
+    def per_minute(self, cycles: float) -> float | None:
+        """A rate in cycles per sequence as a number a minute; None without a frame rate."""
+        return None if self.frame_rate is None else 60.0 * cycles * self.frame_rate / self.clip.frames
+
+
+def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Inspection:
+    """Test the training frames of a sequence for every effect.
+
+    frame_rate   frames a second; with it, rates are also given a minute
+
+    Raises: InputError for a frame rate that is not positive and finite.
+    Equal sequences give equal verdicts: the simulated null has a fixed seed.
+    """
+    if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
+        raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames a second")
+    clip = training_clip(sequence)
+    noise = estimate_noise(sequence, clip)
+    tracks = make_tracks(clip, noise)
+    motion, lines = motion_verdict(sequence, clip, tracks)
+    camera = camera_verdict(sequence, clip)
+    found = [
+        motion, camera, view_verdict(sequence, clip), occluder_verdict(sequence, clip),
+        photometric_verdict(clip, tracks, noise, motion.present or camera.present),
+        highlight_verdict(sequence, clip), depth_verdict(sequence, clip), topology_verdict(clip, tracks, noise),
+        *clarity_verdicts(sequence, clip, noise),
+    ]  # fmt: skip
+    by_name = {verdict.effect: verdict for verdict in found}
+    return Inspection(clip, noise, {name: by_name[name] for name in EFFECTS}, lines, frame_rate)
+
+
+def inspection_record(inspection: Inspection) -> dict[str, Any]:
+    """The inspection as JSON-able data."""
+    noise = inspection.noise
+    rates = [line._asdict() | {"per_minute": inspection.per_minute(line.cycles)} for line in inspection.lines]
+    return {
+        "frames": inspection.clip.frames,
+        "training_frames": inspection.clip.count,
+        "working_size": list(inspection.clip.images.shape[:1:-1]),
+        "frame_rate": inspection.frame_rate,
+        "noise": {"level": noise.level, "by_channel": noise.full.tolist(), "source": noise.source},
+        "verdicts": {name: verdict_record(verdict) for name, verdict in inspection.verdicts.items()},
+        "rates": rates,
+    }

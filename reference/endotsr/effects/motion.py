@@ -1,0 +1,120 @@
+"""Motion of the tissue: none, rigid, periodic or irregular.
+
+The flow of a tile counts as motion when its root mean square over time exceeds `NULL_FACTOR` times what noise alone
+shows in that tile, and `LEAST_MOTION` pixels, in at least `LEAST_TILES` tiles and a fiftieth of them. A moving camera
+is accounted for first: the flow that its poses and the depth predict for rigid tissue is removed.
+"""
+
+import numpy as np
+
+from endotsr.effects.clip import TILE, Clip, tile_map, tile_means
+from endotsr.effects.periodic import Line, spectral_lines
+from endotsr.effects.tracks import VISIBLE_FRAMES, Tracks, filled_tiles
+from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import backproject
+
+NULL_FACTOR = 2.0
+LEAST_MOTION = 0.05  # pixels of the full size
+RIGID_ERROR = 0.25  # fraction of the flow of the camera that errors of the depth and a moving light may leave
+LEAST_TILES = 2
+TILE_FRACTION = 0.02
+EXPLAINED = 0.99  # of the squared motion, by which its half waves are counted
+AFFINE_FRACTION = 0.98  # of the squared flow: above it the picture moves as a whole
+FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
+
+
+def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks) -> tuple[Verdict, list[Line]]:
+    """Whether tissue moves, and how; with the lines of its spectrum (empty without periodic motion)."""
+    tiles, null = tracks.tiles - camera_flow(sequence, clip, tracks), tracks.null
+    known = np.isfinite(tiles[:, 0]).mean(axis=0) >= VISIBLE_FRAMES  # a tile without depth has no predicted flow
+    moving = tracks._replace(tiles=tiles, usable=tracks.usable & known)
+    predicted, size = _root_mean_square(tracks.tiles - tiles), _root_mean_square(tiles)
+    limit = np.maximum(NULL_FACTOR * null, LEAST_MOTION) + RIGID_ERROR * predicted
+    ratio = np.where(moving.usable, size / limit, 0.0)
+    needed = max(LEAST_TILES, round(TILE_FRACTION * int(moving.usable.sum())))
+    if int(moving.usable.sum()) < needed:
+        return _verdict("unknown", 1.0, clip, moving, size, [], clip.count), []
+    statistic = float(np.sort(ratio)[-needed])
+    if statistic < 1.0:
+        return _verdict("none", statistic, clip, moving, size, [], 0), []
+    filled = filled_tiles(moving, clip.times)
+    waves = half_waves(filled, clip.times, null[moving.usable])
+    lines = spectral_lines(filled, clip.times, clip.frames, null[moving.usable])
+    kind = "periodic" if lines else "rigid" if _affine_fraction(filled, clip, moving) > AFFINE_FRACTION else "irregular"
+    return _verdict(kind, statistic, clip, moving, size, lines, waves), lines
+
+
+def half_waves(filled: FloatArray, times: FloatArray, null: FloatArray) -> int:
+    """The least number of half waves over the clip that explain 99 % of the motion; what noise adds is taken off."""
+    flat = filled.reshape(len(times), -1) - filled.mean(axis=0).ravel()
+    noise, total = len(times) * float((null**2).sum()), float((flat**2).sum())
+    for count in range(1, len(times)):
+        design = np.stack([np.cos(np.pi * k * times) for k in range(count + 1)], axis=1)
+        rest = float(((flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]) ** 2).sum())
+        if rest <= (1 - EXPLAINED) * total + noise * (1 - count / len(times)):
+            return count
+    return len(times)
+
+
+def _root_mean_square(tiles: FloatArray) -> FloatArray:
+    """Over the frames that see a tile: (m, 2, T) to (T,), 0 for a tile that none sees."""
+    squares = (tiles**2).sum(axis=1)
+    known = np.isfinite(squares)
+    return np.sqrt(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+
+
+def camera_flow(sequence: Sequence, clip: Clip, tracks: Tracks) -> FloatArray:
+    """Flow in tiles (m, 2, T) that camera motion and the reference depth predict for rigid tissue; 0 if static."""
+    if sequence.static_camera:
+        return np.zeros_like(tracks.tiles)
+    camera, depth = clip.cameras[clip.reference], clip.depth[clip.reference].astype(np.float64)
+    rows, columns = np.indices(depth.shape)
+    offset = clip.shrink // 2
+    u, v = columns * clip.shrink + offset, rows * clip.shrink + offset
+    points = backproject(camera, u.ravel().astype(float), v.ravel().astype(float), depth.ravel())
+    out = np.zeros_like(tracks.tiles)
+    for k, other in enumerate(clip.cameras):
+        seen = other.rotation @ points + np.asarray(other.translation)[:, None]
+        with np.errstate(all="ignore"):
+            x = other.fx * seen[0] / seen[2] + other.cx - 0.5
+            y = other.fy * seen[1] / seen[2] + other.cy - 0.5
+        flow = np.stack([x.reshape(depth.shape) - u, y.reshape(depth.shape) - v])
+        known = tracks.valid[k] & (depth > 0) & np.isfinite(flow).all(axis=0)
+        out[k] = tile_means(np.where(known, flow, 0.0), known)[0]
+    return out
+
+
+def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
+    """Fraction of the squared flow that an affine map of the picture explains, frame by frame."""
+    rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
+    place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
+    design = np.stack([np.ones(place.shape[1]), *place], axis=1)
+    flat = filled.reshape(-1, place.shape[1]).T
+    left = flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]
+    return 1.0 - float((left**2).sum() / max((flat**2).sum(), 1e-30))
+
+
+def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: FloatArray, lines: list[Line],
+             waves: int) -> Verdict:  # fmt: skip
+    length = np.sqrt((tracks.tiles**2).sum(axis=1))
+    seen = np.isfinite(length)
+    path = np.where(seen, length, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    largest = float(size[tracks.usable].max(initial=0.0))
+    rates = ", ".join(f"{line.cycles:.2g}" for line in lines)
+    reason = {
+        "unknown": "Too few tiles of tissue are seen with depth to tell; motion is assumed.",
+        "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
+        "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), all of it along one affine map of the picture.",
+        "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",
+        "irregular": f"Tissue moves by up to {largest:.2g} px (RMS), and no rate stands out of the spectrum.",
+    }[kind]
+    height, width = clip.images.shape[2:]
+    return Verdict(
+        "motion", kind != "none", kind, statistic, 1.0, "times the threshold of a tile",
+        "root mean square of the flow of a tile over max(2 x flow of noise alone, 0.05 px)",
+        FALSE_POSITIVES, reason, {"largest_px": largest, "half_waves": waves},
+        Curve("mean flow, px", "time", clip.times, {"flow": path}),
+        Map("flow, RMS over time, px", tile_map(np.where(tracks.usable, size, np.nan), height, width)),
+    )  # fmt: skip

@@ -1,0 +1,169 @@
+"""Change of light: gain of all channels, white balance, and change in places.
+
+The frames are first moved onto the reference frame along their flow. g = log of the ratio of the mean colours of a tile
+in two frames; saturated and dark pixels do not count. The median over the tiles is the gain of a frame: an F test
+compares its variance between frames with what the scatter of the tiles allows. What is left in a tile is local change
+where smooth courses over time explain it (F test with Bonferroni's correction over the tiles).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means
+from endotsr.effects.noise import Noise
+from endotsr.effects.tracks import Tracks
+from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.kernels.arrays import BoolArray, FloatArray
+
+DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside are not compared
+ALARM = 0.01
+LEAST_CHANGE = 1.0 / 255.0  # display units: a smaller change cannot be displayed
+COURSES = 8  # smooth courses over time, half waves 1 ... 8
+LOCAL_FRACTION = 0.02  # of the tiles that must change for a local change
+LEAST_LOCAL = 1.0 / 255.0  # RMS in a tile, display units
+GRADIENT_ERROR = 0.25  # pixels: error of the alignment while something moves, as a change of light at edges
+LEAST_TILES = 4
+
+
+class Ratios(NamedTuple):
+    """Log ratios of tile colours to those of the reference frame."""
+
+    values: FloatArray  # (m, 3, U) of the usable tiles, their mean over time removed
+    noise: FloatArray  # (3, U) standard deviation that noise of the pixels explains
+    level: FloatArray  # (U,) luminance of the tile, display units
+    tiles: FloatArray  # (U,) number of each tile in the grid
+
+
+def photometric_verdict(clip: Clip, tracks: Tracks, noise: Noise, moving: bool) -> Verdict:
+    """Whether the light changes, and in which way."""
+    ratios = colour_ratios(clip, tracks, noise)
+    if ratios.values.shape[2] < LEAST_TILES:
+        return _nothing("No four tiles of tissue are seen in all frames, so that light cannot be compared.")
+    gain = np.median(ratios.values, axis=2)
+    level = float(np.median(ratios.level))
+    error = _error_of_median(ratios)
+    common = gain @ LUMINANCE
+    balance = gain - common[:, None]
+    ranges = {"gain": _range(common) * level, "white balance": max(_range(b) for b in balance.T) * level}
+    f = {
+        "gain": float(common.var(ddof=1) / (error @ LUMINANCE) ** 2),
+        "white balance": float((balance.var(axis=0, ddof=1) / error**2).max()),
+    }
+    critical = float(stats.f.isf(ALARM / 3, len(gain) - 1, max(2, ratios.values.shape[2] - 1)))
+    local, shares = local_change(clip, ratios, gain, moving)
+    found = [name for name in f if f[name] > critical and ranges[name] >= LEAST_CHANGE]
+    share = float(local.mean())
+    if share >= LOCAL_FRACTION:
+        found.append("local")
+    score = {name: min(f[name] / critical, ranges[name] / LEAST_CHANGE) for name in f}
+    statistic = max(*score.values(), share / LOCAL_FRACTION)
+    return _verdict(clip, found, statistic, ranges, share, common, balance, ratios, shares)
+
+
+def colour_ratios(clip: Clip, tracks: Tracks, noise: Noise) -> Ratios:
+    """Log ratios of the mean colours of the tiles that every frame sees."""
+    reference = clip.reference
+    start = clip.images[reference]
+    rows = []
+    usable = tracks.usable.copy()
+    pixels = np.full(usable.size, np.inf)
+    for k in range(clip.count):
+        moved = tracks.aligned[k]
+        both = tracks.valid[k] & _comparable(start) & _comparable(moved)
+        now, count = tile_means(moved, both)
+        then, _ = tile_means(start, both)
+        with np.errstate(all="ignore"):
+            rows.append(np.log(now / then))
+        pixels = np.minimum(pixels, np.where(count > 0, count, np.inf))
+    values = np.array(rows)
+    usable &= np.isfinite(values).mean(axis=0).min(axis=0) >= 0.6
+    values = _without_gaps(values[:, :, usable], clip.times)
+    level = tile_means(start, clip.masks[reference])[0][:, usable]
+    level = np.where(np.isfinite(level), level, 0.5)
+    count = np.clip(pixels[usable], TILE, TILE * TILE)
+    deviation = noise.working[:, None] / (np.maximum(level, DARK) * np.sqrt(count))
+    centred = values - values.mean(axis=0)
+    return Ratios(centred, deviation, LUMINANCE @ level, np.flatnonzero(usable))
+
+
+def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> tuple[BoolArray, FloatArray]:
+    """(U,) tiles whose light changes smoothly beyond the gain of the frame; and the RMS of the change, display units.
+
+    With motion, an error of alignment of a quarter pixel is allowed for at the gradients of the tile.
+    """
+    left = np.einsum("mcu,c->mu", ratios.values - gain[:, :, None], LUMINANCE)
+    left = left - left.mean(axis=0)
+    m = len(left)
+    courses = min(COURSES, (m - 2) // 2)
+    if courses < 1:
+        return np.zeros(left.shape[1], bool), np.zeros(left.shape[1])
+    design = np.stack([np.cos(np.pi * k * clip.times) for k in range(courses + 1)], axis=1)
+    rest = left - design @ np.linalg.lstsq(design, left, rcond=None)[0]
+    free = m - courses - 1
+    floor = (LUMINANCE @ ratios.noise) ** 2 * free
+    explained = (left**2).sum(axis=0) - (rest**2).sum(axis=0)
+    ratio = explained / courses / (np.maximum((rest**2).sum(axis=0), floor) / free)
+    critical = stats.f.isf(ALARM / 3 / left.shape[1], courses, free)
+    size = np.sqrt(np.maximum(explained, 0.0) / m) * ratios.level
+    needed = LEAST_LOCAL + (GRADIENT_ERROR * _tile_gradient(clip)[ratios.tiles] if moving else 0.0)
+    return (ratio > critical) & (size > needed), size
+
+
+def _tile_gradient(clip: Clip) -> FloatArray:
+    """Mean of the absolute gradient in each tile over the square root of its rows: what a common shift changes."""
+    grey = clip.luminance[clip.reference]
+    down, across = np.gradient(grey)
+    return np.nan_to_num(tile_means(np.hypot(down, across), clip.masks[clip.reference])[0]) / TILE**0.5
+
+
+def _comparable(image: FloatArray) -> BoolArray:
+    return (image.max(axis=0) < BRIGHT) & (image.max(axis=0) > DARK) & (image.min(axis=0) > 0.0)
+
+
+def _without_gaps(values: FloatArray, times: FloatArray) -> FloatArray:
+    out = values.copy()
+    for column in out.reshape(len(times), -1).T:
+        known = np.isfinite(column)
+        column[~known] = np.interp(times[~known], times[known], column[known])
+    return out
+
+
+def _error_of_median(ratios: Ratios) -> FloatArray:
+    """Standard error (3,) of the median over tiles: noise alone, which is the null."""
+    return 1.2533 * np.sqrt((ratios.noise**2).mean(axis=1) / ratios.values.shape[2])
+
+
+def _range(course: FloatArray) -> float:
+    """From the 5th to the 95th percentile."""
+    low, high = np.percentile(course, (5, 95))
+    return float(high - low)
+
+
+def _nothing(reason: str) -> Verdict:
+    return Verdict("photometric", False, "none", 0.0, 1.0, "times the threshold", "variance of the gain of the frames",
+                   ALARM, reason)  # fmt: skip
+
+
+def _verdict(
+    clip: Clip, found: list[str], statistic: float, ranges: dict[str, float], share: float, common: FloatArray,
+    balance: FloatArray, ratios: Ratios, sizes: FloatArray,
+) -> Verdict:  # fmt: skip
+    words = {
+        "gain": f"the gain of the frames ranges over {255 * ranges['gain']:.1f} grey levels",
+        "white balance": f"the channels drift apart by {255 * ranges['white balance']:.1f} grey levels",
+        "local": f"the light changes by itself in {share:.0%} of the tissue",
+    }
+    said = ", ".join(words[name] for name in found)
+    reason = said[0].upper() + said[1:] + "." if said else "No gain, white balance or local light changes visibly."
+    picture = np.full((clip.images.shape[2] // TILE) * (clip.images.shape[3] // TILE), np.nan)
+    picture[ratios.tiles] = 255 * sizes
+    lines = {"gain": 100 * common, "red": 100 * balance[:, 0], "blue": 100 * balance[:, 2]}
+    return Verdict(
+        "photometric", bool(found), " + ".join(found) or "none", statistic, 1.0, "times the threshold",
+        "F ratio of the variance of the frame gain over noise, its range over one grey level, changed tiles over 2 %",
+        ALARM, reason, {"range": ranges, "local_fraction": share},
+        Curve("gain, and red and blue against it, percent", "time", clip.times, lines),
+        Map("local change of light, RMS, grey levels", tile_map(picture, *clip.images.shape[2:])),
+    )  # fmt: skip

@@ -1,0 +1,202 @@
+"""How reliable the tests are: simulated clips with known effects, several seeds, a sweep of amplitudes.
+
+In: numbers of seeds and frames. Out: JSON-able counts of detections and false positives for each effect, and the
+smallest amplitude that is found in every seed, in the unit of the effect (px, percent, degrees, mm).
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from endotsr.effects.inspect import EFFECTS, Inspection, inspect_sequence
+from endotsr.sequences.sequence import Sequence
+from endotsr.simulator.settings import SimulatorSettings, with_effects
+from endotsr.simulator.simulate import SimulatedSequence, simulate
+
+FRAMES = 40
+FOUND = (*EFFECTS, "periodic motion")
+MOTIONS = ("breathing", "pulsation", "pull")
+LIGHTS = ("exposure", "brightening")
+BEATING = {"breathing": {"cycles": 4.0}}  # breaths that a clip can hold often enough to call them periodic
+SWEEPS: dict[str, tuple[float, ...]] = {
+    "breathing": (0.05, 0.1, 0.2, 0.4, 2.5),
+    "pulsation": (0.05, 0.1, 0.2, 0.4, 0.7),
+    "pull": (0.1, 0.2, 0.4, 0.8, 5.0),
+    "exposure": (0.005, 0.01, 0.02, 0.05, 0.15),
+    "brightening": (0.02, 0.05, 0.1, 0.2, 0.6),
+    "highlights": (0.25, 0.5, 1.0, 2.0),
+    "camera_motion": (0.001, 0.1, 1.0, 3.0, 9.0),
+    "depth_errors": (0.02, 0.05, 0.1, 0.5),
+}
+STRENGTH = {"highlights": "strength", "depth_errors": "sigma"}  # the setting that is swept; otherwise `amplitude`
+MIXTURES = (
+    ("noise", "breathing", "pulsation", "instrument", "highlights"),
+    ("noise", "pull", "exposure", "instrument"),
+    ("noise", "pulsation", "exposure", "brightening", "highlights", "depth_errors"),
+    ("noise", "breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument", "camera_motion"),
+)
+BLUR_FRAMES, SMOKE_FRAMES = 3, 6  # frames in the middle of the clip
+SPOILED = {"blur": (0.5, 1.0, 2.0), "smoke": (0.05, 0.1, 0.2, 0.4)}  # pixels, fraction of grey
+
+
+class Trial(NamedTuple):
+    """One simulated clip and what is known about it."""
+
+    scene: str
+    swept: str  # effect whose amplitude is swept, or ""
+    amplitude: float
+    sequence: Sequence
+    size: float  # the amplitude in the unit of the table
+    expected: dict[str, bool | None]  # by effect; None = neither answer is wrong
+
+
+def settings_of(names: tuple[str, ...], seed: int, frames: int, amplitude: float | None = None) -> SimulatorSettings:
+    """Settings with the named effects; the last one has the amplitude, if one is given."""
+    settings = with_effects(SimulatorSettings(frames=frames, seed=seed), *names)
+    changes = {name: dict(BEATING.get(name, {})) for name in names}
+    if amplitude is not None:
+        changes[names[-1]][STRENGTH.get(names[-1], "amplitude")] = amplitude
+    sections = {name: msgspec.structs.replace(getattr(settings, name), **c) for name, c in changes.items() if c}
+    return msgspec.structs.replace(settings, **sections)
+
+
+def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
+    """What the tests should say of a clip with these effects.
+
+    Tissue that moves under the lamp, or a lamp that moves with the camera, does change the light: not counted. The
+    same holds for the view, which is a matter of degree.
+    """
+    on = set(names)
+    moves = bool(on & set(MOTIONS))
+    light: bool | None = bool(on & set(LIGHTS)) or (None if moves or "camera_motion" in on else False)
+    return {
+        "motion": moves,
+        "periodic motion": _beats(on),
+        "photometric": light,
+        "highlights": "highlights" in on,
+        "occluders": "instrument" in on,
+        "camera motion": "camera_motion" in on,
+        "view change": None if "camera_motion" in on else False,
+        "depth quality": "depth_errors" in on,
+        "topology change": False,
+        "smoke": False,
+        "blur": False,
+    }
+
+
+def _beats(on: set[str]) -> bool | None:
+    """A rate is expected, or none; beside a pull or a moving camera, a beat may be hidden: not counted."""
+    beats = bool(on & {"breathing", "pulsation"})
+    return None if beats and on & {"pull", "camera_motion"} else beats
+
+
+def trials(seeds: range, frames: int) -> Iterator[Trial]:
+    """All clips of the study, one at a time."""
+    for seed in seeds:
+        for names in (("noise",), ("noise", "instrument"), *MIXTURES):
+            made = simulate(settings_of(names, seed, frames))
+            yield Trial(" + ".join(names), "", 0.0, made.sequence, 0.0, expectation(names))
+        for effect, amplitudes in SWEEPS.items():
+            for amplitude in amplitudes:
+                names = ("noise", effect)
+                made = simulate(settings_of(names, seed, frames, amplitude))
+                size = size_of(effect, amplitude, made)
+                yield Trial(effect, effect, amplitude, made.sequence, size, expectation(names))
+        still = simulate(settings_of(("noise",), seed, frames)).sequence
+        for effect, spoil in (("blur", blurred), ("smoke", smoky)):
+            for amplitude in SPOILED[effect]:
+                expected = expectation(("noise",)) | {effect: True, "photometric": None}
+                yield Trial(effect, effect, amplitude, spoil(still, amplitude), amplitude, expected)
+
+
+def size_of(effect: str, amplitude: float, made: SimulatedSequence) -> float:
+    """The amplitude as it is seen: px of the largest flow (RMS over time), percent, degrees, mm."""
+    if effect in MOTIONS:
+        sequence = made.sequence
+        middle = int(sequence.train_index[len(sequence.train_index) // 2])
+        flows = [made.true_flow(middle, int(i)) for i in sequence.train_index]
+        return float(np.sqrt(np.mean([(flow**2).sum(axis=0) for flow in flows], axis=0)).max())
+    if effect == "camera_motion":
+        return float(np.degrees(np.arctan(amplitude / made.settings.distance)))
+    return amplitude if effect in ("depth_errors", "highlights") else 100.0 * amplitude
+
+
+UNITS = {
+    **dict.fromkeys(MOTIONS, "px"), "exposure": "percent", "brightening": "percent", "highlights": "strength",
+    "camera_motion": "degrees", "depth_errors": "mm", "blur": "px", "smoke": "of full density",
+}  # fmt: skip
+ANSWERS = {
+    **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(LIGHTS, "photometric"), "highlights": "highlights",
+    "camera_motion": "camera motion", "depth_errors": "depth quality", "blur": "blur", "smoke": "smoke",
+}  # fmt: skip
+
+
+def blurred(sequence: Sequence, sigma: float) -> Sequence:
+    """The sequence with a Gaussian blur of `sigma` pixels in three training frames of the middle."""
+    from scipy.ndimage import gaussian_filter
+
+    return _spoiled(
+        sequence, BLUR_FRAMES, lambda picture: gaussian_filter(picture.astype(np.float64), (0.0, sigma, sigma))
+    )
+
+
+def smoky(sequence: Sequence, density: float) -> Sequence:
+    """The sequence with grey smoke of this density over six training frames of the middle."""
+    return _spoiled(sequence, SMOKE_FRAMES, lambda picture: (1 - density) * picture + density * 190.0)
+
+
+def _spoiled(sequence: Sequence, count: int, change: Callable[[np.ndarray], np.ndarray]) -> Sequence:
+    import dataclasses
+
+    images = sequence.images.copy()
+    first = (len(sequence.train_index) - count) // 2
+    for i in sequence.train_index[first : first + count]:
+        images[i] = np.rint(change(images[i])).astype(np.uint8)
+    fields = {f.name: getattr(sequence, f.name) for f in dataclasses.fields(sequence) if f.init}
+    return Sequence(**(fields | {"images": images}))
+
+
+def answers(inspection: Inspection) -> dict[str, bool]:
+    """What the tests say, by effect."""
+    said = {name: verdict.present for name, verdict in inspection.verdicts.items()}
+    return said | {"periodic motion": bool(inspection.lines)}
+
+
+def run_study(seeds: int, frames: int, on_message: Callable[[str], object]) -> dict[str, Any]:
+    """All trials. JSON-able: "effects" {name: false positives and clips, detections and clips}, "sweeps", "scenes"."""
+    counts = {name: {"positives": 0, "detected": 0, "negatives": 0, "false": 0} for name in FOUND}
+    sweeps: dict[str, dict[str, list[Any]]] = {name: {} for name in ANSWERS}
+    noise, scenes = [], {}
+    for trial in trials(range(seeds), frames):
+        inspection = inspect_sequence(trial.sequence)
+        said = answers(inspection)
+        strongest = not trial.swept or trial.amplitude == max((SWEEPS | SPOILED)[trial.swept])
+        for name, expected in trial.expected.items():
+            counts[name]["negatives"] += expected is False
+            counts[name]["false"] += expected is False and said[name]
+            counts[name]["positives"] += expected is True and strongest
+            counts[name]["detected"] += expected is True and strongest and said[name]
+        if trial.swept:
+            row = sweeps[trial.swept].setdefault(f"{trial.amplitude:g}", [])
+            row.append([trial.size, said[ANSWERS[trial.swept]]])
+        wrong = [name for name, expected in trial.expected.items() if expected is not None and said[name] != expected]
+        scenes.setdefault(trial.scene, []).append(wrong)
+        noise.append(inspection.noise.level)
+        on_message(f"{trial.scene} {trial.amplitude:g}: {', '.join(wrong) or 'right'}")
+    swept = {name: [_row(amplitude, rows) for amplitude, rows in found.items()] for name, found in sweeps.items()}
+    return {
+        "seeds": seeds, "frames": frames, "clips": len(noise), "noise": float(np.median(noise)), "effects": counts,
+        "sweeps": swept,
+    }  # fmt: skip
+
+
+def _row(amplitude: str, rows: list[Any]) -> dict[str, Any]:
+    sizes = [size for size, _ in rows]
+    return {
+        "amplitude": float(amplitude),
+        "size": float(np.median(sizes)),
+        "detected": sum(bool(found) for _, found in rows),
+        "clips": len(rows),
+    }

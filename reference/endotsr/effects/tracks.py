@@ -1,0 +1,97 @@
+"""Motion of the picture from the reference frame to every other training frame, and what noise alone would show.
+
+The pictures are first divided by their local brightness and contrast, so that a change of light is no motion, and
+what either mask excludes is set to the same value in both. Flow is dense inverse search (OpenCV). The simulated null
+is the flow between the reference frame and copies of it with fresh noise: its size in each tile states how small a
+motion that texture can show.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.effects.clip import Clip, tile_means
+from endotsr.effects.noise import Noise
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.opencv import dense_flow, warp_bilinear
+
+LOCAL = 6.0  # Gaussian radius of the local brightness and contrast, working pixels
+GREY_STEPS = 40.0  # grey levels of one standard deviation of the local contrast
+NULL_SEED = 20
+MOST_NULL = 16  # copies of the reference frame
+VISIBLE_FRAMES = 0.6  # a tile counts where it is tissue in at least this fraction of the frames
+
+
+class Tracks(NamedTuple):
+    """Flow from the reference frame to the m training frames, pixels of the full size."""
+
+    flow: NDArray[np.float32]  # (m, 2, h, w) on the working grid
+    valid: BoolArray  # (m, h, w) tissue in the reference and, where the flow leads, in the frame
+    tiles: FloatArray  # (m, 2, T) mean of the flow in a tile; nan where it is not seen
+    usable: BoolArray  # (T,) tiles that enough frames see
+    null: FloatArray  # (T,) root mean square of the flow that noise alone makes
+    aligned: NDArray[np.float32]  # (m, 3, h, w) the frames moved onto the reference, display units
+
+
+def make_tracks(clip: Clip, noise: Noise) -> Tracks:
+    """Flow, its mean in tiles, its null, and the aligned frames."""
+    reference = clip.reference
+    sigma = float(noise.working.mean())
+    grey, mask = clip.luminance, clip.masks[reference]
+    flow, valid, tiles, aligned = [], [], [], []
+    for k in range(clip.count):
+        common = mask & clip.masks[k]
+        found = np.zeros((2, *mask.shape), np.float32)
+        if k != reference:
+            found = dense_flow(
+                normalised(grey[reference], common, sigma), normalised(grey[k], common, sigma), "dis"
+            )  # fmt: skip
+        seen = common & inside(found) & (warp_bilinear(clip.masks[k].astype(np.float32), found) > 0.999)
+        flow.append(found * clip.shrink)
+        valid.append(seen)
+        tiles.append(tile_means(flow[-1], seen)[0])
+        aligned.append(warp_bilinear(clip.images[k], found).astype(np.float32))
+    stacked = np.array(tiles)
+    usable = np.isfinite(stacked[:, 0]).mean(axis=0) >= VISIBLE_FRAMES
+    null = noise_flow(grey[reference], mask, sigma, min(MOST_NULL, clip.count)) * clip.shrink
+    return Tracks(np.array(flow), np.array(valid), stacked, usable & np.isfinite(null), null, np.array(aligned))
+
+
+def inside(flow: FloatArray) -> BoolArray:
+    """(h, w) True where the flow (2, h, w) leads to a place inside the picture."""
+    height, width = flow.shape[1:]
+    x, y = np.arange(width) + flow[0], np.arange(height)[:, None] + flow[1]
+    return (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
+
+
+def normalised(grey: FloatArray, mask: BoolArray, sigma: float) -> NDArray[np.uint8]:
+    """(grey - local mean) / local deviation over tissue, 40 grey levels a deviation about 128; 128 elsewhere."""
+    from scipy.ndimage import gaussian_filter
+
+    weight = mask.astype(np.float32)
+    total = np.maximum(gaussian_filter(weight, LOCAL), 1e-3)
+    centred = (grey - gaussian_filter(grey * weight, LOCAL) / total) * weight
+    variance = gaussian_filter(centred**2, LOCAL) / total
+    scaled = centred / np.sqrt(variance + max(2 * sigma, 2 / 255) ** 2)
+    return np.clip(np.rint(128 + GREY_STEPS * scaled), 0, 255).astype(np.uint8)
+
+
+def noise_flow(grey: FloatArray, mask: BoolArray, sigma: float, copies: int) -> FloatArray:
+    """Root mean square, by tile (T,), of the mean flow to copies with fresh noise, working pixels; nan off tissue."""
+    rng = np.random.default_rng(NULL_SEED)
+    start, squares = normalised(grey, mask, sigma), []
+    for _ in range(copies):
+        copy = grey + (2**0.5 * sigma * rng.standard_normal(grey.shape)).astype(np.float32)
+        means, _ = tile_means(dense_flow(start, normalised(copy, mask, sigma), "dis"), mask)
+        squares.append((means**2).sum(axis=0))
+    return np.sqrt(np.mean(squares, axis=0))
+
+
+def filled_tiles(tracks: Tracks, times: FloatArray) -> FloatArray:
+    """Tile flow of the usable tiles (m, 2, U), frames in which a tile is hidden interpolated over time."""
+    tiles = tracks.tiles[:, :, tracks.usable].copy()
+    for column in tiles.reshape(len(times), -1).T:
+        known = np.isfinite(column)
+        column[~known] = np.interp(times[~known], times[known], column[known])
+    return tiles

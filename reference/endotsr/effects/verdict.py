@@ -1,0 +1,59 @@
+"""The answer of one test: whether an effect is present, how sure that is, and a picture or a curve that shows it."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from endotsr.kernels.arrays import FloatArray
+
+
+class Curve(NamedTuple):
+    """A quantity over time or frequency."""
+
+    name: str  # of the quantity, with its unit
+    x_name: str
+    x: FloatArray  # (k,)
+    lines: dict[str, FloatArray]  # by legend entry, (k,) each
+    threshold: float | None = None
+
+
+class Map(NamedTuple):
+    """A quantity over the working picture; nan where it is not known."""
+
+    name: str  # of the quantity, with its unit
+    values: FloatArray  # (h, w)
+
+
+class Verdict(NamedTuple):
+    """The result of one test."""
+
+    effect: str  # key of `inspect.EFFECTS`
+    present: bool
+    kind: str  # what was found, in a word or two: "none", "periodic", "white balance"
+    statistic: float
+    threshold: float  # of the statistic; at or above it the effect is present
+    unit: str  # of both
+    test: str  # what the statistic is, in words
+    false_positive_rate: float  # designed rate; 0 where the answer is a fact and no estimate
+    reason: str  # one sentence
+    details: Mapping[str, Any] = MappingProxyType({})  # JSON-able numbers, by name
+    curve: Curve | None = None
+    map: Map | None = None
+
+    @property
+    def confidence(self) -> float:
+        """0.5 at the threshold, towards 1 on either side: 1 - (smaller / larger)^2 / 2 of statistic and threshold.
+
+        A measure of the distance from the threshold, not a probability; 1 where the answer is a fact.
+        """
+        if self.false_positive_rate == 0.0:
+            return 1.0
+        small, large = sorted((abs(self.statistic), abs(self.threshold)))
+        return 1.0 - 0.5 * (small / large) ** 2 if large > 0 else 0.5
+
+
+def verdict_record(verdict: Verdict) -> dict[str, Any]:
+    """The verdict as JSON-able data, without picture and curve."""
+    fields = verdict._asdict()
+    kept = {k: v for k, v in fields.items() if k not in ("curve", "map", "details")}
+    return kept | {"details": dict(verdict.details), "confidence": verdict.confidence}

@@ -1,0 +1,85 @@
+"""Whether the views differ enough to tell view-dependent colour of each degree from constant colour.
+
+For points of the reference depth, the harmonics of a degree are evaluated in the directions from which the training
+cameras see them. What the lower degrees already explain is removed. The root mean square of the rest says how much a
+coefficient of that degree changes the colour between frames; a coefficient of `TYPICAL` must change it visibly, by more
+than half a grey level. A fixed camera sees every resting point from one direction: no degree above 0 is determined.
+"""
+
+import numpy as np
+
+from endotsr.effects.clip import Clip
+from endotsr.effects.verdict import Verdict
+from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.constants import Y00
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import backproject, camera_centre
+from endotsr.splatting.harmonics_formulas import harmonic_basis
+
+TYPICAL = 0.1  # coefficient of trained scenes, display units
+LEAST_CHANGE = 0.5 / 255.0  # display units
+POINTS = 64
+SEED = 21
+HIGHEST = 3
+
+
+def view_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+    """The highest degree that the views determine; `kind` is "degree D"."""
+    test = "change of colour by a typical coefficient of degree 1 between frames"
+    if sequence.static_camera:
+        return Verdict("view change", False, "degree 0", 0.0, LEAST_CHANGE, "display units", test, 0.0,
+                       "The camera is fixed: every point keeps one view direction.",
+                       {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
+    directions = view_directions(clip)
+    changes = [float(np.median([band_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
+    degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
+    angle = float(np.degrees(np.median([_spread(d) for d in directions])))
+    reason = f"The views of a point differ by up to {angle:.2g} degrees, which determines harmonics to degree {degree}."
+    return Verdict("view change", degree > 0, f"degree {degree}", changes[0], LEAST_CHANGE, "display units", test,
+                   0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
+
+
+def view_directions(clip: Clip) -> FloatArray:
+    """Unit vectors (P, m, 3) from the cameras to points of the reference depth; P = 0 without depth."""
+    depth = clip.depth[clip.reference]
+    known = np.flatnonzero((depth > 0) & clip.masks[clip.reference])
+    chosen = np.sort(np.random.default_rng(SEED).permutation(known)[:POINTS])
+    row, column = np.divmod(chosen, depth.shape[1])
+    place = [axis * clip.shrink + clip.shrink // 2 for axis in (column, row)]
+    points = backproject(clip.cameras[clip.reference], *map(np.asarray, place), depth.ravel()[chosen].astype(float))
+    centres = np.array([camera_centre(camera) for camera in clip.cameras])
+    away = points.T[:, None, :] - centres[None]
+    return away / np.linalg.norm(away, axis=2, keepdims=True)
+
+
+def band_change(directions: FloatArray, degree: int) -> float:
+    """Root mean square over frames of TYPICAL x the strongest harmonic of this degree, lower degrees removed."""
+    lower, band = harmonic_design(directions, degree - 1), harmonic_design(directions, degree)
+    band = band[:, lower.shape[1] :]
+    # directions of the lower degrees that are rounding noise explain nothing
+    left, sizes, _ = np.linalg.svd(lower, full_matrices=False)
+    basis = left[:, sizes > 1e-6 * sizes[0]]
+    rest = band - basis @ (basis.T @ band)
+    return TYPICAL * float(np.linalg.svd(rest, compute_uv=False)[0]) / len(directions) ** 0.5
+
+
+def harmonic_design(directions: FloatArray, degree: int) -> FloatArray:
+    """Harmonics of degree 0 ... `degree` in the directions (m, 3), one row a direction, (degree + 1)^2 columns."""
+    formula = harmonic_basis.py_func  # the formula itself: a few thousand directions need no compiled code
+    rows = [(Y00, *formula(*map(float, direction))) for direction in directions]
+    return np.array(rows)[:, : (degree + 1) ** 2]
+
+
+def harmonic_sizes(clip: Clip) -> FloatArray:
+    """Mean of |Y_k| over the directions of the pixels of the reference camera, in world axes, (16,)."""
+    camera = clip.cameras[clip.reference]
+    u, v = (np.linspace(0, side - 1, 9).ravel() for side in (camera.width, camera.height))
+    column, row = (axis.ravel() for axis in np.meshgrid(u, v))
+    away = backproject(camera, column, row, np.ones(column.size)).T - camera_centre(camera)
+    directions = away / np.linalg.norm(away, axis=1, keepdims=True)
+    return np.abs(harmonic_design(directions, HIGHEST)).mean(axis=0)
+
+
+def _spread(directions: FloatArray) -> float:
+    """Largest angle to the first direction, radians."""
+    return float(np.arccos(np.clip(directions @ directions[0], -1, 1)).max())

@@ -1,0 +1,56 @@
+"""The page of an inspection: whole, self-contained, safe against odd titles, and true to verdicts and plan."""
+
+import numpy as np
+import pytest
+
+from endotsr.effects.clip import Clip
+from endotsr.effects.inspect import Inspection
+from endotsr.effects.noise import Noise
+from endotsr.effects.periodic import Line
+from endotsr.effects.plan import Change, Dictionary, Plan
+from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.equations.dictionary import AtomReport
+from endotsr.report.inspection import inspection_html, inspection_text, write_inspection
+from report.test_report import Reader, without_pictures
+
+
+@pytest.fixture
+def found() -> tuple[Inspection, Plan]:
+    clip = Clip(np.full((3, 3, 16, 32), 0.5, np.float32), np.ones((3, 16, 32), bool), np.ones((3, 16, 32), np.float32),
+                np.arange(3) / 4, [], 1, 4)  # fmt: skip
+    curve = Curve("flow, px", "time", np.arange(3) / 4, {"one": np.arange(3.0), "two": np.ones(3)}, 0.5)
+    values = np.full((16, 32), 2.0)
+    values[:4] = np.nan
+    verdicts = {
+        "motion": Verdict("motion", True, "periodic", 3.0, 1.0, "times", "flow", 0.01, "It <moves>.", {}, curve,
+                          Map("flow, px", values)),
+        "occluders": Verdict("occluders", False, "none", 0.0, 0.0, "fraction", "pixels", 0.0, "None."),
+    }  # fmt: skip
+    noise = Noise(np.full(3, 0.01), np.full(3, 0.01), "differences over time")
+    report = AtomReport(16, 10.0, [], [])
+    changes = (
+        Change("model.appearance", False, True, "Steady light.", ("photometric",), 0.05, 0.07),
+        Change("model.bases", 5, 17, "Slow motion.", ("motion",), 0.0, 0.0, given=True),
+    )
+    plan = Plan(changes, (("model.deformation", "It <moves>."),), ("Remark.",), Dictionary(8, 16.0, 16, 10.0, report),
+                0.05, 0.07)  # fmt: skip
+    return Inspection(clip, noise, verdicts, [Line(5.0, 2, 0.9, 1e-9, 0.8)], 20.0), plan
+
+
+def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found, tmp_path):
+    page = inspection_html("clip & <b>", *found)
+    words = Reader(page).words
+    for word in ("clip & <b>", "periodic", "It <moves>.", "model.appearance", "Kept as given. Slow motion.", "Remark."):
+        assert any(word in said for said in words), word
+    assert "http" not in without_pictures(page) and "<script" not in page
+    assert page.count("data:image/png") == 4  # frame, map, and the chart for either colour scheme
+    write_inspection(tmp_path / "page.html", "clip & <b>", *found)
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == page
+
+
+def test_text_says_what_the_page_says(found):
+    text = inspection_text(*found)
+    assert "noise: 2.55 grey levels" in text
+    assert "rate: 5 cycles per sequence, 1500 a minute, 2 harmonics" in text
+    assert "model.appearance = false (now true), saves 5% time, 7% memory: Steady light." in text
+    assert "model.bases = 5 (now 17): Slow motion." in text and "model.deformation stays: It <moves>." in text
