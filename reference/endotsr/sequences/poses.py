@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.sequences.arrays import read_npy
 from endotsr.splatting.camera import Camera, camera_centre
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
-ARRAY_START = b"\x93NUMPY"  # first bytes of every .npy file
-ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
 FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry varies by more
@@ -35,18 +34,7 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
 
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
-    try:
-        with path.open("rb") as stream:
-            start = stream.read(len(ARRAY_START))
-        # NumPy would treat any other file as a pickle and advise loading it.
-        rows = np.load(path, allow_pickle=False) if start == ARRAY_START else None
-    except (OSError, ValueError, EOFError) as error:
-        reason = "it holds Python objects" if "allow_pickle" in str(error) else str(error).splitlines()[0]
-        raise InputError(f"{path}: not a plain NumPy array file: {reason}; {ALLOWED_POSES}") from None
-    if rows is None:
-        raise InputError(f"{path}: not a plain NumPy array file; {ALLOWED_POSES}")
-    if not isinstance(rows, np.ndarray) or rows.dtype.kind not in "fiu":
-        raise InputError(f"{path}: not one array of real numbers")
+    rows = read_npy(path)
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")
     if len(rows) != count:

@@ -1,0 +1,12 @@
+"""The one place that imports OpenCV: on first use, so that commands which read no picture start without it."""
+
+from functools import cache
+from typing import Any
+
+
+@cache
+def cv2_library() -> Any:
+    """The module `cv2`."""
+    import cv2
+
+    return cv2
