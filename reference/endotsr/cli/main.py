@@ -16,7 +16,8 @@ from endotsr.runs.stopping import signals_stop
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
-    "train": "train on an EndoNeRF folder, or on a simulated sequence",
+    "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
+    "train": "train on a sequence folder, or on a simulated sequence",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render colour, depth and opacity at any time in [0, 1]",
     "evaluate": "measure held-out frames, compare with baselines, and write renders and a self-contained report",

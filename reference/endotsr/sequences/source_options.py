@@ -11,7 +11,7 @@ class SourceOptions:
 
     layout: str = "auto"
     stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
-    camera: tuple[float, float, float, float] | None = None  # fx fy cx cy, pixel edges at integers
+    camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
     distortion: tuple[float, ...] = ()
     calibration: Path | None = None  # an ini file with StereoLeft and StereoRight
     baseline: float | None = None  # of a rectified pair, in `unit`
