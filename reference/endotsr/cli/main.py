@@ -17,6 +17,7 @@ from endotsr.runs.stopping import signals_stop
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
+    "depth": "make the depth of a sequence from its stereo pairs, or take that of another program",
     "train": "train on a sequence folder, or on a simulated sequence",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render colour, depth and opacity at any time in [0, 1]",
