@@ -94,8 +94,8 @@ def training(result: dict[str, Any]) -> str:
     heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
     note = (
         f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
-        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of the "
-        f"training ({machine(result)})."
+        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
+        f"the training ({machine(result)})."
     )
     return f"{markdown(heads, rows)}\n\n{note}"
 

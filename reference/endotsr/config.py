@@ -31,10 +31,10 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class SequenceConfig(Section, frozen=True, kw_only=True):
-    """The frames, masks and depth that are read from an EndoNeRF folder."""
+    """The frames, masks and depth that are read from a sequence folder."""
 
-    masks: Literal["masks", "gt_masks"] = "masks"
-    """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only"""
+    masks: Literal["masks", "gt_masks", "none"] = "masks"
+    """mask folder: `masks` = instrument and every pixel without depth, `gt_masks` = instrument only, `none`"""
     excluded_value: Literal["white", "black"] = "white"
     """polarity on disk: which mask value is excluded (EndoNeRF: white)"""
     allow_tissue_fraction: bool = False

@@ -18,7 +18,9 @@ from endotsr.untrusted.names import plain_line
 
 COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
-    "train": "train on an EndoNeRF folder, or on a simulated sequence",
+    "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
+    "depth": "make the depth of a sequence from its stereo pairs, or take that of another program",
+    "train": "train on a sequence folder, or on a simulated sequence",
     "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",
     "inspect": "test a clip for motion, light, instruments and more, and plan the components that it calls for",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",

@@ -48,7 +48,7 @@ class TrainOptions:
     """image scale (= --sequence.scale)"""
     frames: Annotated[str | None, Option("A:B[:S]")] = None
     """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
+    masks: Annotated[str | None, Option("{masks,gt_masks,none}")] = None
     """mask folder (= --sequence.masks)"""
     seed: int | None = None
     """seed of every random draw (= --training.seed)"""

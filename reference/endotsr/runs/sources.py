@@ -34,9 +34,9 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
         return simulate(simulated_settings(simulator, config)).sequence
     if source == IN_MEMORY:
         raise InputError("the run was trained on arrays in memory; allowed: the folder that holds the same frames")
-    from endotsr.sequences.endonerf import read_endonerf
+    from endotsr.sequences.layouts import read_sequence
 
-    return read_endonerf(Path(source), config.sequence, config.raster.near)
+    return read_sequence(Path(source), config.sequence, config.raster.near)
 
 
 def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:
@@ -69,9 +69,10 @@ def input_record(source: str, sequence: Sequence, config: Config, simulator: Sim
     if source == SIMULATED:
         record["simulator"] = msgspec.to_builtins(simulator)
     elif source != IN_MEMORY:
-        from endotsr.sequences.endonerf import input_hashes
+        from endotsr.sequences.layouts import readable_layout
 
-        record["files_sha256"] = input_hashes(Path(source), config.sequence)
+        hashes = readable_layout(Path(source)).hashes
+        record["files_sha256"] = hashes(Path(source), config.sequence) if hashes else {}
     return record
 
 

@@ -15,17 +15,20 @@ from endotsr.untrusted.png import LARGEST_FILE
 ALLOWED_NAMES = "allowed: names in one pattern that differ in the frame number, and no other PNG files"
 
 
-def list_pictures(folder: Path) -> list[Path]:
-    """PNG files of a folder in time order: by the numbers in their names, or by name where no name has a number.
+def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Path]:
+    """Picture files of a folder in time order: by the numbers in their names, or by name where no name has a number.
 
-    Raises:  InputError if the folder is missing or holds no PNG, if a name is not UTF-8 or contains more or
+    endings  of the names that count, in lower case; other files are left out
+
+    Raises:  InputError if the folder is missing or holds no such file, if a name is not UTF-8 or contains more or
     fewer numbers than the others, or if two files carry the same number.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: folder not found")
-    files = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".png" and not f.name.startswith("."))
+    files = sorted(f for f in folder.iterdir() if f.suffix.lower() in endings and not f.name.startswith("."))
     if not files:
-        raise InputError(f"{folder}: holds no PNG file")
+        kinds = "PNG file" if endings == (".png",) else f"PNG file, and none that ends in {', '.join(endings[1:])}"
+        raise InputError(f"{folder}: holds no {kinds}")
     _check_names_are_text(files)
     _check_names_alike(files)
     numbers = frame_numbers(files)

@@ -1,9 +1,9 @@
-"""The only module that imports OpenCV: picture files, films, Canny edges, optical flow and area resizing.
+"""The only room that calls OpenCV: PNG files, films, Canny edges, flow, resizing; `video`, `stereo`, `pictures`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
-(BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this module. `cv2` is
-imported on first use, so that commands which read no picture start without it. No golden vector may depend on this
-module, except through the Canny edges, which are an input of the smoothness loss.
+(BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this room. `library`
+imports `cv2` on first use, so that commands which read no picture start without it. No golden vector may depend on this
+room, except through the Canny edges, which are an input of the smoothness loss.
 """
 
 import contextlib
@@ -11,30 +11,20 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
+from endotsr.opencv.library import cv2_library as _cv2
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.png import LARGEST_FILE, pixels_only
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
-
-
-@cache
-def _cv2() -> Any:
-    import cv2
-
-    # Its messages on standard error name no file, and every failed call raises or returns nothing.
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    return cv2
 
 
 def check_png_bytes(data: bytes, name: object) -> None:

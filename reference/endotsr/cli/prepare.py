@@ -1,0 +1,120 @@
+"""`endotsr prepare`: any recording becomes a folder in the common format."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+from endotsr.errors import InputError
+
+
+@dataclass
+class PrepareOptions:
+    """Turn a recording into a folder that `endotsr train` reads: pictures, masks, depth and sequence.toml.
+
+    SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM or EndoNeRF folder, or a folder in the common
+    format. What its files do not say is stated with the options. Lengths become millimetres. Nothing is guessed in
+    silence: the notes that are printed say what was done.
+    """
+
+    source: Annotated[Path, Option("SOURCE", positional=True)]
+    """folder, video or picture"""
+    out: Annotated[Path, Option("FOLDER")]
+    """folder to create"""
+    layout: Annotated[str, Option("NAME")] = "auto"
+    """layout of the source instead of the detected one"""
+    stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
+    """how a picture holds a stereo pair: side_by_side = left half first, stacked = left on top"""
+    camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
+    """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
+    distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
+    """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; the pictures are straightened"""
+    calibration: Annotated[Path | None, Option("FILE.ini")] = None
+    """stereo calibration with StereoLeft and StereoRight; the pair is rectified"""
+    baseline: float | None = None
+    """distance of the cameras of a pair that is rectified already, millimetres"""
+    trajectory: Annotated[Path | None, Option("FILE")] = None
+    """poses in the TUM form: stamp tx ty tz qx qy qz qw"""
+    trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
+    """what the poses map"""
+    trajectory_axes: Literal["opencv", "opengl"] = "opencv"
+    """axes of the camera: opencv = x right, y down, z forward; opengl = x right, y up, z backward"""
+    trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None
+    """unit of the positions (TUM and StereoMIS: m)"""
+    masks: Annotated[Path | None, Option("FOLDER")] = None
+    """masks of another program, one a frame, or one file for all frames"""
+    excluded_value: Literal["white", "black"] = "white"
+    """which value of these masks is excluded; white = any value above 0"""
+    depth: Annotated[Path | None, Option("FOLDER")] = None
+    """depth of every frame: png, tiff, npy or pfm"""
+    depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
+    """unit of the depth"""
+    depth_scale: float = 1.0
+    """length of one step of the stored depth, in its unit"""
+    points: Literal["interpolated", "sparse", "none"] = "interpolated"
+    """depth from the points of a reconstruction (COLMAP): between the points, at the points, or none"""
+    frames: Annotated[str, Option("A:B[:S]")] = ""
+    """frame range of the source"""
+    rate: float | None = None
+    """frames a second to keep"""
+    source_rate: float | None = None
+    """frames a second of the source, where its files do not say"""
+    scale: float = 1.0
+    """image scale, area-averaged; the intrinsics follow"""
+    gaps: Literal["refuse", "drop", "fill"] = "refuse"
+    """frames without mask or pose while others have one: drop leaves them out, fill interpolates"""
+    pictures: Literal["png", "jpg"] = "png"
+    """format of the written pictures"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    options = parse(PrepareOptions, words, "prepare")
+    from endotsr.sequences.layouts import open_recording
+    from endotsr.sequences.prepare import PrepareSettings, prepare
+    from endotsr.sequences.source_options import SourceOptions
+    from endotsr.sequences.writing import refuse_existing
+
+    refuse_existing(options.out)
+    for name in ("rate", "source_rate", "baseline", "depth_scale"):
+        value = getattr(options, name)
+        if value is not None and not 0 < value < float("inf"):
+            raise InputError(f"--{name.replace('_', '-')} {value:g} is not allowed; allowed: a number > 0")
+    if len(options.camera) not in (0, 4):
+        raise InputError(f"--camera: {len(options.camera)} numbers; allowed: 4, FX FY CX CY")
+    stated = SourceOptions(
+        layout=options.layout,
+        stereo=options.stereo,
+        camera=options.camera or None,
+        distortion=options.distortion,
+        calibration=options.calibration,
+        baseline=options.baseline,
+        trajectory=options.trajectory,
+        direction=options.trajectory_direction,
+        axes=options.trajectory_axes,
+        trajectory_unit=options.trajectory_unit,
+        masks=options.masks,
+        excluded_value=options.excluded_value,
+        depth=options.depth,
+        depth_unit=options.depth_unit,
+        depth_scale=options.depth_scale,
+        rate=options.source_rate,
+    )
+    settings = PrepareSettings(
+        options.frames, options.rate, options.scale, options.gaps, options.pictures, options.points
+    )
+    recording = open_recording(options.source, stated)
+    print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
+    found, notes = prepare(recording, options.out, settings)
+    for note in notes:
+        print(f"  {note}")
+    print(f"written: {options.out}, {found.frames} frames of {found.camera.width}x{found.camera.height}")
+    print(_next_step(options.out, found.depth is not None, found.camera.baseline > 0))
+    return 0
+
+
+def _next_step(out: Path, depth: bool, stereo: bool) -> str:
+    if depth:
+        return f"next: endotsr train {out} --out RUN"
+    return f"next: endotsr depth {out}" if stereo else f"next: add depth/ to {out}; training needs it"

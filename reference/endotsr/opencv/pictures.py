@@ -1,0 +1,77 @@
+"""Picture files of any kind that a recording may hold: PNG, JPEG, TIFF, and OpenEXR where OpenCV has it.
+
+Comes in: a path; goes out: RGB or grey pixels as stored. Every reader refuses a file that OpenCV would repair in
+silence: a JPEG that was cut off decodes to a picture whose lower part is grey.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import Array
+from endotsr.opencv import read_png
+from endotsr.opencv.library import cv2_library
+from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.png import LARGEST_FILE
+
+JPEG_ENDINGS = (".jpg", ".jpeg")
+TIFF_ENDINGS = (".tif", ".tiff")
+EXR_ENDINGS = (".exr",)
+PICTURE_ENDINGS = (".png", *JPEG_ENDINGS)  # of colour pictures and masks
+JPEG_START, JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"
+TIFF_STARTS = (b"II*\0", b"MM\0*")
+EXR_START = b"v/1\x01"
+
+
+def read_picture(path: Path) -> Array:
+    """Pixels of a PNG, JPEG, TIFF or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
+
+    Raises:  InputError naming the file if it is missing, of another kind, truncated or damaged.
+    """
+    ending = Path(path).suffix.lower()
+    if ending == ".png":
+        return read_png(path)
+    if ending not in JPEG_ENDINGS + TIFF_ENDINGS + EXR_ENDINGS:
+        raise InputError(f"{path}: no picture by its name; allowed: .png, .jpg, .jpeg, .tif, .tiff, .exr")
+    data = read_bytes(Path(path), LARGEST_FILE)
+    _check_start_and_end(data, ending, path)
+    return _decoded(data, path)
+
+
+def _check_start_and_end(data: bytes, ending: str, path: Path) -> None:
+    if not data:
+        raise InputError(f"{path}: the file is empty")
+    if ending in JPEG_ENDINGS:
+        if not data.startswith(JPEG_START):
+            raise InputError(f"{path}: not a JPEG file: it does not start with the JPEG signature")
+        if JPEG_END not in data[-64:]:  # some cameras append a few bytes
+            raise InputError(f"{path}: truncated JPEG: the file ends after {len(data)} bytes, without its end marker")
+    starts = TIFF_STARTS if ending in TIFF_ENDINGS else (EXR_START,)
+    if ending not in JPEG_ENDINGS and not data.startswith(starts):
+        raise InputError(f"{path}: not a {'TIFF' if ending in TIFF_ENDINGS else 'EXR'} file by its first bytes")
+
+
+def _decoded(data: bytes, path: Path) -> Array:
+    cv2 = cv2_library()
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise InputError(f"{path}: cannot be decoded: {str(error).strip().splitlines()[-1]}") from None
+    if pixels is None:
+        raise InputError(f"{path}: cannot be decoded: the file is damaged, or this OpenCV lacks its format")
+    if pixels.ndim == 3 and pixels.shape[2] == 1:
+        pixels = pixels[:, :, 0]
+    return np.ascontiguousarray(pixels if pixels.ndim == 2 else pixels[:, :, 2::-1])
+
+
+def write_jpeg(path: Path, pixels: Array, quality: int = 95) -> None:
+    """Write (H, W, 3) RGB uint8 as JPEG. Raises InputError if the file cannot be written."""
+    cv2 = cv2_library()
+    done, encoded = cv2.imencode(".jpg", np.ascontiguousarray(pixels[:, :, ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not done:
+        raise InputError(f"{path}: the picture cannot be encoded as JPEG")
+    try:
+        Path(path).write_bytes(encoded.tobytes())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None

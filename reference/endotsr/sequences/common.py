@@ -1,0 +1,227 @@
+"""Reading the common format: `sequence.toml` beside `images/`, `masks/`, `depth/` and `images_right/`.
+
+Comes in: a folder and the `SequenceConfig`; goes out: a `Sequence`, or a `Recording` for `prepare`, `depth` and
+`masks`. The fields of `sequence.toml` are described in `sequence_file`. The file states the polarity of the masks and
+the units; `sequence.excluded_value` does not apply.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_depth_scale, check_percentiles, clip_depth
+from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.sequences.files import check_pairing, hash_files, list_pictures
+from endotsr.sequences.masks import threshold_masks
+from endotsr.sequences.recording import Pair, Pose, Recording, colour_picture, grey_plane
+from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
+from endotsr.sequences.splits import parse_frame_range, split_frames
+from endotsr.splatting.camera import Camera
+
+
+class Contents(NamedTuple):
+    """The files of a folder in the common format, all frames, in time order."""
+
+    folder: Path
+    file: SequenceFile
+    images: list[Path]
+    right: list[Path]  # empty: no right pictures
+    masks: list[Path]  # empty: no masks
+    depth: list[Path]  # empty: no depth
+    poses: list[Pose] | None
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder in the common format."""
+    return (path / FILE_NAME).is_file()
+
+
+def list_contents(folder: Path) -> Contents:
+    """List and pair the files. Raises InputError for a file without its partner or a number that disagrees."""
+    folder = Path(folder)
+    found = read_sequence_file(folder)
+    images = list_pictures(folder / IMAGES, PICTURE_ENDINGS)
+    if len(images) != found.frames:
+        raise InputError(f"{folder / FILE_NAME}: frames = {found.frames}, but images/ holds {len(images)} pictures")
+    right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
+    masks = list_pictures(folder / found.masks.folder, PICTURE_ENDINGS) if found.masks else []
+    depth = list_pictures(folder / found.depth.folder, DEPTH_ENDINGS) if found.depth else []
+    for other in (right, masks, depth):
+        if other:
+            check_pairing(images, other)
+    return Contents(folder, found, images, right, masks, depth, read_poses(found, folder / FILE_NAME))
+
+
+def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, range]:
+    """The contents that a training reads, and the selected frames. Raises InputError for what cannot be trained on."""
+    contents = list_contents(folder)
+    if contents.file.camera.distortion and any(contents.file.camera.distortion):
+        raise InputError(
+            f"{folder}: the pictures are distorted (camera.distortion); `endotsr prepare {folder} --out FOLDER`"
+            " straightens them"
+        )
+    if not contents.depth:
+        remedy = "`endotsr depth` makes it from the stereo pair" if contents.right else "allowed: depth of every frame"
+        raise InputError(f"{folder}: no depth: [depth] is missing in {FILE_NAME}; {remedy}")
+    if config.masks == "gt_masks":
+        raise InputError(
+            f"{folder}: sequence.masks = 'gt_masks': {FILE_NAME} names the mask folder; allowed: masks, none"
+        )
+    if config.masks == "none":
+        contents = contents._replace(masks=[])
+    try:
+        frames = parse_frame_range(config.frames, len(contents.images))
+        split_frames(len(frames), config.split, config.block_length)
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from None
+    chosen = {
+        name: [getattr(contents, name)[i] for i in frames if getattr(contents, name)]
+        for name in ("images", "right", "masks", "depth")
+    }
+    poses = [contents.poses[i] for i in frames] if contents.poses else None
+    return contents._replace(**chosen, poses=poses), frames
+
+
+def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
+    """Read the frames that `config` selects; the steps are those of `read_endonerf`.
+
+    near     near plane, scene units
+
+    Raises:  InputError naming the file, the frame or the key.
+    """
+    check_percentiles(config)
+    contents, _ = select_contents(folder, config)
+    notes = [f"source: {contents.file.source}"] if contents.file.source else []
+    if contents.file.masks and contents.file.masks.proposed and contents.masks:
+        notes.append("masks: proposals of `endotsr masks`, checked by nobody")
+    images, masks, depth = _read_frames(contents, config, notes)
+    cameras, static = cameras_of(contents)
+    excluded = contents.file.masks.excluded_value if contents.file.masks else "white"
+    names = [str(file) for file in contents.masks]
+    unit = "arbitrary unit" if contents.file.arbitrary else "mm"
+    frames = Frames(
+        images=images,
+        masks=masks,
+        depth=depth,
+        cameras=cameras,
+        static=static,
+        names=[file.stem for file in contents.images],
+        depth_files=contents.depth,
+        unit=unit,
+        mask_source=MaskSource(str(contents.masks[0].parent), names, excluded) if names else None,
+        arbitrary=contents.file.arbitrary,
+    )
+    return assemble(frames, config, near, Path(folder), notes)
+
+
+def common_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
+    """SHA-256 (hex) of every file that `read_common` reads with this configuration, by path inside the folder."""
+    contents, _ = select_contents(folder, config)
+    files = [Path(folder) / FILE_NAME, *contents.images, *contents.masks, *contents.depth]
+    return hash_files(Path(folder), files)
+
+
+def cameras_of(contents: Contents) -> tuple[list[Camera], bool]:
+    """One camera a frame, and whether all are one (then one and the same object)."""
+    entry, count = contents.file.camera, len(contents.images)
+    lens = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
+    poses = contents.poses
+    if poses is None or (
+        all((p.rotation == poses[0].rotation).all() for p in poses)
+        and all((p.translation == poses[0].translation).all() for p in poses)
+    ):
+        pose = poses[0] if poses else Pose(np.eye(3), np.zeros(3))
+        return [Camera(pose.rotation, pose.translation, *lens)] * count, True
+    return [Camera(pose.rotation, pose.translation, *lens) for pose in poses], False
+
+
+def _read_frames(
+    contents: Contents, config: SequenceConfig, notes: list[str]
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
+    """All selected pictures: images (n, 3, H, W), tissue masks (n, H, W), clipped depth (n, H, W)."""
+    entry = contents.file.depth
+    assert entry is not None
+    scale = entry.scale * contents.file.to_scene(entry.unit)
+    n, width, height = len(contents.images), contents.file.camera.width, contents.file.camera.height
+    images = np.empty((n, 3, height, width), np.uint8)
+    depth = np.empty((n, height, width), np.float32)
+    masks: list[NDArray] = [depth] * n
+    types = [depth.dtype] * n
+
+    def read_frame(i: int) -> None:
+        images[i] = _colour(contents, contents.images[i]).transpose(2, 0, 1)
+        if contents.masks:
+            masks[i] = grey_plane(
+                _sized(contents, read_picture(contents.masks[i]), contents.masks[i]), contents.masks[i]
+            )
+        raw = _sized(contents, read_plane(contents.depth[i]), contents.depth[i])
+        types[i] = raw.dtype
+        depth[i] = clip_depth(depth_plane(raw, scale, contents.depth[i]), config.depth_percentiles)
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame with one
+    check_depth_scale(depth, contents.depth, types, entry.unit)
+    if not contents.masks:
+        return images, np.ones((n, height, width), bool), depth
+    white = threshold_masks(masks, [str(file) for file in contents.masks], notes)
+    assert contents.file.masks is not None
+    return images, ~white if contents.file.masks.excluded_value == "white" else white, depth
+
+
+def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:
+    entry = contents.file.camera
+    if pixels.shape[:2] != (entry.height, entry.width):
+        raise InputError(
+            f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {FILE_NAME} states {entry.width}x{entry.height}"
+        )
+    return pixels
+
+
+def _colour(contents: Contents, path: Path) -> NDArray[np.uint8]:
+    return colour_picture(_sized(contents, read_picture(path), path), path)
+
+
+def open_common(folder: Path) -> Recording:
+    """The whole folder as a recording, nothing decoded yet. Raises InputError."""
+    contents = list_contents(folder)
+    found = contents.file
+    scale = found.to_scene(found.depth.unit) * found.depth.scale if found.depth else 1.0
+
+    def pictures(wanted: list[int]) -> Iterator[Pair]:
+        for i in wanted:
+            right = _colour(contents, contents.right[i]) if contents.right else None
+            yield Pair(_colour(contents, contents.images[i]), right)
+
+    def mask(i: int) -> NDArray[np.bool_]:
+        assert found.masks is not None
+        path = contents.masks[i]
+        plane = grey_plane(_sized(contents, read_picture(path), path), path)
+        white = threshold_masks([plane], [str(path)], [])[0]
+        return ~white if found.masks.excluded_value == "white" else white
+
+    def depth(i: int) -> NDArray[np.float32]:
+        path = contents.depth[i]
+        return depth_plane(_sized(contents, read_plane(path), path), scale, path)
+
+    return Recording(
+        layout="common",
+        where=Path(folder),
+        names=[file.stem for file in contents.images],
+        pictures=pictures,
+        masks=mask if contents.masks else None,
+        depth=depth if contents.depth else None,
+        unit="arbitrary" if found.arbitrary else "mm",
+        lens=found.camera.lens(folder),
+        baseline=found.camera.baseline * found.to_scene(found.unit) or None,
+        poses=list(contents.poses) if contents.poses else None,
+        rate=found.frame_rate or None,
+        notes=[f"source: {found.source}"] if found.source else [],
+    )

@@ -1,0 +1,43 @@
+"""Depth of one frame from a file: PNG of 8 or 16 bits, TIFF, .npy, .pfm, and OpenEXR where OpenCV has it."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
+from endotsr.sequences.arrays import read_npy, read_pfm
+from endotsr.sequences.recording import grey_plane
+
+DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
+
+
+def read_plane(path: Path) -> NDArray:
+    """The numbers (H, W) of a file as stored; an axis of length 1 is dropped.
+
+    Raises:  InputError naming the file and the reason.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in DEPTH_ENDINGS:
+        raise InputError(f"{path}: no depth by its name; allowed: {', '.join(DEPTH_ENDINGS)}")
+    array = read_npy(path) if ending == ".npy" else read_pfm(path) if ending == ".pfm" else read_picture(path)
+    plane = grey_plane(array, path) if ending not in (".npy", ".pfm") else np.squeeze(array)
+    if plane.ndim != 2:
+        raise InputError(f"{path}: array of shape {array.shape}; allowed: one plane (height, width)")
+    return plane
+
+
+def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32]:
+    """Depth (H, W) in scene units; what is no depth (0, negative, not finite) becomes 0.
+
+    Raises:  InputError if no value of a floating-point file is finite, or values leave the range of float32.
+    """
+    if raw.dtype.kind == "f" and raw.size and not np.isfinite(raw).any():
+        raise InputError(f"{where}: no value is finite; allowed: lengths, and 0 where there is no depth")
+    with np.errstate(over="ignore"):
+        depth = raw.astype(np.float64) * scale
+    depth[~np.isfinite(depth) | (depth <= 0)] = 0.0
+    if depth.size and depth.max() > np.finfo(np.float32).max:
+        raise InputError(f"{where}: depth {depth.max():g} is too large")
+    return depth.astype(np.float32)

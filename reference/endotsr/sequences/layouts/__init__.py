@@ -1,0 +1,88 @@
+"""The layouts in which recordings come, one file each.
+
+A file of this folder holds one value `LAYOUT`; putting it here registers it. `detect` asks the layouts in the order of
+`rank`: those that state what they are first, a plain folder of pictures last.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import NamedTuple
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.sequences.recording import Recording
+from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.source_options import SourceOptions
+
+
+class Layout(NamedTuple):
+    """One layout on disk."""
+
+    name: str
+    about: str  # what a path in this layout holds, for messages
+    rank: int  # layouts are tried in ascending order
+    recognises: Callable[[Path], bool]
+    open: Callable[[Path, SourceOptions], Recording]
+    read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: `endotsr prepare` comes first
+    hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # of the files that `read` reads
+
+
+@cache
+def layouts() -> tuple[Layout, ...]:
+    """Every layout, in the order in which they are tried."""
+    found = [import_module(f"{__name__}.{entry.name}").LAYOUT for entry in iter_modules(__path__)]
+    return tuple(sorted(found, key=lambda layout: (layout.rank, layout.name)))
+
+
+def layout_of(path: Path, name: str = "auto") -> Layout:
+    """The layout named, or the first that recognises the path.
+
+    Raises:  InputError if the path does not exist or no layout recognises it, with what would be recognised.
+    """
+    path = Path(path)
+    if name != "auto":
+        found = {layout.name: layout for layout in layouts()}
+        if name not in found:
+            raise InputError(f"layout {name!r} is not allowed; allowed: auto, {', '.join(found)}")
+        return found[name]
+    if not path.exists():
+        raise InputError(f"{path}: not found")
+    for layout in layouts():
+        if layout.recognises(path):
+            return layout
+    known = "; ".join(f"{layout.name} ({layout.about})" for layout in layouts())
+    raise InputError(f"{path}: no known layout; allowed: {known}")
+
+
+def open_recording(path: Path, options: SourceOptions) -> Recording:
+    """The recording at a path. Raises InputError."""
+    layout = layout_of(path, options.layout)
+    if options.layout != "auto" and not Path(path).exists():
+        raise InputError(f"{path}: not found")
+    return layout.open(Path(path), options)
+
+
+def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:
+    """The sequence at a path, in any layout that can be trained on as it is.
+
+    Raises:  InputError; for another layout it names the commands that make a sequence of it.
+    """
+    layout = readable_layout(Path(path))
+    assert layout.read is not None
+    return layout.read(Path(path), config, near)
+
+
+def readable_layout(path: Path) -> Layout:
+    """The layout of a path that can be trained on as it is; a path that is in no layout is read as EndoNeRF.
+
+    Raises:  InputError for a layout that needs `endotsr prepare`.
+    """
+    found = next((layout for layout in layouts() if path.exists() and layout.recognises(path)), None)
+    if found is None or (found.name == "pictures" and (path / "depth").is_dir()):
+        found = layout_of(path, "endonerf")  # its messages say what is missing
+    if found.read is None:
+        raise InputError(f"{path}: {found.about}; `endotsr prepare {path} --out FOLDER` makes a sequence of it")
+    return found

@@ -1,0 +1,75 @@
+"""A COLMAP model with its pictures: poses, intrinsics and points of a reconstruction of unknown scale.
+
+The model (cameras, images, points3D; .txt or .bin) lies in the folder, in sparse/0 or in sparse; the pictures in
+images/ or beside the model. Frames are the registered pictures, in the order of their names.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.sequences.colmap_model import find_model, read_model
+from endotsr.sequences.layouts import Layout
+from endotsr.sequences.recording import ARBITRARY, Recording
+from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import pictures_from_files, stated_masks
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with a COLMAP model."""
+    return path.is_dir() and find_model(path) is not None
+
+
+def open_colmap(path: Path, options: SourceOptions) -> Recording:
+    """The model as a recording. Raises InputError for a picture that is missing, or for several cameras."""
+    folder = find_model(path)
+    if folder is None:
+        raise InputError(f"{path}: holds no COLMAP model (cameras.txt or cameras.bin, also in sparse/0)")
+    model = read_model(folder)
+    if not model.images:
+        raise InputError(f"{folder}: the model holds no registered picture")
+    used = {image.camera for image in model.images}
+    if len({model.cameras[key] for key in used}) > 1:
+        raise InputError(f"{folder}: {len(used)} cameras with different intrinsics; allowed: one for all frames")
+    files = [_file(path, image.name) for image in model.images]
+    lens = model.cameras[model.images[0].camera]
+    empty = np.zeros((0, 3))
+
+    def points(i: int) -> np.ndarray:
+        seen = [model.points[key] for key in model.images[i].points.tolist() if key in model.points]
+        return np.array(seen) if seen else empty
+
+    return Recording(
+        layout="colmap",
+        where=path,
+        names=[file.stem for file in files],
+        pictures=pictures_from_files(files, []),
+        masks=stated_masks(options, files, lens.width, lens.height),
+        points=points,
+        unit=ARBITRARY,
+        lens=lens,
+        poses=[image.pose for image in model.images],
+        rate=options.rate,
+        notes=[f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points"],
+    )
+
+
+def _file(path: Path, name: str) -> Path:
+    """The file of a registered picture. Raises InputError if it is missing or lies outside of the folder."""
+    inner = Path(name)
+    if inner.is_absolute() or ".." in inner.parts:
+        raise InputError(f"{path}: picture {name!r}: allowed: a file inside the folder")
+    for place in (path / "images" / inner, path / inner):
+        if place.is_file():
+            return place
+    raise InputError(f"{path / 'images' / inner}: file not found; the COLMAP model registers it")
+
+
+LAYOUT = Layout(
+    name="colmap",
+    about="a folder with a COLMAP model and images/",
+    rank=2,
+    recognises=recognises,
+    open=open_colmap,
+)

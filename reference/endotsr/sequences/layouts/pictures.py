@@ -1,0 +1,91 @@
+"""A plain folder of pictures, or one picture: png or jpg, one a frame, alone or as stereo pairs.
+
+A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`) is a stereo recording.
+Everything else about it is stated on the command line.
+"""
+
+from pathlib import Path
+
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.sequences.files import check_pairing
+from endotsr.sequences.layouts import Layout
+from endotsr.sequences.recording import Pose, Recording, colour_picture
+from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import (
+    files_of,
+    halves,
+    pictures_from_files,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+    unit_of,
+)
+from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
+
+PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"))
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a picture, or a folder that holds pictures directly or in a known pair of folders."""
+    if path.is_file():
+        return path.suffix.lower() in PICTURE_ENDINGS
+    return path.is_dir() and any(_holds_pictures(folder) for folder in (path, *(path / left for left, _ in PAIRS)))
+
+
+def _holds_pictures(folder: Path) -> bool:
+    return folder.is_dir() and any(file.suffix.lower() in PICTURE_ENDINGS for file in folder.iterdir())
+
+
+def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
+    """Left and right picture files; right is empty without a second folder. Raises InputError."""
+    for left, right in PAIRS:
+        if path.is_dir() and _holds_pictures(path / left):
+            both = files_of(path / left, PICTURE_ENDINGS), []
+            if _holds_pictures(path / right):
+                both = both[0], files_of(path / right, PICTURE_ENDINGS)
+                check_pairing(*both)
+            return both
+    return files_of(path, PICTURE_ENDINGS), []
+
+
+def open_pictures(path: Path, options: SourceOptions) -> Recording:
+    """The pictures as a recording. Raises InputError."""
+    left, right = find_pictures(path)
+    stereo = "none" if options.stereo == "auto" else options.stereo
+    if right and stereo != "none":
+        raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
+    stored = colour_picture(read_picture(left[0]), left[0])
+    width, height = halves(stored.shape[1], stored.shape[0], stereo)
+    lens, rig = stated_camera(options, width, height, path)
+    poses: list[Pose | None] | None = None
+    notes = []
+    if options.trajectory is not None:
+        unit = options.trajectory_unit or "m"
+        trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
+        poses, how = poses_of_frames(trajectory, len(left), options.rate)
+        notes.append(f"{options.trajectory.name}: {how}; positions in {unit}")
+    return Recording(
+        layout="pictures",
+        where=path,
+        names=[file.stem for file in left],
+        pictures=pictures_from_files(left, right, stereo),
+        masks=stated_masks(options, left, width, height),
+        depth=stated_depth(options, left),
+        unit=unit_of(options, "m"),
+        lens=lens,
+        rig=rig,
+        baseline=options.baseline,
+        poses=poses,
+        rate=options.rate,
+        notes=notes,
+    )
+
+
+LAYOUT = Layout(
+    name="pictures",
+    about="a folder of pictures, or left/ and right/",
+    rank=9,
+    recognises=recognises,
+    open=open_pictures,
+)

@@ -1,0 +1,93 @@
+"""TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
+
+`rgb.txt` and `depth.txt` hold one line a picture, `time file`; `groundtruth.txt` is a trajectory in seconds and metres,
+camera-to-world. Depth is stored in 5000 steps a metre. Pictures, depth and poses belong together within 0.02 s.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import read_picture
+from endotsr.sequences.layouts import Layout
+from endotsr.sequences.recording import Lens, Pose, Recording, colour_picture
+from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_masks
+from endotsr.sequences.trajectory import poses_at, read_trajectory
+
+LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
+STEP = 1000.0 / 5000.0  # mm of one step of the stored depth
+LONGEST = 0.02  # seconds between a picture and its depth or pose
+DEFAULT = (525.0, 525.0, 320.0, 240.0)  # the intrinsics that the authors of the layout recommend, 640x480
+
+
+def recognises(path: Path) -> bool:
+    """Whether a path is a folder with a list of timed pictures."""
+    return (path / LIST).is_file()
+
+
+def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
+    """Times and files of a list, in time order. Raises InputError naming the line."""
+    times, files = [], []
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    for number, line in enumerate(lines, 1):
+        words = line.split(maxsplit=1)
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            time = float(words[0])
+        except ValueError:
+            time = float("nan")
+        if len(words) != 2 or not np.isfinite(time):
+            raise InputError(f"{path}: line {number}: allowed: a time in seconds and the name of a file")
+        file = Path(words[1].strip())
+        if file.is_absolute() or ".." in file.parts:
+            raise InputError(f"{path}: line {number}: {file}: allowed: a file inside the folder")
+        times.append(time)
+        files.append(path.parent / file)
+    if not times:
+        raise InputError(f"{path}: names no picture")
+    order = np.argsort(times, kind="stable")
+    return np.array(times)[order], [files[i] for i in order]
+
+
+def open_tum(path: Path, options: SourceOptions) -> Recording:
+    """The folder as a recording. Raises InputError."""
+    times, files = read_list(path / LIST)
+    height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
+    lens, _ = stated_camera(options, width, height, path)
+    notes = []
+    if lens is None and (width, height) == (640, 480):
+        lens = Lens(*DEFAULT, width, height)
+        notes.append("no --camera: the intrinsics that the authors of the layout recommend")
+    depth = None
+    if (path / DEPTH_LIST).is_file():
+        moments, planes = read_list(path / DEPTH_LIST)
+        nearest = np.abs(moments[None, :] - times[:, None]).argmin(axis=1)
+        paired = [planes[k] if abs(moments[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
+        depth = depth_reader(paired, STEP)
+    poses: list[Pose | None] | None = None
+    where = options.trajectory or path / TRAJECTORY
+    if where.is_file():
+        poses = poses_at(read_trajectory(where, options.trajectory_unit or "m", options.direction), times, LONGEST)
+    steps = np.diff(times)
+    return Recording(
+        layout="tum",
+        where=path,
+        names=[file.stem for file in files],
+        pictures=pictures_from_files(files, []),
+        masks=stated_masks(options, files, width, height),
+        depth=depth,
+        unit="mm",
+        lens=lens,
+        poses=poses,
+        rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
+        notes=notes,
+    )
+
+
+LAYOUT = Layout(name="tum", about="a folder with rgb.txt and rgb/", rank=3, recognises=recognises, open=open_tum)

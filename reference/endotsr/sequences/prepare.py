@@ -1,0 +1,261 @@
+"""From any recording to a folder in the common format.
+
+Comes in: a `Recording` and `PrepareSettings`; goes out: a new folder with pictures, masks, depth, `sequence.toml`, and
+notes on everything that was assumed. Frames are read, straightened, resized and written one at a time. The folder
+appears when it is whole.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.opencv import write_png
+from endotsr.opencv.pictures import write_jpeg
+from endotsr.sequences.files import shortened
+from endotsr.sequences.points import depth_from_points
+from endotsr.sequences.recording import ARBITRARY, Lens, Pair, Pose, Recording
+from endotsr.sequences.sequence_file import (
+    DEPTH,
+    FORMAT,
+    IMAGES,
+    MASKS,
+    RIGHT,
+    CameraEntry,
+    DepthEntry,
+    MaskEntry,
+    PoseEntry,
+    SequenceFile,
+    write_sequence_file,
+)
+from endotsr.sequences.splits import parse_frame_range
+from endotsr.sequences.straighten import Straightener, straightener
+from endotsr.sequences.trajectory import filled
+from endotsr.sequences.writing import new_folder
+
+DEPTH_LEVELS = 65535 // 8  # of the 16 bits for the usual largest depth of a frame; eight times more still fits
+LARGEST = 99.8  # percentile of a frame that counts as its largest depth; single values may be outliers
+OnFrame = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class PrepareSettings:
+    """What is made of a recording."""
+
+    frames: str = ""  # start:stop[:step] of the source
+    rate: float | None = None  # frames a second to keep
+    scale: float = 1.0
+    gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
+    pictures: Literal["png", "jpg"] = "png"
+    points: Literal["interpolated", "sparse", "none"] = "interpolated"
+
+
+def prepare(
+    recording: Recording, out: Path, settings: PrepareSettings, on_frame: OnFrame = lambda i, n: None
+) -> tuple[SequenceFile, list[str]]:
+    """Write the frames to the new folder `out`. Returns `sequence.toml` and the notes.
+
+    on_frame  called with (frames written, frames in all)
+
+    Raises:  InputError; nothing is left behind then.
+    """
+    notes = list(recording.notes)
+    chosen = select_frames(recording, settings, notes)
+    chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
+    with new_folder(Path(out)) as folder:
+        found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
+        write_sequence_file(found, folder)
+    return found, notes
+
+
+def select_frames(recording: Recording, settings: PrepareSettings, notes: list[str]) -> list[int]:
+    """The frame range, thinned to the wanted rate. Raises InputError."""
+    text = settings.frames.strip()
+    frames = list(parse_frame_range(text, recording.count) if text else range(recording.count))
+    if settings.rate is None:
+        return frames
+    if recording.rate is None:
+        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ beside --rate")
+    if settings.rate > recording.rate:
+        raise InputError(f"rate {settings.rate:g}: the source has {recording.rate:g} frames a second; allowed: no more")
+    step = recording.rate / settings.rate
+    kept = sorted({round(k * step) for k in range(int(len(frames) / step) + 1)} & set(range(len(frames))))
+    notes.append(f"{len(kept)} of {len(frames)} frames kept for {settings.rate:g} a second")
+    return [frames[k] for k in kept]
+
+
+def _poses_and_masks(
+    recording: Recording, chosen: list[int], gaps: str, notes: list[str]
+) -> tuple[list[int], list[Pose] | None]:
+    """The frames that are written and their poses; gaps are refused, left out or filled, and named."""
+    lacking: dict[str, list[int]] = {}
+    if recording.poses is not None:
+        lacking["pose"] = [i for i in chosen if recording.poses[i] is None]
+    if recording.masks is not None:
+        lacking["mask"] = [i for i in chosen if recording.masks(i) is None]
+    for what, frames in lacking.items():
+        if not frames:
+            continue
+        named = f"{len(frames)} of {len(chosen)} frames have no {what}: {shortened([str(i) for i in frames])}"
+        if gaps == "refuse" or len(frames) == len(chosen):
+            raise InputError(f"{recording.where}: {named}; allowed: --gaps drop (without these) or --gaps fill")
+        filling = "the pose is between its neighbours" if what == "pose" else "the mask is that of the nearest frame"
+        notes.append(f"{named}; {'left out' if gaps == 'drop' else filling}")
+    if gaps == "drop":
+        without = set().union(*lacking.values())
+        chosen = [i for i in chosen if i not in without]
+    if recording.poses is None:
+        return chosen, None
+    every = filled(recording.poses) if lacking["pose"] and gaps == "fill" else recording.poses
+    return chosen, [pose for pose in (every[i] for i in chosen) if pose is not None]
+
+
+def _write_frames(
+    recording: Recording,
+    folder: Path,
+    chosen: list[int],
+    poses: list[Pose] | None,
+    settings: PrepareSettings,
+    notes: list[str],
+    on_frame: OnFrame,
+) -> SequenceFile:
+    if not chosen:
+        raise InputError(f"{recording.where}: no frame is left")
+    straight: Straightener | None = None
+    depth_scale, saturated = 0.0, 0
+    without_depth: list[int] = []
+    (folder / IMAGES).mkdir()
+    for k, (i, pair) in enumerate(zip(chosen, recording.pictures(chosen))):
+        if straight is None:
+            height, width = pair.left.shape[:2]
+            straight = straightener(recording, width, height, settings.scale)
+            notes += straight.notes
+        _write_pictures(folder, k, _checked(recording, i, pair, straight), settings.pictures)
+        if recording.masks is not None:
+            _write_mask(folder, k, straight.mask(_mask_or_nearest(recording, i, chosen)))
+        depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points)
+        if depth is not None and depth.any():
+            depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
+            saturated += _write_depth(folder, k, depth, depth_scale)
+        elif recording.depth is not None or (recording.points is not None and settings.points != "none"):
+            without_depth.append(i)
+            _write_depth(folder, k, np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
+        on_frame(k + 1, len(chosen))
+    assert straight is not None
+    if without_depth:
+        notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
+    if saturated:
+        notes.append(
+            f"{saturated} pixels lie beyond {65535 * depth_scale:g}, eight times the usual depth: cut off there"
+        )
+    turned = [straight.pose(pose) for pose in poses] if poses else None
+    return _file_of(recording, straight, turned, len(chosen), depth_scale, settings, notes)
+
+
+def _checked(recording: Recording, i: int, pair: Pair, straight: Straightener) -> Pair:
+    """The pictures in the new camera. Raises InputError for a frame of another size than the first."""
+    size = pair.left.shape[:2]
+    expected = straight.left.x.shape if straight.left else None
+    source = recording.rig.left if recording.rig else recording.lens
+    expected = expected or (source and (source.height, source.width))
+    if expected and size != tuple(expected):
+        raise InputError(
+            f"{recording.where}: frame {recording.names[i]}: {size[1]}x{size[0]} pixels, others"
+            f" {expected[1]}x{expected[0]}"
+        )
+    if pair.right is not None and pair.right.shape != pair.left.shape:
+        raise InputError(f"{recording.where}: frame {recording.names[i]}: left and right differ in size")
+    return straight.pictures(pair)
+
+
+def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray[np.bool_]:
+    """The mask of a frame, or that of the nearest frame that has one."""
+    assert recording.masks is not None
+    for other in sorted(chosen, key=lambda k: (abs(k - i), k)):
+        found = recording.masks(other)
+        if found is not None:
+            return found
+    raise InputError(f"{recording.where}: no frame has a mask")
+
+
+def _depth(
+    recording: Recording, i: int, straight: Straightener, pose: Pose | None, points: str
+) -> NDArray[np.float32] | None:
+    if recording.depth is not None:
+        found = recording.depth(i)
+        return None if found is None else straight.depth(found)
+    if recording.points is None or pose is None or points == "none":
+        return None
+    return depth_from_points(recording.points(i), straight.pose(pose), straight.lens, points)
+
+
+def step_of_depth(largest: float) -> float:
+    """The length of one step of 16-bit depth: 1, 2 or 5 times a power of ten, so that eight times `largest` fits."""
+    least = largest / DEPTH_LEVELS
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
+
+
+def _write_pictures(folder: Path, k: int, pair: Pair, ending: str) -> None:
+    for name, picture in ((IMAGES, pair.left), (RIGHT, pair.right)):
+        if picture is not None:
+            (folder / name).mkdir(exist_ok=True)
+            path = folder / name / f"{k:06d}.{ending}"
+            write_png(path, picture) if ending == "png" else write_jpeg(path, picture)
+
+
+def _write_mask(folder: Path, k: int, mask: NDArray[np.bool_]) -> None:
+    (folder / MASKS).mkdir(exist_ok=True)
+    write_png(folder / MASKS / f"{k:06d}.png", np.where(mask, 0, 255).astype(np.uint8))
+
+
+def _write_depth(folder: Path, k: int, depth: NDArray[np.float32], step: float) -> int:
+    """16-bit steps; where there is depth, at least 1. Returns the number of pixels that do not fit and are cut off."""
+    (folder / DEPTH).mkdir(exist_ok=True)
+    levels = np.rint(depth / step)
+    stored = np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16)
+    write_png(folder / DEPTH / f"{k:06d}.png", stored)
+    return int(np.count_nonzero(levels > 65535))
+
+
+def _file_of(
+    recording: Recording,
+    straight: Straightener,
+    poses: list[Pose] | None,
+    count: int,
+    depth_scale: float,
+    settings: PrepareSettings,
+    notes: list[str],
+) -> SequenceFile:
+    unit = "arbitrary" if recording.unit == ARBITRARY else "mm"
+    if (recording.depth or recording.points) and not depth_scale:
+        notes.append("no frame has depth: none is written")
+    method = "given" if recording.depth else f"points, {settings.points}"
+    return SequenceFile(
+        format=FORMAT,
+        frames=count,
+        camera=camera_entry(straight.lens, straight.baseline),
+        source=f"{recording.where.name} ({recording.layout})",
+        unit=unit,
+        frame_rate=float(settings.rate or recording.rate or 0.0),
+        masks=MaskEntry() if recording.masks is not None else None,
+        depth=DepthEntry(unit=unit, scale=depth_scale, method=method) if depth_scale else None,
+        poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
+    )
+
+
+def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
+    """The [camera] of a lens without distortion."""
+    fx, fy, cx, cy = (float(value) for value in (lens.fx, lens.fy, lens.cx, lens.cy))
+    return CameraEntry(
+        width=lens.width, height=lens.height, fx=fx, fy=fy, cx=cx, cy=cy, baseline=float(baseline or 0.0)
+    )
+
+
+def pose_row(pose: Pose) -> list[float]:
+    """The twelve numbers of [poses] matrices."""
+    return [float(value) for value in np.column_stack([pose.rotation, pose.translation]).ravel()]

@@ -1,0 +1,242 @@
+"""The file `sequence.toml` of the common format: what the pictures of a folder mean.
+
+    format = "endotsr-sequence-1"
+    source = "P2_8 (stereomis)"        # where the frames come from, in words
+    frames = 120
+    unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
+    frame_rate = 25.0                  # frames a second; 0 = unknown
+
+    [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
+    width = 640 ... height, fx, fy, cx, cy
+    distortion = []                    # k1 k2 p1 p2 [k3 [k4 k5 k6]], OpenCV's order; training needs none
+    baseline = 4.2                     # of a rectified pair; 0 = no stereo
+
+    [masks]                            # absent: every pixel is tissue
+    folder = "masks"
+    excluded_value = "white"           # or "black"
+    proposed = false                   # true: made by `endotsr masks`, not by a person
+
+    [depth]                            # absent: `endotsr depth` makes it
+    folder = "depth"
+    unit = "mm"
+    scale = 0.01                       # length = stored value x scale, in `unit`; 0 = no depth here
+    method = "given"
+
+    [poses]                            # absent: the camera rests at the origin
+    direction = "world_to_camera"      # or "camera_to_world"
+    axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
+    matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers a frame
+
+Comes in: the file; goes out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder
+`images/` holds one picture a frame, `images_right/` the right pictures of a stereo pair.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+
+from endotsr.config import Section, checked, read_toml, refuse_unknown_keys
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Lens, Pose, checked_lens
+
+FILE_NAME = "sequence.toml"
+FORMAT = "endotsr-sequence-1"
+IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
+ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
+OPENGL = np.diag([1.0, -1.0, -1.0])  # OpenGL axes to OpenCV axes, and back
+Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0)]
+PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
+
+
+class CameraEntry(Section, frozen=True, kw_only=True):
+    """Intrinsics of all frames."""
+
+    width: PositiveCount
+    height: PositiveCount
+    fx: Positive
+    fy: Positive
+    cx: float
+    cy: float
+    distortion: list[float] = msgspec.field(default_factory=list)
+    baseline: NonNegative = 0.0
+
+    def lens(self, where: object) -> Lens:
+        """The lens, checked. Raises InputError."""
+        lens = Lens(self.fx, self.fy, self.cx, self.cy, self.width, self.height, tuple(self.distortion))
+        return checked_lens(lens, where)
+
+
+class MaskEntry(Section, frozen=True, kw_only=True):
+    """The mask pictures."""
+
+    folder: str = MASKS
+    excluded_value: Literal["white", "black"] = "white"
+    proposed: bool = False
+
+
+class DepthEntry(Section, frozen=True, kw_only=True):
+    """The depth files."""
+
+    folder: str = DEPTH
+    unit: Unit = "mm"
+    scale: Positive = 1.0
+    method: str = "given"
+
+
+class PoseEntry(Section, frozen=True, kw_only=True):
+    """One pose a frame."""
+
+    direction: Literal["world_to_camera", "camera_to_world"] = "world_to_camera"
+    axes: Literal["opencv", "opengl"] = "opencv"
+    matrices: list[list[float]]
+
+
+class SequenceFile(Section, frozen=True, kw_only=True):
+    """All of `sequence.toml`."""
+
+    format: str
+    frames: PositiveCount
+    camera: CameraEntry
+    source: str = ""
+    unit: Unit = "mm"
+    frame_rate: NonNegative = 0.0
+    masks: MaskEntry | None = None
+    depth: DepthEntry | None = None
+    poses: PoseEntry | None = None
+
+    @property
+    def arbitrary(self) -> bool:
+        """Whether the unit of the lengths is unknown."""
+        return self.unit == ARBITRARY
+
+    def to_scene(self, unit: str) -> float:
+        """The factor from lengths in `unit` to scene units: millimetres, or the arbitrary unit itself."""
+        return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
+
+
+def read_sequence_file(folder: Path) -> SequenceFile:
+    """The checked contents of `sequence.toml` in a folder.
+
+    Raises:  InputError naming the file, the key and what is allowed.
+    """
+    path = Path(folder) / FILE_NAME
+    data = read_toml(path)
+    if data.get("format") != FORMAT:
+        raise InputError(f"{path}: format = {data.get('format')!r} is not allowed; allowed: {FORMAT!r}")
+    for key, needed in (("frames", data), ("camera", data)):
+        if key not in needed:
+            raise InputError(f"{path}: {key} is missing")
+    refuse_unknown_keys(data, SequenceFile, str(path))
+    for key, kind in (("camera", CameraEntry), ("masks", MaskEntry), ("depth", DepthEntry), ("poses", PoseEntry)):
+        if isinstance(data.get(key), dict):
+            _check_section(data[key], kind, path, key)
+    found = checked(data, SequenceFile, str(path))
+    if found.depth and (found.depth.unit == ARBITRARY) != found.arbitrary:
+        raise InputError(
+            f"{path}: depth.unit = {found.depth.unit!r} with unit = {found.unit!r} is not allowed; allowed: both"
+            " arbitrary (then of one scale), or neither"
+        )
+    for key, entry in (("masks", found.masks), ("depth", found.depth)):
+        if entry and not _plain_name(entry.folder):
+            raise InputError(
+                f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder beside the file"
+            )
+    found.camera.lens(path)
+    return found
+
+
+def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:
+    """A missing key of a section, and a list of numbers with something else in it, named by their full path."""
+    refuse_unknown_keys(data, kind, str(path), f"{key}.")
+    for field in msgspec.structs.fields(kind):
+        if field.required and field.name not in data:
+            raise InputError(f"{path}: {key}.{field.name} is missing")
+    try:
+        msgspec.convert(data.get("matrices", []), list[list[float]], strict=True)
+        msgspec.convert(data.get("distortion", []), list[float], strict=True)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {key}: a list of numbers is expected: {error}") from None
+    checked(data, kind, str(path), f"{key}.")
+
+
+def _plain_name(folder: str) -> bool:
+    return bool(folder) and Path(folder).name == folder and folder not in (".", "..")
+
+
+def read_poses(found: SequenceFile, path: Path) -> list[Pose] | None:
+    """World-to-camera poses in OpenCV axes, translation in scene units; None if the camera rests.
+
+    Raises:  InputError naming the frame.
+    """
+    if found.poses is None:
+        return None
+    entry = found.poses
+    if len(entry.matrices) != found.frames:
+        raise InputError(f"{path}: poses.matrices: {len(entry.matrices)} rows for {found.frames} frames")
+    scale = found.to_scene(found.unit)
+    return [_pose(row, entry, scale, f"{path}: poses.matrices: frame {i}") for i, row in enumerate(entry.matrices)]
+
+
+def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> Pose:
+    if len(row) != 12:
+        raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")
+    matrix = np.array(row, np.float64).reshape(3, 4)
+    if entry.axes == "opengl":
+        matrix = OPENGL @ matrix if entry.direction == "world_to_camera" else matrix @ np.diag([1.0, -1.0, -1.0, 1.0])
+    rotation = checked_rotation(matrix[:, :3], where)
+    translation = matrix[:, 3] * scale
+    if not np.isfinite(translation).all():
+        raise InputError(f"{where}: the translation is not finite")
+    if entry.direction == "camera_to_world":
+        return inverse_pose(rotation, translation)
+    return Pose(rotation, translation)
+
+
+def inverse_pose(rotation: FloatArray, translation: FloatArray) -> Pose:
+    """World-to-camera from camera-to-world, and back."""
+    turned = np.ascontiguousarray(rotation.T)
+    return Pose(turned, -turned @ translation + 0.0)
+
+
+def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
+    """A rotation. Raises InputError for anything else."""
+    if not np.isfinite(matrix).all():
+        raise InputError(f"{where}: the rotation is not finite")
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROTATION_TOLERANCE:
+        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors")
+    if np.linalg.det(matrix) < 0:
+        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation")
+    return np.ascontiguousarray(matrix)
+
+
+def write_sequence_file(found: SequenceFile, folder: Path) -> None:
+    """Write `sequence.toml`. `read_sequence_file` returns an equal value."""
+    (Path(folder) / FILE_NAME).write_text(sequence_text(found), encoding="utf-8")
+
+
+def sequence_text(found: SequenceFile) -> str:
+    """The TOML text."""
+    lines, sections = [], []
+    for key, value in msgspec.to_builtins(found).items():
+        if isinstance(value, dict):
+            sections += ["", f"[{key}]", *(f"{name} = {_toml(entry)}" for name, entry in value.items())]
+        elif value is not None:
+            lines.append(f"{key} = {_toml(value)}")
+    return "\n".join(lines + sections) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n" + "".join(f"    {_toml(row)},\n" for row in value) + "]"
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml(entry) for entry in value) + "]"
+    return repr(value)

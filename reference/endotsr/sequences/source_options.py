@@ -1,0 +1,28 @@
+"""What a person may state about a source that its files do not say. Used by `endotsr prepare`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """Statements about a source; the defaults state nothing."""
+
+    layout: str = "auto"
+    stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
+    camera: tuple[float, ...] | None = None  # fx fy cx cy, pixel edges at integers
+    distortion: tuple[float, ...] = ()
+    calibration: Path | None = None  # an ini file with StereoLeft and StereoRight
+    baseline: float | None = None  # of a rectified pair, in `unit`
+    trajectory: Path | None = None  # TUM: time or frame, position, quaternion x y z w
+    direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
+    axes: Literal["opencv", "opengl"] = "opencv"
+    trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None  # None: as the layout says
+    masks: Path | None = None
+    excluded_value: Literal["white", "black"] = "white"
+    depth: Path | None = None
+    depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
+    depth_scale: float = 1.0
+    rate: float | None = None  # frames a second of the source
+    points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction

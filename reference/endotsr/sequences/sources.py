@@ -1,0 +1,221 @@
+"""Parts that several layouts use: picture files and videos as frames, masks and depth beside them, stated cameras.
+
+Comes in: paths and the statements of `SourceOptions`; goes out: functions of a `Recording`.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.sequences.files import check_pairing, frame_numbers, list_pictures
+from endotsr.sequences.recording import (
+    ARBITRARY,
+    MILLIMETRES,
+    Lens,
+    Pair,
+    Picture,
+    Rig,
+    checked_lens,
+    colour_picture,
+    grey_plane,
+)
+from endotsr.sequences.source_options import SourceOptions
+
+MOST_SOFT = 0.05  # of a mask: more pixels between black and white are no mask
+
+
+def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
+    """The file itself, or the files of a folder in time order. Raises InputError."""
+    if path.is_file():
+        if path.suffix.lower() not in endings:
+            raise InputError(f"{path}: allowed: a file that ends in {', '.join(endings)}, or a folder of such files")
+        return [path]
+    return list_pictures(path, endings)
+
+
+def split_pair(picture: Picture, stereo: str, where: object) -> Pair:
+    """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
+
+    Raises:  InputError for a picture that has no two equal halves.
+    """
+    height, width = picture.shape[:2]
+    if stereo == "none":
+        return Pair(picture)
+    if (width if stereo == "side_by_side" else height) % 2:
+        side = "width" if stereo == "side_by_side" else "height"
+        raise InputError(f"{where}: {width}x{height} pixels: a {stereo} pair has an even {side}")
+    if stereo == "side_by_side":
+        return Pair(picture[:, : width // 2], picture[:, width // 2 :])
+    return Pair(picture[: height // 2], picture[height // 2 :])
+
+
+def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
+    """The size of one picture of a stored pair."""
+    return (width // 2 if stereo == "side_by_side" else width), (height // 2 if stereo == "stacked" else height)
+
+
+def pictures_from_files(
+    left: list[Path], right: list[Path], stereo: str = "none"
+) -> Callable[[list[int]], Iterator[Pair]]:
+    """Frames from picture files: two lists, or one whose pictures hold both."""
+
+    def pictures(wanted: list[int]) -> Iterator[Pair]:
+        for i in wanted:
+            picture = colour_picture(read_picture(left[i]), left[i])
+            if right:
+                yield Pair(picture, colour_picture(read_picture(right[i]), right[i]))
+            else:
+                yield split_pair(picture, stereo, left[i])
+
+    return pictures
+
+
+def mask_reader(
+    files: list[Path | None], excluded_value: str, width: int, height: int
+) -> Callable[[int], NDArray[np.bool_] | None]:
+    """Tissue masks from files, one a frame; None where a frame has none.
+
+    A mask of another size is resized to the nearest pixel if its proportions are those of the picture. Zero is black,
+    and any other value white. The polarity says which of the two is excluded.
+
+    Raises:  InputError for a picture of other proportions, or one that is no mask.
+    """
+
+    def mask(i: int) -> NDArray[np.bool_] | None:
+        path = files[i]
+        if path is None:
+            return None
+        plane = grey_plane(read_picture(path), path)
+        values = np.unique(plane)
+        if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT:
+            raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
+        tissue = plane == 0 if excluded_value == "white" else plane > 0
+        return resized_mask(tissue, width, height, path)
+
+    return mask
+
+
+def resized_mask(mask: NDArray[np.bool_], width: int, height: int, where: object) -> NDArray[np.bool_]:
+    """The mask at another size, nearest pixel. Raises InputError for other proportions."""
+    rows, columns = mask.shape
+    if (rows, columns) == (height, width):
+        return mask
+    if abs(columns * height - rows * width) > max(columns, width):
+        raise InputError(f"{where}: {columns}x{rows} pixels, the pictures have {width}x{height}: other proportions")
+    row = ((np.arange(height) + 0.5) * rows / height).astype(np.intp)
+    column = ((np.arange(width) + 0.5) * columns / width).astype(np.intp)
+    return mask[row][:, column]
+
+
+def beside(frames: list[Path], files: list[Path]) -> list[Path | None]:
+    """For every frame the file with its number, or None; without numbers, files and frames pair in order.
+
+    Raises:  InputError if nothing pairs.
+    """
+    if len(files) == 1:
+        return [files[0]] * len(frames)  # one mask for all, such as a round field of view
+    here, there = frame_numbers(frames), frame_numbers(files)
+    if here is None or there is None or len(here[0]) != len(there[0]):
+        check_pairing(frames, files)
+        return list(files)
+    by_number = dict(zip(there, files))
+    found = [by_number.get(number) for number in here]
+    if not any(found):
+        raise InputError(
+            f"{files[0].parent}: no file has the number of a frame, such as {files[0].name} for {frames[0].name}"
+        )
+    return found
+
+
+def numbered(files: list[Path], count: int) -> list[Path | None]:
+    """For frames 0 .. count - 1 of a video the file with that number, or None. Raises InputError if none has one."""
+    numbers = frame_numbers(files)
+    if len(files) == 1:
+        return [files[0]] * count
+    if numbers is None or len(numbers[0]) != 1:
+        raise InputError(f"{files[0].parent}: names without one frame number, such as {files[0].name}")
+    by_number = {number[0]: file for number, file in zip(numbers, files)}
+    found = [by_number.get(i) for i in range(count)]
+    if not any(found):
+        raise InputError(f"{files[0].parent}: no file has a number from 0 to {count - 1}, such as {files[0].name}")
+    return found
+
+
+def depth_reader(files: list[Path | None], scale: float) -> Callable[[int], NDArray[np.float32] | None]:
+    """Depth from files, one a frame, in millimetres or the arbitrary unit; None where a frame has none."""
+
+    def depth(i: int) -> NDArray[np.float32] | None:
+        path = files[i]
+        return None if path is None else depth_plane(read_plane(path), scale, path)
+
+    return depth
+
+
+def stated_masks(
+    options: SourceOptions, frames: list[Path] | int, width: int, height: int
+) -> Callable[[int], NDArray[np.bool_] | None] | None:
+    """The masks of `--masks`, paired with frame files or with the numbers of a video; None without them."""
+    if options.masks is None:
+        return None
+    files = files_of(options.masks, PICTURE_ENDINGS)
+    paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
+    return mask_reader(paired, options.excluded_value, width, height)
+
+
+def stated_depth(
+    options: SourceOptions, frames: list[Path] | int
+) -> Callable[[int], NDArray[np.float32] | None] | None:
+    """The depth of `--depth`, as `stated_masks`."""
+    if options.depth is None:
+        return None
+    files = files_of(options.depth, DEPTH_ENDINGS)
+    paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
+    factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
+    return depth_reader(paired, options.depth_scale * factor)
+
+
+def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> tuple[Lens | None, Rig | None]:
+    """The lens of `--camera`, or the rig of `--calibration`, for pictures of this size; both None without them.
+
+    Raises:  InputError for a calibration of another size (proportional sizes are scaled).
+    """
+    from endotsr.sequences.calibration import read_rig
+
+    if options.calibration is not None:
+        rig = read_rig(options.calibration)
+        return None, Rig(
+            fitted_lens(rig.left, width, height, options.calibration),
+            fitted_lens(rig.right, width, height, options.calibration),
+            rig.rotation,
+            rig.translation,
+        )
+    if options.camera is None:
+        return None, None
+    fx, fy, cx, cy = options.camera
+    return checked_lens(Lens(fx, fy, cx, cy, width, height, options.distortion), where), None
+
+
+def fitted_lens(lens: Lens, width: int, height: int, where: object) -> Lens:
+    """The lens for pictures of this size. Raises InputError if they have other proportions than the calibration."""
+    if abs(lens.width * height - lens.height * width) > max(lens.width, width) // 100:
+        raise InputError(
+            f"{where}: the calibration is of {lens.width}x{lens.height} pixels, the pictures have {width}x{height}"
+        )
+    return lens.scaled(width, height)
+
+
+def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:
+    """`mm` or `arbitrary`, from what is stated of trajectory and depth. Raises InputError if only one is arbitrary."""
+    stated = []
+    if options.trajectory is not None:
+        stated.append(options.trajectory_unit or otherwise)
+    if options.depth is not None:
+        stated.append(options.depth_unit)
+    if len({unit == ARBITRARY for unit in stated}) > 1:
+        raise InputError("one of --trajectory-unit and --depth-unit is arbitrary: allowed: both or neither")
+    return ARBITRARY if ARBITRARY in stated else "mm"

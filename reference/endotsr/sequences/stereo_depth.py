@@ -1,0 +1,120 @@
+"""Depth of a rectified stereo pair: semi-global matching, left-right check, smoothing, metric scale.
+
+    z = f B / d          f, B: focal length (px) and baseline; d: disparity (px)
+
+Comes in: left and right pictures, the lens and the baseline; goes out: depth (H, W) with holes left as holes (0), and a
+confidence. A pixel has depth where left and right agree, the match is confident and the depth is within range.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Section
+from endotsr.errors import InputError
+from endotsr.opencv.stereo import match_pair
+from endotsr.sequences.recording import Lens, Picture
+
+MULTIPLE = 16  # OpenCV searches multiples of this many disparities
+MOST = 512  # searched disparities; more would be a wrong calibration
+SUBPIXEL = 0.5  # px of disparity: between two frames, matching noise is below this
+
+
+class StereoSettings(Section, frozen=True, kw_only=True):
+    """How depth is made from stereo pairs."""
+
+    nearest: float = 20.0
+    """nearest depth that is searched, in the unit of the sequence"""
+    farthest: float = 300.0
+    """farthest depth that is searched"""
+    block: Literal[3, 5, 7, 9, 11] = 5
+    """side of the matched blocks, px"""
+    smooth: bool = True
+    """edge-preserving smoothing by weighted least squares"""
+    agreement: float = 1.0
+    """largest difference between the disparities of left and right, px"""
+    confidence: float = 0.5
+    """least confidence of the smoothing, 0 to 1"""
+    temporal: bool = False
+    """median over three frames along the optical flow"""
+
+
+class StereoDepth(NamedTuple):
+    """Depth of one frame."""
+
+    depth: NDArray[np.float32]  # (H, W) 0 = none
+    confidence: NDArray[np.float32]  # (H, W) in [0, 1]; 0 where there is no depth
+
+
+def disparity_range(settings: StereoSettings, lens: Lens, baseline: float) -> tuple[int, int]:
+    """Lowest disparity and number of disparities, a multiple of 16, for the depths that are searched.
+
+    Raises:  InputError for depths that are not ascending, or a range that no picture holds.
+    """
+    if not 0 < settings.nearest < settings.farthest < np.inf:
+        raise InputError(
+            f"nearest {settings.nearest:g}, farthest {settings.farthest:g}: allowed: two ascending numbers > 0"
+        )
+    lowest = int(np.floor(lens.fx * baseline / settings.farthest))
+    highest = int(np.ceil(lens.fx * baseline / settings.nearest))
+    count = -(-(highest - lowest + 1) // MULTIPLE) * MULTIPLE
+    if count > min(MOST, lens.width):
+        raise InputError(
+            f"depths from {settings.nearest:g} to {settings.farthest:g} at baseline {baseline:g} are disparities from"
+            f" {lowest} to {highest} px in pictures {lens.width} px wide; allowed: a larger --nearest, or the right"
+            " baseline and unit"
+        )
+    return lowest, count
+
+
+def stereo_depth(left: Picture, right: Picture, lens: Lens, baseline: float, settings: StereoSettings) -> StereoDepth:
+    """Depth of the left picture.
+
+    lens       of both rectified pictures
+    baseline   in the unit in which the depth is wanted
+
+    Edges:   pixels whose match would lie outside of the right picture have no depth.
+    """
+    lowest, count = disparity_range(settings, lens, baseline)
+    # OpenCV leaves a strip as wide as the search at the left of the left picture, and at the right of the right one.
+    padding = lowest + count
+    pad = ((0, 0), (padding, padding), (0, 0))
+    match = match_pair(
+        np.pad(left, pad, "edge"), np.pad(right, pad, "edge"), lowest, count, settings.block, settings.smooth
+    )
+    disparity, confidence, apart = (
+        plane[:, padding:-padding] for plane in (match.disparity, match.confidence, match.disagreement)
+    )
+    column = np.arange(lens.width)[None, :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        depth = lens.fx * baseline / disparity
+        good = (apart <= settings.agreement) & (confidence >= settings.confidence) & (disparity > 0)
+        good &= (depth >= settings.nearest) & (depth <= settings.farthest) & (column - disparity >= 0)
+    return StereoDepth(np.where(good, depth, 0).astype(np.float32), np.where(good, confidence, 0).astype(np.float32))
+
+
+def temporal_median(depths: list[NDArray[np.float32]], pictures: list[Picture], middle: int) -> NDArray[np.float32]:
+    """The median of the depths of neighbouring frames, each moved along the optical flow to frame `middle`.
+
+    depths    (H, W) each, 0 = none
+    pictures  the left pictures of the same frames
+    returns   (H, W): where the frame itself has depth; 0 elsewhere, holes are not filled
+
+    A neighbour counts at a pixel whose four bilinear neighbours all have depth there.
+    """
+    from endotsr.opencv import dense_flow, warp_bilinear
+
+    found = [np.where(depths[middle] > 0, depths[middle], np.nan)]
+    for k, (depth, picture) in enumerate(zip(depths, pictures)):
+        if k != middle:
+            flow = dense_flow(
+                np.ascontiguousarray(pictures[middle].transpose(2, 0, 1)),
+                np.ascontiguousarray(picture.transpose(2, 0, 1)),
+            )
+            whole = warp_bilinear((depth > 0).astype(np.float32), flow) > 0.999
+            found.append(np.where(whole, warp_bilinear(depth, flow), np.nan))
+    known = np.isfinite(found[0])
+    result = np.zeros(depths[middle].shape, np.float32)
+    result[known] = np.nanmedian(np.stack(found)[:, known], axis=0)
+    return result

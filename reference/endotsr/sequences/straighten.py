@@ -1,0 +1,116 @@
+"""From the pictures of a recording to those of one pinhole camera: straightened or rectified, then resized.
+
+Comes in: a `Recording` and a scale; goes out: a `Straightener`, which maps pictures, masks, depth and poses, and the
+lens that belongs to its pictures. Left and right each have the distortion of their own camera.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.opencv import area_resize
+from endotsr.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
+from endotsr.sequences.recording import Lens, Pair, Picture, Pose, Recording, lens_of_matrix, opencv_matrix
+
+SKEWED = 0.5  # of the baseline: a pair whose cameras stand higher than wide apart by more is not side by side
+
+
+@dataclass(frozen=True)
+class Straightener:
+    """The maps of a recording, and the size of the new pictures."""
+
+    lens: Lens  # of the new pictures, without distortion
+    left: Maps | None  # None: as stored
+    right: Maps | None
+    turn: FloatArray  # (3, 3) x_new = turn @ x_old, camera axes of the left picture
+    baseline: float | None
+    notes: list[str]
+
+    def pictures(self, pair: Pair) -> Pair:
+        """Both pictures in the new camera."""
+        left = self._picture(pair.left, self.left)
+        return Pair(left, None if pair.right is None else self._picture(pair.right, self.right))
+
+    def _picture(self, picture: Picture, maps: Maps | None) -> Picture:
+        return area_resize(remapped(picture, maps) if maps else picture, self.lens.width, self.lens.height)
+
+    def mask(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Tissue where all covered pixels of the old mask are."""
+        if self.left:
+            mask = remapped(mask.astype(np.uint8), self.left, nearest=True) > 0
+        return area_resize((~mask).astype(np.float32), self.lens.width, self.lens.height) == 0
+
+    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Mean of the depths that a new pixel covers; 0 where it covers none."""
+        if self.left:
+            depth = remapped(depth, self.left, nearest=True)
+        fraction = area_resize((depth > 0).astype(np.float32), self.lens.width, self.lens.height)
+        found = np.zeros(fraction.shape, np.float32)
+        return np.divide(area_resize(depth, self.lens.width, self.lens.height), fraction, out=found, where=fraction > 0)
+
+    def pose(self, pose: Pose) -> Pose:
+        """World-to-camera of the new left camera."""
+        if (self.turn == np.eye(3)).all():
+            return pose
+        return Pose(self.turn @ pose.rotation, self.turn @ pose.translation)
+
+
+def straightener(recording: Recording, width: int, height: int, scale: float) -> Straightener:
+    """The maps of a recording whose pictures have this size.
+
+    Raises:  InputError without intrinsics, for a scale outside (0, 1], and for cameras that do not stand side by side.
+    """
+    if not 0 < scale <= 1:
+        raise InputError(f"scale {scale:g}: pictures are only reduced; allowed: values in (0, 1]")
+    new_size = round(width * scale), round(height * scale)
+    if min(new_size) < 1:
+        raise InputError(f"scale {scale:g} makes {new_size[0]}x{new_size[1]} pixels of {width}x{height}")
+    if recording.rig is not None:
+        return _rectified(recording, new_size)
+    lens = recording.lens
+    if lens is None:
+        raise InputError(
+            f"{recording.where}: the intrinsics are unknown; allowed: --camera FX FY CX CY in pixels, or"
+            " --calibration FILE"
+        )
+    if (lens.width, lens.height) != (width, height):
+        raise InputError(
+            f"{recording.where}: the intrinsics are of {lens.width}x{lens.height} pixels, the pictures have"
+            f" {width}x{height}"
+        )
+    if not any(lens.distortion):
+        plain = lens._replace(distortion=())
+        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), recording.baseline, [])
+    maps = undistortion_maps(opencv_matrix(lens), np.array(lens.distortion), width, height)
+    new = lens_of_matrix(maps.matrix, width, height, where=recording.where)
+    note = f"straightened: distortion {', '.join(f'{k:g}' for k in lens.distortion)}"
+    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), recording.baseline, [note])
+
+
+def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:
+    rig = recording.rig
+    assert rig is not None
+    across, down = abs(rig.translation[0]), abs(rig.translation[1])
+    if down > SKEWED * across:
+        raise InputError(
+            f"{recording.where}: the cameras stand {across:g} beside and {down:g} above each other;"
+            " allowed: side by side"
+        )
+    if recording.depth is not None:
+        raise InputError(f"{recording.where}: depth of pictures that are not rectified; allowed: without --depth")
+    distortions = np.array(rig.left.distortion or (0.0,) * 4), np.array(rig.right.distortion or (0.0,) * 4)
+    matrices = opencv_matrix(rig.left), opencv_matrix(rig.right)
+    width, height = rig.left.width, rig.left.height
+    maps = rectification_maps(matrices, distortions, rig.rotation, rig.translation, width, height)
+    if maps.baseline <= 0:
+        raise InputError(
+            f"{recording.where}: by the calibration the right camera stands on the left; are the pictures, or the"
+            " sections of the calibration, swapped?"
+        )
+    lens = lens_of_matrix(maps.left.matrix, width, height, where=recording.where).scaled(*new_size)
+    angle = np.degrees(np.arccos(np.clip((np.trace(maps.left.rotation) - 1) / 2, -1, 1)))
+    note = f"rectified: baseline {maps.baseline:.6g} mm, left camera turned by {angle:.3g} degrees"
+    return Straightener(lens, maps.left, maps.right, maps.left.rotation, maps.baseline, [note])

@@ -1,0 +1,157 @@
+"""Trajectories in the TUM form: one line a pose, `stamp tx ty tz qx qy qz qw`; lines that begin with # are comments.
+
+The stamp is a time in seconds or the number of a frame. Comes in: the file, and what the numbers mean; goes out: one
+world-to-camera pose a frame in millimetres (or the arbitrary unit), None where the trajectory says nothing.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Pose
+from endotsr.sequences.sequence_file import OPENGL, inverse_pose
+
+NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
+
+
+class Trajectory(NamedTuple):
+    """Poses by stamp, ascending."""
+
+    stamps: NDArray[np.float64]  # (n,)
+    poses: list[Pose]  # world-to-camera, OpenCV axes
+    path: Path
+
+    @property
+    def counts_frames(self) -> bool:
+        """Whether every stamp is a whole number from 0 on, as frame numbers are."""
+        return bool((self.stamps == np.rint(self.stamps)).all() and self.stamps[0] >= 0)
+
+
+def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", axes: str = "opencv") -> Trajectory:
+    """The poses of a file.
+
+    unit        of the positions: um, mm, cm, m or arbitrary
+    direction   camera_to_world (the position is the camera's) or world_to_camera
+    axes        of the camera: opencv (x right, y down, z forward) or opengl (x right, y up, z backward)
+
+    Raises:  InputError naming the line and the reason.
+    """
+    rows, lines = _rows(Path(path))
+    order = np.argsort(rows[:, 0], kind="stable")
+    rows = rows[order]
+    repeated = np.flatnonzero(np.diff(rows[:, 0]) == 0)
+    if repeated.size:
+        first = lines[order[repeated[0] + 1]]
+        raise InputError(f"{path}: line {first}: the stamp {rows[repeated[0], 0]:.12g} occurs twice")
+    scale = 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
+    poses = [_pose(row, scale, direction, axes) for row in rows]
+    return Trajectory(rows[:, 0].astype(np.float64), poses, Path(path))
+
+
+def _rows(path: Path) -> tuple[FloatArray, list[int]]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    rows, lines = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.replace(",", " ").split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) != 8 or not np.isfinite(row).all():
+            raise InputError(f"{path}: line {number}: allowed: 8 finite numbers, stamp tx ty tz qx qy qz qw")
+        if abs(np.linalg.norm(row[4:]) - 1) > NORM_TOLERANCE:
+            raise InputError(
+                f"{path}: line {number}: the quaternion has length {np.linalg.norm(row[4:]):.4g}; allowed: 1,"
+                " in the order x y z w"
+            )
+        rows.append(row)
+        lines.append(number)
+    if not rows:
+        raise InputError(f"{path}: holds no pose; allowed: lines of 8 numbers, stamp tx ty tz qx qy qz qw")
+    return np.array(rows), lines
+
+
+def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> Pose:
+    from scipy.spatial.transform import Rotation
+
+    rotation, translation = Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale
+    if direction == "camera_to_world":
+        rotation, translation = inverse_pose(rotation, translation)
+    return Pose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else Pose(rotation, translation)
+
+
+def poses_of_frames(trajectory: Trajectory, count: int, rate: float | None) -> tuple[list[Pose | None], str]:
+    """One pose a frame, None where there is none, and a sentence on how stamps became frames.
+
+    Whole stamps below the number of frames are frame numbers. As many poses as frames belong to them in order. Other
+    stamps are seconds from the first one, and a frame without a pose of its own lies between two.
+
+    Raises:  InputError if the stamps are times and the frame rate is unknown.
+    """
+    stamps = trajectory.stamps
+    if trajectory.counts_frames and stamps[-1] < count:
+        found: list[Pose | None] = [None] * count
+        for stamp, pose in zip(stamps, trajectory.poses):
+            found[int(stamp)] = pose
+        return found, "stamps are frame numbers"
+    if len(stamps) == count:
+        return list(trajectory.poses), "one pose a frame, in order"
+    if rate is None:
+        raise InputError(
+            f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose a frame, frame"
+            " numbers as stamps, or a known frame rate"
+        )
+    moments = stamps[0] + np.arange(count) / rate
+    return poses_at(trajectory, moments, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
+
+
+def poses_at(trajectory: Trajectory, moments: FloatArray, longest: float) -> list[Pose | None]:
+    """Poses at moments, between the two nearest of the trajectory; None outside, and in gaps longer than `longest`."""
+    stamps, found = trajectory.stamps, []
+    for moment in moments:
+        after = int(np.searchsorted(stamps, moment))
+        nearest = min((k for k in (after - 1, after) if 0 <= k < len(stamps)), key=lambda k: abs(stamps[k] - moment))
+        if abs(stamps[nearest] - moment) <= 1e-3 * longest:
+            found.append(trajectory.poses[nearest])
+        elif 0 < after < len(stamps) and stamps[after] - stamps[after - 1] <= 2 * longest:
+            fraction = (moment - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+            found.append(pose_between(trajectory.poses[after - 1], trajectory.poses[after], fraction))
+        else:
+            found.append(trajectory.poses[nearest] if abs(stamps[nearest] - moment) <= longest / 2 else None)
+    return found
+
+
+def pose_between(a: Pose, b: Pose, fraction: float) -> Pose:
+    """The pose at a fraction of the way: the centre on the straight line, the rotation on the shortest arc."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    centres = [-pose.rotation.T @ pose.translation for pose in (a, b)]
+    rotation = Slerp([0.0, 1.0], Rotation.from_matrix([a.rotation, b.rotation]))(fraction).as_matrix()
+    return Pose(rotation, -rotation @ (centres[0] + fraction * (centres[1] - centres[0])))
+
+
+def filled(poses: list[Pose | None]) -> list[Pose]:
+    """Gaps filled from the neighbours on both sides; before the first and after the last, the nearest pose."""
+    known = [i for i, pose in enumerate(poses) if pose is not None]
+    found = []
+    for i, pose in enumerate(poses):
+        if pose is None:
+            before = max((k for k in known if k < i), default=None)
+            after = min((k for k in known if k > i), default=None)
+            ends = [poses[k] for k in (before, after) if k is not None]
+            if before is not None and after is not None and ends[0] and ends[1]:
+                pose = pose_between(ends[0], ends[1], (i - before) / (after - before))
+            else:
+                pose = ends[0]
+        assert pose is not None
+        found.append(pose)
+    return found
