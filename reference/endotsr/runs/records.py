@@ -102,7 +102,7 @@ class SequenceRecord(_Part, kw_only=True):
 
 REPORTED = (
     *(f"input.{key}" for key in ("source", "frames", "width", "height", "training_frames", "held_out_frames")),
-    *("input.tissue_fraction", "input.notes", "input.arrays_sha256", "versions"),
+    *("input.tissue_fraction", "input.notes", "input.arrays_sha256", "versions", "seconds"),
     *(f"machine.{key}" for key in ("processor", "cores", "memory_bytes", "system")),
 )
 """Keys of run.json that a report needs."""
