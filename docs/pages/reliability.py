@@ -22,8 +22,13 @@ MAKERS = {
 
 def parts() -> dict[str, str]:
     """The generated parts of the page by name."""
-    found = {name: read_json(RESULTS / f"{name}.json", command) for name, command in MAKERS.items()}
-    return {"faults": faults(found["faults"]), "fuzz": fuzz(found["fuzz"]), "soak": soak(found["soak"])}
+    written = {"faults": faults, "fuzz": fuzz, "soak": soak}
+    return {
+        name: written[name](read_json(RESULTS / f"{name}.json", command))
+        if (RESULTS / f"{name}.json").exists()
+        else f"No result is stored yet; the command is `{command}`."
+        for name, command in MAKERS.items()
+    }
 
 
 def faults(result: dict[str, Any]) -> str:

@@ -26,6 +26,7 @@ from file_layer import disk_full, killed, operations, read_only  # noqa: E402
 from tiny import assert_same_run, train_words, written_folder  # noqa: E402
 
 from endotsr.cli.main import main as endotsr  # noqa: E402
+from endotsr.runs.machine import machine  # noqa: E402
 
 
 class Bench:
@@ -238,8 +239,10 @@ def folder_vanishes(bench: Bench) -> tuple[bool, str]:
     return code == 2 and told and bench.finish(out), "one line and exit code 2; a new training is bitwise equal"
 
 
-def campaign(bench: Bench, kills: int, failures: int) -> list[dict[str, Any]]:
-    """Every fault, as rows of the report."""
+def campaign(
+    bench: Bench, kills: int, failures: int, store: Callable[[list[dict[str, Any]]], object]
+) -> list[dict[str, Any]]:
+    """Every fault, as rows of the report, which `store` gets as they grow."""
     total = count_operations(bench)
     spread = sorted({max(1, round(k * total / failures)) for k in range(1, failures + 1)}) if failures else []
     trials: dict[str, list[Callable[[], tuple[bool, str]]]] = {
@@ -264,6 +267,7 @@ def campaign(bench: Bench, kills: int, failures: int) -> list[dict[str, Any]]:
         good = sum(passed for passed, _ in found)
         row = {"fault": name, "trials": len(found), "as_promised": good, "what": found[0][1] if found else ""}
         rows.append(row)
+        store(rows)
         print(f"{name}: {good} of {len(found)}", flush=True)
     return rows
 
@@ -278,13 +282,14 @@ def main() -> int:
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as scratch:
         bench = Bench(Path(scratch) / "watched", asked.seed)
-        rows = campaign(bench, asked.kills, asked.failures)
-    if asked.json:
-        from endotsr.runs.machine import machine
 
-        day, seconds = datetime.date.today().isoformat(), round(time.monotonic() - began)
-        about = {"date": day, "seed": asked.seed, "seconds": seconds, "machine": machine(), "faults": rows}
-        asked.json.write_text(json.dumps(about, indent=1) + "\n")
+        def store(rows: list[dict[str, Any]]) -> None:  # after every row, so that a stopped campaign is not lost
+            if asked.json:
+                day, seconds = datetime.date.today().isoformat(), round(time.monotonic() - began)
+                about = {"date": day, "seed": asked.seed, "seconds": seconds, "machine": machine(), "faults": rows}
+                asked.json.write_text(json.dumps(about, indent=1) + "\n")
+
+        rows = campaign(bench, asked.kills, asked.failures, store)
     return 0 if all(row["trials"] == row["as_promised"] for row in rows) else 1
 
 

@@ -205,3 +205,16 @@ def test_a_broken_line_of_the_log_is_cut_off(line, run, capfd):
 
     (run / "log.jsonl").write_text(line + "\n")
     assert main(["train", "--out", str(run), "--resume", "--no-evaluate"]) == 0
+
+
+def test_a_record_cannot_put_a_script_into_the_report(run):
+    from endotsr.cli.main import main
+
+    record = json.loads((run / "run.json").read_text())
+    script = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    record["input"]["notes"] = [script]
+    record["machine"]["processor"] = record["versions"]["numpy"] = record["command"][0] = script
+    (run / "run.json").write_text(json.dumps(record))
+    assert main(["evaluate", str(run)]) == 0
+    page = (run / "report.html").read_text()
+    assert "<script>alert" not in page and "<img src=x" not in page and "&lt;script&gt;alert" in page

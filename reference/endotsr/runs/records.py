@@ -62,7 +62,7 @@ class RunRecord(_Part, kw_only=True):
     command: list[Text] = []
     started: Text | None = None
     finished: Text | None = None
-    seconds: Seconds | None = None
+    seconds: Seconds = 0.0
     iterations_done: Count | None = None
     lambda_lap: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | None = None
     peak_memory_bytes: Count | None = None
@@ -74,7 +74,7 @@ class RunRecord(_Part, kw_only=True):
     resumed: list[dict[str, Any]] = []
 
 
-class CameraPart(_Part, kw_only=True):
+class CameraPart(_Part, kw_only=True, forbid_unknown_fields=True):
     """An entry of `cameras` of sequence.json; see `splatting.camera.Camera`."""
 
     rotation: tuple[Row, Row, Row]
@@ -102,7 +102,7 @@ class SequenceRecord(_Part, kw_only=True):
 
 REPORTED = (
     *(f"input.{key}" for key in ("source", "frames", "width", "height", "training_frames", "held_out_frames")),
-    *("input.tissue_fraction", "input.notes", "input.arrays_sha256", "versions"),
+    *("input.tissue_fraction", "input.notes", "input.arrays_sha256", "versions", "seconds"),
     *(f"machine.{key}" for key in ("processor", "cores", "memory_bytes", "system")),
 )
 """Keys of run.json that a report needs."""
