@@ -49,6 +49,8 @@ def test_another_size_keeps_pixels_square_and_the_view_inside(size):
     for corner in corners:
         column, row, _ = seen(camera, corner - CAMERA.translation)
         assert -1e-9 <= column <= size[0] + 1e-9 and -1e-9 <= row <= size[1] + 1e-9
+    left, right = (seen(camera, [(c - CAMERA.cx) / CAMERA.fx, 0, 1] - CAMERA.translation)[0] for c in (0, 64))
+    assert left + right == pytest.approx(size[0]), "in the middle"
     assert fitted(CAMERA, 64, 48) == CAMERA
 
 

@@ -19,7 +19,7 @@ from endotsr.simulator.simulate import simulate
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.views.page import check_page, page, write_page
 from endotsr.views.panels import normalised_depth
-from endotsr.views.trajectories import key_times, packed, trajectories
+from endotsr.views.trajectories import _signed, key_times, packed, trajectories
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 from made_up_model import CAMERA, moving_scene
@@ -47,8 +47,16 @@ def test_the_numbers_of_the_page_are_those_of_the_scene():
         turned = small[:4, k].astype(np.int8).astype(np.float32)
         a, b = (covariance_forward(q, moment.log_scale)[0].rotation for q in (turned, moment.quaternion))
         assert np.abs(a - b).max() < 0.03
-    signed = small[:4].astype(np.int8).astype(int)
-    assert ((signed[:, 1:] * signed[:, :-1]).sum(axis=0) >= 0).all(), "no sign jumps between keys"
+
+
+def test_no_sign_of_a_quaternion_jumps_between_keys():
+    scene = moving_scene()
+    steady = trajectories(scene, np.array([0.0, 0.01, 0.02]))
+    signed = steady.bytes[:4].astype(np.int8).astype(int)
+    assert ((signed[:, 1:] * signed[:, :-1]).sum(axis=0) >= 0).all()
+    rows = np.random.default_rng(0).normal(size=(4, 1, 9)).repeat(3, axis=1)
+    levels = _signed(rows * np.array([1, -1, 1])[:, None])
+    assert np.array_equal(levels[:, 1], levels[:, 0]) and np.array_equal(levels[:, 2], levels[:, 0])
 
 
 def test_gaussians_that_are_never_drawn_are_left_out():
