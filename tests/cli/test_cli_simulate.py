@@ -4,6 +4,7 @@ import pytest
 from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
+from endotsr.errors import InputError
 from endotsr.simulator.scenes import IN_FILES
 from endotsr.simulator.truth import read_truth
 
@@ -51,9 +52,13 @@ def test_bad_input_is_refused_and_nothing_is_left(tmp_path, capsys, words, named
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_fold_found_while_writing_leaves_nothing(tmp_path, capsys):
-    words = ["--effects", "pull", "--pull.amplitude", "5", "--pull.width", "1.2", "--out", str(tmp_path / "out")]
-    assert_refused(capsys, ["simulate", *words, *SMALL], "simulator: at t = ")
+def test_a_failure_while_writing_leaves_nothing(tmp_path, capsys, monkeypatch):
+    def fails(folder, i, frame):
+        if i == 2:
+            raise InputError("simulator: at t = 0.5 the sheet folds over itself")
+
+    monkeypatch.setattr("endotsr.simulator.folder.write_frame", fails)
+    assert_refused(capsys, ["simulate", "still", "--out", str(tmp_path / "out"), *SMALL], "simulator: at t = 0.5")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -132,4 +132,5 @@ def _refusal(settings: SimulatorSettings, section: str, key: str, fits: Fits) ->
         middle = 0.5 * (low + high)
         low, high = (middle, high) if fits(_changed(settings, section, key, middle)) else (low, middle)
     largest = np.floor(low * 100) / 100
-    return InputError(f"simulator: {section}.{key} = {value:g} leaves the field of view; allowed: at most {largest:g}")
+    found = f"simulator: {section}.{key} = {value:g} leaves the field of view, or folds the tissue"
+    return InputError(f"{found}; allowed: at most {largest:g}")
