@@ -14,7 +14,7 @@ ANSWERED = {
     "photometric": ("The light changes: gain, white balance, or in places", "Fourier colour (`model.appearance`)",
                     "appearance", "a change of one grey level or more"),
     "view change": ("A point is seen from several directions", "harmonics above degree 0 (`model.harmonics_degree`)",
-                    "harmonics", "views that differ by several degrees"),
+                    "harmonics", "views that differ by several degrees, or any motion"),
     "occluders": ("Masks exclude instruments", "mask propagation and total variation under the masks", "",
                   "any excluded pixel; a full mask is recognised and costs nothing"),
     "depth quality": ("Depth has holes, steps or flicker", "smoothness (`loss.smoothness_weight`)", "smoothness",
@@ -94,8 +94,8 @@ def training(result: dict[str, Any]) -> str:
     heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
     note = (
         f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
-        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of the "
-        f"training ({machine(result)})."
+        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
+        f"the training ({machine(result)})."
     )
     return f"{markdown(heads, rows)}\n\n{note}"
 
