@@ -27,7 +27,10 @@ def test_every_effect_has_its_row():
 
 
 def test_false_positives_are_at_most_five_percent():
-    for name, counts in effects.read()["detect"]["effects"].items():
+    measured = effects.read()
+    if "detect" not in measured:
+        pytest.skip("not measured yet: python docs/pages/effects.py detect 5")
+    for name, counts in measured["detect"]["effects"].items():
         assert counts["false"] <= 0.05 * counts["negatives"], name
 
 
