@@ -1,9 +1,9 @@
 """Measure what `endotsr inspect` finds and what `--effects auto` saves, and write the tables of docs/effects.md.
 
-    python docs/pages/effects.py detect [SEEDS]   simulated clips: detections, false positives, smallest amplitudes
-    python docs/pages/effects.py train [SEEDS]    held-out PSNR and time, `auto` against `everything`
-    python docs/pages/effects.py real FOLDER ...  verdicts on EndoNeRF folders and on `sinus_endoscopy`
-    python docs/pages/effects.py                  write the page from docs/results
+    python docs/pages/effects.py detect [SEEDS]              simulated clips: detections, false positives
+    python docs/pages/effects.py train [SEEDS [SCENE ...]]   held-out PSNR and time, `auto` against `everything`
+    python docs/pages/effects.py real FOLDER ...             verdicts on EndoNeRF folders and on `sinus_endoscopy`
+    python docs/pages/effects.py                             write the page from docs/results
 
 `endotsr bench effects --json docs/results/bench_effects.json` measures the time of the parts.
 """
@@ -47,8 +47,8 @@ def detect(seeds: int) -> dict[str, Any]:
     return run_study(seeds, FRAMES, print)
 
 
-def train(seeds: int) -> dict[str, Any]:
-    """Every scene with both settings: held-out tissue PSNR, processor time of the training, numbers of a Gaussian."""
+def train(seeds: int, names: list[str]) -> dict[str, Any]:
+    """Every named scene (none = all) with both settings: tissue PSNR, processor time, numbers of a Gaussian."""
     from endotsr.api import make_config
     from endotsr.api import train as fit
     from endotsr.effects.study import settings_of
@@ -60,8 +60,8 @@ def train(seeds: int) -> dict[str, Any]:
     fit(first, make_config("demo", iterations=20, training={"threads": 1}), on_message=print)  # loads the kernels
     scenes: dict[str, list[dict[str, Any]]] = {}
     for seed in range(seeds):
-        for name, effects in SCENES.items():
-            sequence = simulate(settings_of(effects, seed, TRAIN_FRAMES)).sequence
+        for name in names or SCENES:
+            sequence = simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
             scenes.setdefault(name, []).append(_pair(sequence, seed))
             print(name, seed, scenes[name][-1], flush=True)
     return {"seeds": seeds, "frames": TRAIN_FRAMES, "iterations": ITERATIONS, "scenes": scenes}
@@ -113,19 +113,26 @@ def _read_endonerf(folder: Path) -> Any:
 
 
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
-    """Every generated part of the page by name."""
+    """Every generated part of the page by name; a part without its measurement says so."""
+    makers = {
+        "costs": (effects_parts.costs, "bench"),
+        "detections": (effects_parts.detections, "detect"),
+        "amplitudes": (effects_parts.amplitudes, "detect"),
+        "training": (effects_parts.training, "train"),
+        "real": (effects_parts.real, "real"),
+    }
     return {
-        "costs": effects_parts.costs(found["bench"]),
-        "detections": effects_parts.detections(found["detect"]),
-        "amplitudes": effects_parts.amplitudes(found["detect"]),
-        "training": effects_parts.training(found["train"]),
-        "real": effects_parts.real(found["real"]),
+        name: make(found[file]) if file in found else f"Not measured yet: `python docs/pages/effects.py {file}`."
+        for name, (make, file) in makers.items()
     }
 
 
 def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
-    """The measurements by name. Raises: InputError if a file is missing or cannot be read."""
-    return {name: read_json(folder / file, f"docs/pages/effects.py {name}") for name, file in FILES.items()}
+    """The measurements that exist, by name. Raises: InputError if a file cannot be read, or if none exists."""
+    found = {name: folder / file for name, file in FILES.items() if (folder / file).exists()}
+    if not found:
+        raise InputError(f"{folder}: holds no measurement; made by docs/pages/effects.py")
+    return {name: read_json(path, f"docs/pages/effects.py {name}") for name, path in found.items()}
 
 
 def main(words: list[str], page: Path = PAGE) -> None:
@@ -136,8 +143,9 @@ def main(words: list[str], page: Path = PAGE) -> None:
     if what == "real":
         write_json(RESULTS / FILES[what], dated(real([Path(word) for word in rest])))
     elif what:
-        measure = {"detect": detect, "train": train}[what]
-        write_json(RESULTS / FILES[what], dated(measure(int(rest[0]) if rest else SEEDS)))
+        seeds = int(rest[0]) if rest else SEEDS
+        result = detect(seeds) if what == "detect" else train(seeds, rest[1:])
+        write_json(RESULTS / FILES[what], dated(result))
     else:
         try:
             write_marked(page, fragments(read()), "effects")

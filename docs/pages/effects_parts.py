@@ -14,7 +14,7 @@ ANSWERED = {
     "photometric": ("The light changes: gain, white balance, or in places", "Fourier colour (`model.appearance`)",
                     "appearance", "a change of one grey level or more"),
     "view change": ("A point is seen from several directions", "harmonics above degree 0 (`model.harmonics_degree`)",
-                    "harmonics", "views that differ by several degrees"),
+                    "harmonics", "views that differ by several degrees, or any motion"),
     "occluders": ("Masks exclude instruments", "mask propagation and total variation under the masks", "",
                   "any excluded pixel; a full mask is recognised and costs nothing"),
     "depth quality": ("Depth has holes, steps or flicker", "smoothness (`loss.smoothness_weight`)", "smoothness",

@@ -76,10 +76,11 @@ def test_a_plan_never_switches_on_and_never_enlarges():
     assert planned("noise", "exposure", config=small)[1].model.exposure
 
 
-def test_highlights_on_moving_tissue_keep_the_harmonics():
-    assert planned("noise", "breathing", "highlights")[1].model.harmonics_degree == 3
+def test_moving_tissue_keeps_the_harmonics():
+    assert planned("noise", "breathing")[1].model.harmonics_degree == 3
+    assert planned("noise", "breathing")[1].optimiser == PAPER.optimiser
     assert planned("noise", "highlights")[1].model.harmonics_degree == 0
-    assert planned("noise", "breathing")[1].model.harmonics_degree == 0
+    assert planned("noise", "camera_motion", amplitude=9.0)[1].model.harmonics_degree == 1
 
 
 def test_explicit_settings_win_and_both_are_said():

@@ -67,7 +67,7 @@ def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] =
         ("model.spectral_motion", _periodic(inspection, dictionary), _about_rates(inspection, dictionary), ("motion",)),
         ("model.appearance", light.present, light.reason, ("photometric",)),
         ("model.exposure", light.present, light.reason, ("photometric",)),
-        ("model.harmonics_degree", *_degree(inspection, config), ("view change", "highlights", "motion")),
+        ("model.harmonics_degree", *_degree(inspection, config), ("view change", "motion")),
     ]
     if not depth.details["usable"]:
         wanted.append(("loss.depth_weight", 0.0, depth.reason, ("depth quality",)))
@@ -101,13 +101,14 @@ def _colour_rate(plan: Plan, config: Config, explicit: frozenset[str], inspectio
 
 
 def _degree(inspection: Inspection, config: Config) -> tuple[int, str]:
-    """The degree that the views determine; all of them where highlights wander over moving tissue.
+    """The degree that the views determine while the tissue rests; all degrees where it moves.
 
-    There a point turns towards and away from the camera, and the direction from which it is seen follows its motion.
+    Tissue that moves is seen from other directions and turns to and from the lamp, and the harmonics follow that with
+    its motion: clips with motion fit worse without them.
     """
-    views, highlights = inspection.verdicts["view change"], inspection.verdicts["highlights"]
-    if highlights.present and highlights.kind == "moving" and inspection.verdicts["motion"].present:
-        return config.model.harmonics_degree, f"{highlights.reason[:-1]} and wander with its motion."
+    views, motion = inspection.verdicts["view change"], inspection.verdicts["motion"]
+    if motion.present:
+        return config.model.harmonics_degree, f"{motion.reason[:-1]}: its view directions and its shading move along."
     return views.details["degree"], views.reason
 
 
