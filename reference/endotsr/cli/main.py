@@ -18,6 +18,7 @@ COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
     "depth": "make the depth of a sequence from its stereo pairs, or take that of another program",
+    "check": "find everything that is wrong with a sequence, with remedies",
     "train": "train on a sequence folder, or on a simulated sequence",
     "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render colour, depth and opacity at any time in [0, 1]",
