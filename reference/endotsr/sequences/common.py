@@ -1,7 +1,7 @@
 """Reading the common format: `sequence.toml` beside `images/`, `masks/`, `depth/` and `images_right/`.
 
-Comes in: a folder and the `SequenceConfig`; goes out: a `Sequence`, or a `Recording` for `prepare`, `depth` and
-`masks`. The fields of `sequence.toml` are described in `sequence_file`. The file states the polarity of the masks and
+Comes in: a folder and the `SequenceConfig`; goes out: a `Sequence`, or a `Recording` for `prepare` and `depth`.
+The fields of `sequence.toml` are described in `sequence_file`. The file states the polarity of the masks and
 the units; `sequence.excluded_value` does not apply.
 """
 
@@ -17,6 +17,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_depth_scale, check_percentiles, clip_depth
+from endotsr.sequences.checks.cost import refuse_too_large
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import threshold_masks
@@ -101,7 +102,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     contents, _ = select_contents(folder, config)
     notes = [f"source: {contents.file.source}"] if contents.file.source else []
     if contents.file.masks and contents.file.masks.proposed and contents.masks:
-        notes.append("masks: proposals of `endotsr masks`, checked by nobody")
+        notes.append("masks: proposed by a program, checked by nobody")
     images, masks, depth = _read_frames(contents, config, notes)
     cameras, static = cameras_of(contents)
     excluded = contents.file.masks.excluded_value if contents.file.masks else "white"
@@ -151,6 +152,7 @@ def _read_frames(
     assert entry is not None
     scale = entry.scale * contents.file.to_scene(entry.unit)
     n, width, height = len(contents.images), contents.file.camera.width, contents.file.camera.height
+    refuse_too_large(n, width, height, contents.folder)
     images = np.empty((n, 3, height, width), np.uint8)
     depth = np.empty((n, height, width), np.float32)
     masks: list[NDArray] = [depth] * n

@@ -27,6 +27,7 @@ from endotsr.sequences.assemble import (
     check_percentiles,
     clip_depth,
 )
+from endotsr.sequences.checks.cost import refuse_too_large
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import threshold_masks
@@ -164,6 +165,7 @@ def _read_pictures(
     first = read_picture(files.images[0])
     height, width = first.shape[:2]
     n = len(files.images)
+    refuse_too_large(n, width, height, files.images[0].parents[1])
     images = np.empty((n, 3, height, width), np.uint8)
     depth = np.empty((n, height, width), np.float32)
     masks: list[NDArray] = [first] * n

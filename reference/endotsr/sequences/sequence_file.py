@@ -14,7 +14,7 @@
     [masks]                            # absent: every pixel is tissue
     folder = "masks"
     excluded_value = "white"           # or "black"
-    proposed = false                   # true: made by `endotsr masks`, not by a person
+    proposed = false                   # true: made by a program, not checked by a person
 
     [depth]                            # absent: `endotsr depth` makes it
     folder = "depth"

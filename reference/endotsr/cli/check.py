@@ -1,0 +1,57 @@
+"""`endotsr check`: everything that is wrong with a sequence, in one pass."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.options import base_settings
+from endotsr.cli.parts.parser import parse
+from endotsr.config import PAPER, Config
+from endotsr.errors import InputError
+
+
+@dataclass
+class CheckOptions:
+    """Check a sequence before a training: every finding with file, frame, reason and remedy.
+
+    Exit code 0: a training accepts the sequence; 1: it refuses it.
+    """
+
+    sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
+    """sequence folder, in the common format or in the layout of EndoNeRF"""
+    json: Annotated[Path | None, Option("FILE.json")] = None
+    """write the findings to this file"""
+    html: Annotated[Path | None, Option("FILE.html")] = None
+    """write a page with the findings and pictures to this file"""
+    settings: Annotated[Config, Option(flat=True)] = PAPER
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    base, _ = base_settings(words)
+    options = parse(CheckOptions, words, "check", CheckOptions(settings=base))
+    if not options.sequence:
+        raise InputError("check: SEQUENCE is missing: a sequence folder")
+    from endotsr.report.check_page import check_page
+    from endotsr.runs.files import refuse_unwritable, replace_file, write_json
+    from endotsr.sequences.checks.check import check_sequence
+
+    refuse_unwritable(options.json, options.html)
+    checked = check_sequence(Path(options.sequence), options.settings)
+    for finding in checked.findings:
+        print(f"{finding.level}: {finding.code}: {finding.line}")
+    cost = checked.facts.get("cost")
+    if cost:
+        print(
+            f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: a training needs"
+            f" about {cost['total_bytes'] / 1e9:.1f} GB and {cost['minutes']:.0f} minutes on two cores"
+        )
+    print(f"{options.sequence}: {'refused' if checked.refused else 'can be trained on'}")
+    if options.json is not None:
+        findings = [finding._asdict() for finding in checked.findings]
+        write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
+    if options.html is not None:
+        page = check_page(checked)
+        replace_file(options.html, lambda temporary: temporary.write_text(page, encoding="utf-8"))
+    return 1 if checked.refused else 0

@@ -1,0 +1,232 @@
+"""`endotsr check`: one pass over a sequence that collects every finding.
+
+Comes in: a folder in the common format or in the EndoNeRF layout, and the settings; goes out: `Checked`. Frames are
+read one at a time. What stops a single file from being read is a finding of that file, and the pass goes on.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import read_picture
+from endotsr.sequences.checks.cameras import camera_findings
+from endotsr.sequences.checks.cost import Cost, estimated_cost, memory_of_machine
+from endotsr.sequences.checks.depth import DepthFacts, depth_facts, depth_findings, inverted_finding
+from endotsr.sequences.checks.findings import Finding, worst_first
+from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings
+from endotsr.sequences.checks.parts import Parts, parts_of
+from endotsr.sequences.depth_files import depth_plane, read_plane
+from endotsr.sequences.files import check_pairing
+from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, threshold_masks
+from endotsr.sequences.recording import colour_picture, grey_plane
+from endotsr.sequences.sources import beside
+from endotsr.sequences.splits import parse_frame_range, split_frames
+
+T = TypeVar("T")
+SAMPLED = 16  # frames whose masks are checked against pictures and depth
+STEP = 4  # pixels between their sampled rows and columns
+
+
+class Checked(NamedTuple):
+    """The result of a check."""
+
+    source: str
+    findings: list[Finding]  # refusals first
+    facts: dict[str, Any]  # frames, width, height, and the cost
+    pictures: list[tuple[str, NDArray[np.uint8]]]  # caption and small picture (h, w, 3), for a report
+
+    @property
+    def refused(self) -> bool:
+        """Whether a training would refuse the sequence."""
+        return any(finding.level == "refusal" for finding in self.findings)
+
+
+class _Pass:
+    """Findings, and what is kept of the frames while they are read."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+        self.frames: list[FrameFacts] = []
+        self.depth: list[DepthFacts] = []
+        self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
+        self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
+
+    def tried(self, make: Callable[[], T], code: str, where: object, remedy: str, frame: int | None = None) -> T | None:
+        """The value, or None and a refusal."""
+        try:
+            return make()
+        except InputError as error:
+            why = "a training refuses it"
+            self.findings.append(Finding("refusal", code, str(where), frame, " ".join(str(error).split()), why, remedy))
+            return None
+
+
+def check_sequence(path: Path, config: Config) -> Checked:
+    """Every finding on the sequence at `path`.
+
+    Raises:  InputError only if there is nothing to check: no folder, or a layout that `endotsr prepare` converts.
+    """
+    run = _Pass()
+    parts = parts_of(Path(path), config.sequence, run.findings)
+    if not parts.images:
+        return Checked(str(path), worst_first(run.findings), {}, [])
+    _pairing(parts, run)
+    run.findings += gap_findings(parts.images)
+    size = _read_frames(parts, run)
+    facts: dict[str, Any] = {"frames": len(parts.images)}
+    if run.frames:
+        run.findings += frame_findings(run.frames, str(parts.images[0].parent))
+    if run.depth:
+        run.findings += depth_findings(run.depth, str(parts.depth[0].parent), parts.arbitrary, config.raster.near)
+    if run.samples:
+        _check_masks(parts, run, config)
+    usual = float(np.median([fact.median for fact in run.depth if fact.median] or [0.0]))
+    if size:
+        facts |= {"width": size[1], "height": size[0]}
+        cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file, "mend the poses")
+        if cameras:
+            run.findings += camera_findings(cameras, usual, str(parts.camera_file))
+        facts["cost"] = _cost(parts, size, config, run)._asdict()
+    _split(parts, config, run)
+    return Checked(str(path), worst_first(run.findings), facts, run.pictures)
+
+
+def _pairing(parts: Parts, run: _Pass) -> None:
+    for other in (parts.masks, parts.depth, parts.right):
+        if other:
+            where = other[0].parent
+            run.tried(
+                lambda other=other: check_pairing(parts.images, other), "pairing", where, "supply or delete the file"
+            )
+
+
+def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
+    """Read every frame once; the size (height, width) of the first picture that can be read."""
+    masks, depth = (_paired(parts.images, files) for files in (parts.masks, parts.depth))
+    sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
+    size = None
+    for i, file in enumerate(parts.images):
+        again = "copy or export the file again"
+        picture = run.tried(lambda file=file: colour_picture(read_picture(file), file), "picture", file, again, i)
+        if picture is None:
+            continue
+        size = size or picture.shape[:2]
+        if picture.shape[:2] != size:
+            run.findings.append(_other_size(file, i, picture.shape, size))
+            continue
+        run.frames.append(frame_facts(file.name, picture))
+        tissue = _mask(parts, run, masks[i], i, size)
+        found = _depth(parts, run, depth[i], i, size, tissue)
+        if i in sampled:
+            _sample(run, file, picture, tissue, found)
+            if i == 0 and parts.right and found is not None:
+                _against_stereo(parts, run, picture, found, depth[i])
+    return size
+
+
+def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
+    try:
+        return beside(images, files) if files else [None] * len(images)
+    except InputError:
+        return [None] * len(images)  # named by the check of the pairing
+
+
+def _other_size(file: Path, i: int, shape: tuple[int, ...], size: tuple[int, ...]) -> Finding:
+    what = f"{shape[1]}x{shape[0]} pixels, the first picture has {size[1]}x{size[0]}"
+    return Finding("refusal", "size", str(file), i, what, "all files of a sequence have one size", "export it again")
+
+
+def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    if file is None:
+        return None
+    plane = run.tried(lambda: grey_plane(read_picture(file), file), "mask", file, "export the mask again", i)
+    if plane is None or plane.shape != size:
+        if plane is not None:
+            run.findings.append(_other_size(file, i, plane.shape, size))
+        return None
+    white = run.tried(lambda: threshold_masks([plane], [str(file)], []), "mask-values", file, "store two values", i)
+    if white is None:
+        return None
+    return ~white[0] if parts.excluded_value == "white" else white[0]
+
+
+def _depth(
+    parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, ...], tissue: NDArray[np.bool_] | None
+) -> NDArray[np.float32] | None:
+    if file is None:
+        return None
+    stored = run.tried(lambda: read_plane(file), "depth-file", file, "export the depth again", i)
+    if stored is None:
+        return None
+    if stored.shape != size:
+        run.findings.append(_other_size(file, i, stored.shape, size))
+        return None
+    depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, "store lengths", i)
+    if depth is None:
+        return None
+    run.depth.append(depth_facts(file.name, depth, stored, tissue))
+    return depth
+
+
+def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, depth: NDArray | None) -> None:
+    small = np.ascontiguousarray(picture[::STEP, ::STEP])
+    if len(run.pictures) < 4:
+        run.pictures.append((file.name, small))
+    if tissue is not None and depth is not None:
+        run.samples.append((file.name, small, tissue[::STEP, ::STEP], depth[::STEP, ::STEP]))
+
+
+def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
+    """The depth of the first frame against the disparity of its stereo pair."""
+    from endotsr.opencv.stereo import match_pair
+
+    right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], "copy the file again", 0)
+    if right is not None and right.shape == picture.shape and picture.shape[1] > 128:
+        match = match_pair(picture, right, 0, 64, smooth=False)
+        disparity = np.where(match.disagreement <= 1, match.raw, np.nan)
+        run.findings += inverted_finding(depth, disparity, str(file), 0)
+
+
+def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
+    """Polarity and tissue fraction on sampled frames, by the rules of the training."""
+    names = [name for name, *_ in run.samples]
+    images = np.stack([small.transpose(2, 0, 1) for _, small, _, _ in run.samples])
+    masks, depth = (np.stack([sample[k] for sample in run.samples]) for k in (2, 3))
+    where, allow = str(parts.masks[0].parent), config.sequence.allow_tissue_fraction
+    excluded = parts.excluded_value
+    remedy = "set sequence.excluded_value, or mend the masks"
+    if (
+        run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where, remedy)
+        is None
+    ):
+        return
+    if (
+        run.tried(lambda: check_polarity(masks, depth, images, where, excluded, allow), "polarity", where, remedy)
+        is None
+    ):
+        return
+    run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where, "mend this mask")
+
+
+def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
+    cost = estimated_cost(len(parts.images), size[1], size[0], config.training.iterations, config.sequence.scale)
+    memory = memory_of_machine()
+    if memory is not None and cost.total_bytes > memory:
+        level = "refusal" if cost.sequence_bytes > memory else "warning"
+        what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, this machine has {memory / 1e9:.1f} GB"
+        remedy = "endotsr prepare --scale 0.5, or fewer --frames"
+        run.findings.append(Finding(level, "memory", str(parts.folder), None, what, "it would be stopped", remedy))
+    return cost
+
+
+def _split(parts: Parts, config: Config, run: _Pass) -> None:
+    def split() -> None:
+        frames = parse_frame_range(config.sequence.frames, len(parts.images))
+        split_frames(len(frames), config.sequence.split, config.sequence.block_length)
+
+    run.tried(split, "frames", parts.folder, "more frames, or another split")

@@ -1,0 +1,137 @@
+"""The files of a sequence, listed as far as they can be: what is missing becomes a finding, and the rest is checked."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import PICTURE_ENDINGS
+from endotsr.sequences.checks.findings import Finding
+from endotsr.sequences.common import Contents, cameras_of
+from endotsr.sequences.depth_files import DEPTH_ENDINGS
+from endotsr.sequences.endonerf import NO_MASKS
+from endotsr.sequences.files import list_pictures
+from endotsr.sequences.layouts import readable_layout
+from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows
+from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, read_poses, read_sequence_file
+from endotsr.splatting.camera import Camera
+
+
+class Parts(NamedTuple):
+    """What a sequence consists of; lists are empty where there is nothing."""
+
+    folder: Path
+    images: list[Path]
+    masks: list[Path]
+    depth: list[Path]
+    right: list[Path]
+    excluded_value: str
+    depth_scale: float  # to scene units
+    arbitrary: bool
+    camera_file: Path
+    cameras: Callable[[int, int], list[Camera]]  # of pictures of this width and height
+
+
+def parts_of(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
+    """List the parts of a folder in the common or the EndoNeRF layout; findings are appended.
+
+    Raises:  InputError if there is no folder, or its layout has to be prepared first.
+    """
+    if not folder.exists():
+        raise InputError(f"{folder}: sequence folder not found")
+    layout = readable_layout(folder)
+    return (_common_parts if layout.name == "common" else _endonerf_parts)(folder, config, findings)
+
+
+def _listed(folder: Path, endings: tuple[str, ...], what: str, findings: list[Finding]) -> list[Path]:
+    try:
+        return list_pictures(folder, endings)
+    except InputError as error:
+        remedy = f"supply the {what}, one file a frame"
+        findings.append(
+            Finding("refusal", f"{what}-files", str(folder), None, str(error), "a training reads them", remedy)
+        )
+        return []
+
+
+def _endonerf_parts(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
+    images = _listed(folder / IMAGES, PICTURE_ENDINGS, "images", findings)
+    masks = [] if config.masks == NO_MASKS else _listed(folder / config.masks, (".png",), "masks", findings)
+    depth = _listed(folder / "depth", DEPTH_ENDINGS, "depth", findings)
+    right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
+
+    def cameras(width: int, height: int) -> list[Camera]:
+        file = find_pose_file(folder)
+        rows = read_pose_rows(file, len(images))
+        return cameras_from_rows(rows, width, height, file, range(len(images)))[0]
+
+    where = next((folder / n for n in ("poses_bounds.npy", "pose_bounds.npy") if (folder / n).exists()), folder)
+    return Parts(folder, images, masks, depth, right, config.excluded_value, 1.0, False, where, cameras)
+
+
+def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
+    where = folder / FILE_NAME
+    try:
+        file = read_sequence_file(folder)
+    except InputError as error:
+        findings.append(
+            Finding(
+                "refusal", "sequence-file", str(where), None, str(error), "it says what the files mean", "mend the key"
+            )
+        )
+        return Parts(folder, [], [], [], [], "white", 1.0, False, where, lambda width, height: [])
+    images = _listed(folder / IMAGES, PICTURE_ENDINGS, "images", findings)
+    wanted = file.masks is not None and config.masks != NO_MASKS
+    masks = _listed(folder / file.masks.folder, PICTURE_ENDINGS, "masks", findings) if file.masks and wanted else []
+    depth = _listed(folder / file.depth.folder, DEPTH_ENDINGS, "depth", findings) if file.depth else []
+    right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
+    if file.depth is None:
+        findings.append(
+            Finding(
+                "refusal",
+                "no-depth",
+                str(where),
+                None,
+                "[depth] is missing",
+                "nothing can be placed in space",
+                "endotsr depth makes it from the stereo pair",
+            )
+        )
+    if file.masks is None:
+        findings.append(
+            Finding(
+                "note",
+                "no-masks",
+                str(where),
+                None,
+                "there are no masks",
+                "instruments count as tissue",
+                "supply masks: endotsr prepare --masks",
+            )
+        )
+    if any(file.camera.distortion):
+        findings.append(
+            Finding(
+                "refusal",
+                "distortion",
+                str(where),
+                None,
+                "the pictures are distorted",
+                "the model is a pinhole camera",
+                "endotsr prepare straightens them",
+            )
+        )
+
+    def cameras(width: int, height: int) -> list[Camera]:
+        if (file.camera.width, file.camera.height) != (width, height):
+            raise InputError(
+                f"{where}: states {file.camera.width}x{file.camera.height}, the pictures have {width}x{height}"
+            )
+        if file.frames != len(images):
+            raise InputError(f"{where}: frames = {file.frames}, but images/ holds {len(images)} pictures")
+        return cameras_of(Contents(folder, file, images, right, masks, depth, read_poses(file, where)))[0]
+
+    scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
+    excluded = file.masks.excluded_value if file.masks else "white"
+    return Parts(folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras)
