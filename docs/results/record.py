@@ -12,6 +12,9 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
+from scipy import stats
+
 from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
@@ -37,25 +40,43 @@ def record(run: Path, name: str, commit: str) -> None:
     write_json(FOLDER / f"{name}.json", metrics)
 
 
-def rows(records: dict[str, dict]) -> list[tuple[str, dict]]:
-    """Runs, then the baselines of the first run, then what was published."""
-    out = [(f"endotsr, `{name}.json`", r["held_out"]["mean"]) for name, r in records.items()]
+def split_of(metrics: dict) -> str:
+    """The held-out frames of a run, in words."""
+    sequence = metrics["run"]["settings"]["sequence"]
+    return "every eighth frame" if sequence["split"] != "blocks" else f"blocks of {sequence['block_length']} frames"
+
+
+def rows(records: dict[str, dict]) -> list[tuple[str, list[dict]]]:
+    """Label and held-out means: the seeds of every preset, the baselines of the first run, what was published."""
     first = next(iter(records.values()))
-    out += [(b["label"], b["mean"]) for b in first["baselines"].values()]
-    return out + [(p["label"], p) for p in first["published"]]
+    presets: dict[str, list[dict]] = {}
+    for metrics in records.values():
+        presets.setdefault(metrics["run"]["settings"]["preset"], []).append(metrics["held_out"]["mean"])
+    counted = {name: f", mean of {len(runs)} seeds" if len(runs) > 1 else "" for name, runs in presets.items()}
+    out = [(f"endotsr, preset `{name}`{counted[name]}", runs) for name, runs in presets.items()]
+    out += [(baseline["label"], [baseline["mean"]]) for baseline in first["baselines"].values()]
+    return out + [(row["label"], [row]) for row in first["published"] if split_of(first) == "every eighth frame"]
+
+
+def cell(values: list[dict], key: str, form: str) -> str:
+    """The mean over the seeds, with the half width of its 95 % interval (Student) if there are several."""
+    numbers = [row[key] for row in values if row.get(key) is not None]
+    if not numbers:
+        return "-"
+    if len(numbers) < 2:
+        return form.format(numbers[0])
+    half = stats.t.ppf(0.975, len(numbers) - 1) * np.std(numbers, ddof=1) / np.sqrt(len(numbers))
+    return f"{form.format(np.mean(numbers))} ± {form.format(half)}"
 
 
 def table(records: dict[str, dict]) -> str:
-    """Held-out means as Markdown, and one line on each run."""
-    cells = [
-        [label, *(f.format(values[key]) if values.get(key) is not None else "-" for key, _, f in COLUMNS)]
-        for label, values in rows(records)
-    ]
-    return (
-        markdown(["Held-out frames", *(c[1] for c in COLUMNS)], cells)
-        + "\n\n"
-        + "\n".join(about(name, r) for name, r in records.items())
-    )
+    """For every split the held-out means as Markdown; then one line on each run."""
+    parts = []
+    for split in dict.fromkeys(split_of(metrics) for metrics in records.values()):
+        chosen = {name: metrics for name, metrics in records.items() if split_of(metrics) == split}
+        cells = [[label, *(cell(values, key, form) for key, _, form in COLUMNS)] for label, values in rows(chosen)]
+        parts.append(markdown([f"Held out: {split}", *(c[1] for c in COLUMNS)], cells))
+    return "\n\n".join([*parts, "\n".join(about(name, metrics) for name, metrics in records.items())])
 
 
 def about(name: str, metrics: dict) -> str:

@@ -45,8 +45,8 @@ def view_directions(clip: Clip) -> FloatArray:
     known = np.flatnonzero((depth > 0) & clip.masks[clip.reference])
     chosen = np.sort(np.random.default_rng(SEED).permutation(known)[:POINTS])
     row, column = np.divmod(chosen, depth.shape[1])
-    place = [axis * clip.shrink + clip.shrink // 2 for axis in (column, row)]
-    points = backproject(clip.cameras[clip.reference], *map(np.asarray, place), depth.ravel()[chosen].astype(float))
+    u, v = (axis * clip.shrink + clip.shrink // 2 for axis in (column, row))
+    points = backproject(clip.cameras[clip.reference], u, v, depth.ravel()[chosen].astype(float))
     centres = np.array([camera_centre(camera) for camera in clip.cameras])
     away = points.T[:, None, :] - centres[None]
     return away / np.linalg.norm(away, axis=2, keepdims=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.between import CONSISTENT, TOLERANCE, WHOLE, flows_between
+from endotsr.sequences.between import CONSISTENT, TOLERANCE, WHOLE, Flows, flows_between
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, backproject
 
@@ -61,7 +61,8 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, me
     flows = lru_cache(KEPT_PAIRS)(lambda place: flows_between(sequence, train[place], train[place + 1], method))
     for way in (1, -1):
         for place in range(last) if way > 0 else range(last, 0, -1):
-            flow = flows(place) if way > 0 else flows(place - 1)[::-1]
+            there_and_back = flows(min(place, place + way))
+            flow = there_and_back if way > 0 else Flows(there_and_back.backward, there_and_back.forward)
             known = start <= place if way > 0 else start >= place
             here = _Points(out.position[place][:, known], out.followed[place, known])
             there = _step(sequence, (train[place], train[place + way]), here, flow)
@@ -69,12 +70,12 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, me
     return out
 
 
-def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: tuple[FloatArray, FloatArray]) -> _Points:
+def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flows) -> _Points:
     """The points at the second frame."""
     source, target = (sequence.cameras[i] for i in frames)
     pixel, _ = _project(source, here.position)
-    moved = pixel + _sampled(flows[0], pixel)
-    apart = moved + _sampled(flows[1], moved) - pixel
+    moved = pixel + _sampled(flows.forward, pixel)
+    apart = moved + _sampled(flows.backward, moved) - pixel
     lengths = np.square(moved - pixel).sum(axis=0)
     agree = np.square(apart).sum(axis=0) <= 2 * CONSISTENT * lengths + TOLERANCE
     found, at = _lifted(sequence, frames[1], moved)

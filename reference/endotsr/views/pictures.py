@@ -15,6 +15,7 @@ from endotsr.export.files import check_folder_name
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import moments
 from endotsr.opencv import write_png
+from endotsr.report.figures import ByteImage
 from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
 from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
 from endotsr.runs.folder import refuse_existing
@@ -23,7 +24,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
-from endotsr.views.film import ByteImage, check_film, write_film
+from endotsr.views.film import check_film, write_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, normalised_depth, scale_of, side_by_side
 from endotsr.views.plan import Request, View, check_request, views_of
 
