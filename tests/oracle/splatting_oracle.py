@@ -42,16 +42,8 @@ def project(position, sigma, pose, lens, rules):
     (w, d), (fx, fy, cx, cy, width, height) = pose, lens
     x, y, z = w @ position + d[:, None]
     kappa = rules["jacobian_clamp"]
-    limit_x = (
-        np.max([kappa * width, (kappa >= 1) * 2 * cx, (kappa >= 1) * 2 * (width - cx)]) / (2 * fx)
-        if kappa > 0
-        else np.inf
-    )
-    limit_y = (
-        np.max([kappa * height, (kappa >= 1) * 2 * cy, (kappa >= 1) * 2 * (height - cy)]) / (2 * fy)
-        if kappa > 0
-        else np.inf
-    )
+    limit_x = kappa * width / (2 * fx) if kappa > 0 else np.inf
+    limit_y = kappa * height / (2 * fy) if kappa > 0 else np.inf
     zero = np.zeros_like(z)
     j = np.array(
         [

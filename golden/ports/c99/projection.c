@@ -94,13 +94,8 @@ static Lens lens_of(Request *request)
         lens.d[k] = d[k];
     lens.focal[0] = (real)setting(request, "camera.fx");
     lens.focal[1] = (real)setting(request, "camera.fy");
-    const char *sizes[2] = {"camera.width", "camera.height"}, *centres[2] = {"camera.cx", "camera.cy"};
-    for (int k = 0; k < 2; k++) { /* never inside the picture, wherever the principal point is */
-        real size = (real)setting(request, sizes[k]), centre = (real)setting(request, centres[k]);
-        real widest = clamp < 1 ? 0 : 2 * (centre > size - centre ? centre : size - centre);
-        widest = clamp * size > widest ? clamp * size : widest;
-        lens.limit[k] = clamp > 0 ? widest / (2 * lens.focal[k]) : (real)INFINITY;
-    }
+    lens.limit[0] = clamp > 0 ? clamp * (real)setting(request, "camera.width") / (2 * lens.focal[0]) : (real)INFINITY;
+    lens.limit[1] = clamp > 0 ? clamp * (real)setting(request, "camera.height") / (2 * lens.focal[1]) : (real)INFINITY;
     lens.low_pass = (real)setting(request, "raster.low_pass");
     lens.near = (real)setting(request, "raster.near");
     lens.twice = setting_is(request, "raster.deviations.double_clamp_term", "true");

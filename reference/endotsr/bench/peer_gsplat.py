@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.splatting.camera import Camera, camera_centre
-from endotsr.splatting.camera_model import jacobian_limit
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import RasterSettings
 
@@ -60,7 +59,7 @@ def difference_of_rules(scene: Scene, camera: Camera, settings: RasterSettings) 
         slope = slope[seen] / z[seen]
         margin = (JACOBIAN_CLAMP - 1) * pixels / 2
         low, high = -(centre + margin) / focal, (pixels - centre + margin) / focal
-        ours = jacobian_limit(settings.jacobian_clamp, pixels, centre, focal)
+        ours = settings.jacobian_clamp * pixels / (2 * focal) if settings.jacobian_clamp > 0 else np.inf
         if not np.allclose(np.clip(slope, low, high), np.clip(slope, -ours, ours), rtol=1e-13, atol=0):
             return "a centre lies beyond the limit of the Jacobian clamp, and the limits differ"
     return None

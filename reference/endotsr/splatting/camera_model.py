@@ -35,22 +35,10 @@ def intrinsics_of(camera: Camera, settings: RasterSettings, dtype: np.dtype) -> 
         real(camera.fy),
         real(camera.cx),
         real(camera.cy),
-        real(jacobian_limit(clamp, camera.width, camera.cx, camera.fx)),
-        real(jacobian_limit(clamp, camera.height, camera.cy, camera.fy)),
+        real(clamp * camera.width / (2 * camera.fx) if clamp > 0 else np.inf),
+        real(clamp * camera.height / (2 * camera.fy) if clamp > 0 else np.inf),
         real(2 if settings.deviations.double_clamp_term else 1),
     )
-
-
-def jacobian_limit(clamp: float, pixels: int, principal: float, focal: float) -> float:
-    """L of (B3) along one axis: `clamp` times half the field of view, and never inside the picture.
-
-    A principal point within 15 % of the centre gives the first; a picture that reaches further to one side, the second.
-    A clamp below 1, which no preset has, is meant to be inside the picture and stays as it is.
-    """
-    if clamp <= 0:
-        return np.inf
-    widest = 2 * max(principal, pixels - principal) if clamp >= 1 else 0.0
-    return max(clamp * pixels, widest) / (2 * focal)
 
 
 @jit_formula

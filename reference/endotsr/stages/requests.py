@@ -109,6 +109,12 @@ class Tape:
 
     def __init__(self, frames: NDArray, noise: NDArray) -> None:
         self.frames, self.noise = list(map(int, frames)), noise
+        self.bit_generator = self  # the trainer notes the state of its generator before an iteration
+
+    @property
+    def state(self) -> dict[str, list[int]]:
+        """The frames that are still to come."""
+        return {"frames": list(self.frames)}
 
     def integers(self, high: int) -> int:
         """The next frame, as a position within the training frames."""
