@@ -32,7 +32,7 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import correlate1d
 
-from endotsr.config import DEMO, with_iterations
+from endotsr.config import PAPER, with_iterations
 from endotsr.evaluation.baselines import BASELINES
 from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
 from endotsr.fitting.model import render_at
@@ -48,9 +48,12 @@ if SMALL:  # a thumbnail, for the tests; the book shows the demonstration at ful
 else:
     simulation, T, points = SimulatorSettings(), 600, 6000
 sequence = simulate(simulation).sequence
-config = with_iterations(DEMO, T)
+config = with_iterations(PAPER, T)  # the published method, with time bases as wide as its few frames need
 config = replace(
-    config, initialisation=replace(config.initialisation, first_frame_points=points, other_frame_points=points // 4)
+    config,
+    model=replace(config.model, initial_width=0.1),
+    initialisation=replace(config.initialisation, first_frame_points=points, other_frame_points=points // 4),
+    training=replace(config.training, bridge_fraction=1.0),
 )
 print(f"{sequence.count} frames of {sequence.width}x{sequence.height}; held out: {sequence.test_index.tolist()}")
 
