@@ -21,6 +21,8 @@ from endotsr.runs.files import write_json
 
 FOLDER = Path(__file__).parent
 START, END = "<!-- results:start (made by docs/results/record.py) -->", "<!-- results:end -->"
+EVERY_EIGHTH = "every eighth frame"
+MORE = "[All runs, with blocks of frames held out, machine and times](docs/results/README.md). ± is a 95 % interval."
 COLUMNS = (
     ("psnr_full", "PSNR full, dB", "{:.2f}"),
     ("psnr_tissue", "PSNR tissue, dB", "{:.2f}"),
@@ -43,19 +45,24 @@ def record(run: Path, name: str, commit: str) -> None:
 def split_of(metrics: dict) -> str:
     """The held-out frames of a run, in words."""
     sequence = metrics["run"]["settings"]["sequence"]
-    return "every eighth frame" if sequence["split"] != "blocks" else f"blocks of {sequence['block_length']} frames"
+    return EVERY_EIGHTH if sequence["split"] != "blocks" else f"blocks of {sequence['block_length']} frames"
 
 
 def rows(records: dict[str, dict]) -> list[tuple[str, list[dict]]]:
     """Label and held-out means: the seeds of every preset, the baselines of the first run, what was published."""
     first = next(iter(records.values()))
     presets: dict[str, list[dict]] = {}
+    faded: dict[str, list[dict]] = {}
     for metrics in records.values():
-        presets.setdefault(metrics["run"]["settings"]["preset"], []).append(metrics["held_out"]["mean"])
+        preset = metrics["run"]["settings"]["preset"]
+        presets.setdefault(preset, []).append(metrics["held_out"]["mean"])
+        if row := metrics.get("cross_fade"):
+            faded.setdefault(preset, []).append(row["mean"])
     counted = {name: f", mean of {len(runs)} seeds" if len(runs) > 1 else "" for name, runs in presets.items()}
     out = [(f"endotsr, preset `{name}`{counted[name]}", runs) for name, runs in presets.items()]
+    out += [(f"blend of the own renders of `{name}`", means) for name, means in faded.items()]
     out += [(baseline["label"], [baseline["mean"]]) for baseline in first["baselines"].values()]
-    return out + [(row["label"], [row]) for row in first["published"] if split_of(first) == "every eighth frame"]
+    return out + [(row["label"], [row]) for row in first["published"] if split_of(first) == EVERY_EIGHTH]
 
 
 def cell(values: list[dict], key: str, form: str) -> str:
@@ -70,13 +77,13 @@ def cell(values: list[dict], key: str, form: str) -> str:
 
 
 def table(records: dict[str, dict]) -> str:
-    """For every split the held-out means as Markdown; then one line on each run."""
+    """For every split the held-out means as Markdown."""
     parts = []
     for split in dict.fromkeys(split_of(metrics) for metrics in records.values()):
         chosen = {name: metrics for name, metrics in records.items() if split_of(metrics) == split}
         cells = [[label, *(cell(values, key, form) for key, _, form in COLUMNS)] for label, values in rows(chosen)]
         parts.append(markdown([f"Held out: {split}", *(c[1] for c in COLUMNS)], cells))
-    return "\n\n".join([*parts, "\n".join(about(name, metrics) for name, metrics in records.items())])
+    return "\n\n".join(parts)
 
 
 def about(name: str, metrics: dict) -> str:
@@ -109,8 +116,10 @@ def main(words: list[str]) -> None:
         sys.exit(__doc__)
     records = {p.stem: json.loads(p.read_text(encoding="utf-8")) for p in sorted(FOLDER.glob("pulling*.json"))}
     if records:
-        for path in (FOLDER / "README.md", FOLDER.parents[1] / "README.md"):
-            replace_marked(path, table(records))
+        runs = "\n".join(about(name, metrics) for name, metrics in records.items())
+        replace_marked(FOLDER / "README.md", f"{table(records)}\n\n{runs}")
+        short = {name: metrics for name, metrics in records.items() if split_of(metrics) == EVERY_EIGHTH}
+        replace_marked(FOLDER.parents[1] / "README.md", f"{table(short)}\n\n{MORE}")
 
 
 if __name__ == "__main__":
