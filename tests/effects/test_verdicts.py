@@ -14,8 +14,9 @@ from endotsr.effects.verdict import Verdict
 from endotsr.effects.views import view_verdict
 from endotsr.errors import InputError
 from endotsr.runs.files import finite
+from endotsr.simulator.cameras import make_cameras
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.simulate import make_cameras, simulate
+from endotsr.simulator.simulate import simulate
 
 ALONE = ("breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument", "depth_errors")
 

@@ -7,6 +7,7 @@ training without a fault, bit by bit. The children are forks of this process, so
 
 import argparse
 import datetime
+import io
 import json
 import os
 import random
@@ -16,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -74,13 +76,15 @@ def endotsr_quietly(words: list[str], said: Path | None = None) -> int:
     """The command; standard output and standard error go to a file or nowhere."""
     place = os.open(said or os.devnull, os.O_WRONLY | (os.O_CREAT | os.O_TRUNC if said else 0))
     kept = os.dup(1), os.dup(2)
+    text = io.TextIOWrapper(io.FileIO(place, "w", closefd=False), "utf-8", write_through=True)
     try:
         sys.stdout.flush()
         os.dup2(place, 1)
         os.dup2(place, 2)
-        return endotsr(words)
+        with redirect_stdout(text), redirect_stderr(text):  # pytest's own streams do not write to 1 and 2
+            return endotsr(words)
     finally:
-        sys.stdout.flush()
+        text.close()
         for number, descriptor in zip((1, 2), kept, strict=True):
             os.dup2(descriptor, number)
             os.close(descriptor)

@@ -168,19 +168,17 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.cli.render import RenderOptions, wanted_views
+    from endotsr.export.times import Times
     from endotsr.runs.folder import RunFolder
-    from endotsr.runs.sources import remembered_cameras
+    from endotsr.views.plan import Request, check_request, views_of
 
-    record = RunFolder(path.parent).sequence_record(
-        "names", "times", "train_index", "test_index", "cameras", "static_camera", "unit"
-    )
-    cameras = remembered_cameras(record)
-    views = wanted_views(record, RenderOptions(Path("run"), Path("out"), frames="all"))
-    for view in views:
-        inside = (path.parent / f"{view.label}.png").resolve()
-        assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
-        assert cameras[view.frame].width > 0
+    record = RunFolder(path.parent).sequence_record("names", "times", "train_index", "test_index")
+    for request in (Request(Times(frames="all")), Request(Times(count=3), camera="sway", size="20x20")):
+        check_request(request, record)
+        for view in views_of(request, record, pivot_depth=50.0):
+            inside = (path.parent / f"{view.label}.png").resolve()
+            assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
+            assert view.camera.width > 0
     return np.array(record["times"])[record["train_index"]]
 
 

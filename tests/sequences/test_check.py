@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from common_folder import moving, written
-from test_depth import slanted_pair, stereo_folder
+from test_stereo_depth import slanted_pair, stereo_folder
 
 from data_folder import data_folder
 from endotsr.cli.main import main
