@@ -71,7 +71,7 @@ def test_grid_is_every_combination():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["everything"], "allowed: iteration, stages, scaling, peers, start, all"),
+        (["everything"], "allowed: iteration, stages, effects, scaling, peers, start, all"),
         (["stages", "--gaussians", "3"], "--gaussians 3 is not allowed"),
         (["stages", "--plot", "bars.pdf"], "--plot bars.pdf is not allowed; allowed: a file whose name ends in .png"),
         (["scaling", "--largest", "10"], "--largest 10 is not allowed"),
@@ -91,7 +91,7 @@ def test_wrong_scene_is_refused_before_anything_is_measured(words, tmp_path, mon
     monkeypatch.setattr(start, "measure_start", measured)
     words = [word.format(tmp_path) for word in words]
     assert main(["bench", *words, "--scenes", str(tmp_path / "none.npz")]) == 2
-    assert "none.npz: not a trained scene" in capsys.readouterr().err
+    assert "none.npz: cannot be read: No such file" in capsys.readouterr().err
 
 
 def test_peers_without_torch_say_what_to_install(monkeypatch, capsys):
@@ -119,5 +119,8 @@ def test_trained_scene_fills_the_picture(tmp_path):
     np.savez(file, allow_pickle=False, **(found | {"rgb": found["rgb"][:7]}))
     with pytest.raises(InputError, match=r"rgb has shape \(7, 3\)"):
         trained.trained_gaussians(file, PAPER)
-    with pytest.raises(InputError, match="not a trained scene"):
+    np.savez(file, allow_pickle=False, xyz=found["xyz"])
+    with pytest.raises(InputError, match=r"scene\.npz: not a trained scene: log_scale is missing; allowed: an npz"):
+        trained.trained_gaussians(file, PAPER)
+    with pytest.raises(InputError, match=r"none\.npz: cannot be read: No such file"):
         trained.trained_gaussians(tmp_path / "none.npz", PAPER)

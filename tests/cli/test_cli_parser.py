@@ -38,6 +38,8 @@ class Options(Base):
     """may be negative"""
     sizes: tuple[int, ...] = (1, 2)
     """several numbers"""
+    marks: Annotated[tuple[int, ...], Option("INT ...", may_be_empty=True)] = (3,)
+    """numbers or none"""
     fast: bool = False
     """a switch"""
     out: Path | None = None
@@ -69,6 +71,7 @@ def test_several_values_and_none():
     assert tried("--sizes", "3", "4", "5").sizes == (3, 4, 5)
     with pytest.raises(InputError, match="--sizes: missing value"):
         tried("--sizes")
+    assert tried("--marks").marks == () and tried("--marks", "7").marks == (7,)
     assert tried("--sequence.depth-percentiles", "1", "99").settings.sequence.depth_percentiles == (1.0, 99.0)
 
 

@@ -90,7 +90,7 @@ def test_a_film_alone_shows_all_frames(finished_run, tmp_path):
         (["--film", "{}/a.avi"], "a.avi: not a film; allowed: a name that ends in .mp4, .webm, .gif"),
         (["--film", "{}/none/a.mp4"], "a.mp4: cannot be written"),
         (["--film", "{}/a.mp4", "--rate", "0"], "--rate 0 is not allowed"),
-        (["--film", "{}/a.mp4", "--panels"], "--panels is empty"),
+        (["--film", "{}/a.mp4", "--panels"], "--panels: missing value {render,truth,error,depth,opacity} ..."),
         (["--film", "{}/a.mp4", "--panels", "truth", "--count", "5"], "--panels truth at time 0.25: no frame has"),
         (["--film", "{}/a.mp4", "--panels", "error", "--offset", "1", "0", "0"], "--panels error at time 0:"),
         (["--out", "{}/a", "--camera", "circle"], "--camera 'circle' is not allowed; allowed: observed, orbit, sway"),

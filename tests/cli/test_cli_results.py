@@ -224,13 +224,18 @@ def test_bench_that_names_its_threads_takes_no_zero(what, capsys):
 @pytest.mark.parametrize(
     ("what", "name"),
     [
-        *(("stages", name) for name in ("gaussians", "precisions", "threads")),
+        *(("stages", name) for name in ("scenes", "precisions", "threads")),
         *(("peers", name) for name in ("gaussians", "precisions")),
         ("scaling", "axes"),
     ],
 )
 def test_bench_refuses_an_empty_list(what, name, capsys):
-    assert_refused(capsys, ["bench", what, f"--{name}"], f"--{name} is empty", "allowed: one or more")
+    assert_refused(capsys, ["bench", what, f"--{name}"], f"--{name}: missing value ")
+
+
+def test_bench_without_sizes_and_without_scenes_has_nothing_to_time(capsys):
+    said = "--gaussians is empty, which leaves nothing to time; allowed: one or more, or none with --scenes"
+    assert_refused(capsys, ["bench", "stages", "--gaussians"], said)
 
 
 def test_bench_times_scenes_alone(tmp_path, capsys):

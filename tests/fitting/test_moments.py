@@ -74,6 +74,9 @@ def test_a_training_compares_with_the_moments(sequence):
 
 
 def test_without_bridges_no_moment_is_made(sequence):
-    shop, state = workshop(sequence, DEMO), new_training(sequence, DEMO)
-    training_step(state, shop)
+    training = msgspec.structs.replace(DEMO.training, bridge_fraction=0.0, bridge_target="flow")
+    config = msgspec.structs.replace(DEMO, training=training)
+    shop, state = workshop(sequence, config), new_training(sequence, config)
+    for _ in range(4):
+        training_step(state, shop)
     assert not shop.moments.stored

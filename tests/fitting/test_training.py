@@ -24,6 +24,7 @@ from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, trainer
 from endotsr.fitting.checkpoint import load_checkpoint
 from endotsr.fitting.checkpoint_values import check_lengths
+from endotsr.fitting.divergence import Diverged
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
 from endotsr.fitting.schedules import densify_now
@@ -356,7 +357,7 @@ def test_a_loss_that_is_not_finite_stops_the_run_and_names_iteration_and_frame(s
             state.gaussians.harmonics[0] = np.nan
 
     _, frames = run(sequence, config)
-    with pytest.raises(FloatingPointError, match=rf"iteration 6, frame {frames[5]['frame']}: loss is nan"):
+    with pytest.raises(Diverged, match=rf"^iteration 6, frame {frames[5]['frame']}: l1 is nan$"):
         run(sequence, config, state, poison)
     assert state.iteration == 5
 

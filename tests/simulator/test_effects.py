@@ -16,7 +16,7 @@ from endotsr.simulator.instrument import draw
 from endotsr.simulator.lamps import Blocker, shadow
 from endotsr.simulator.shading import lit_by_all, shade
 from endotsr.simulator.slit import half_width, parting, side_of, slit_coordinates
-from endotsr.simulator.smoke import GREY, smoke_share, with_smoke
+from endotsr.simulator.smoke import GREY, smoke_fraction, with_smoke
 from endotsr.simulator.surface import make_surface, surface_point
 from endotsr.simulator.texture import sample
 from endotsr.simulator.views import see, to_camera
@@ -191,11 +191,11 @@ def test_vignetting_takes_its_fraction_in_the_corners_and_nothing_in_the_middle(
 
 def test_smoke_replaces_light_by_grey_within_its_time():
     settings = with_effects(SMALL, "smoke")
-    assert not smoke_share(settings, 0.05).any() and not smoke_share(settings, 0.97).any()
-    share = smoke_share(settings, 0.5)
-    assert 0.1 < share.mean() < 0.5 and share.max() < 0.6 and share.std() > 0.05
+    assert not smoke_fraction(settings, 0.05).any() and not smoke_fraction(settings, 0.97).any()
+    fraction = smoke_fraction(settings, 0.5)
+    assert 0.1 < fraction.mean() < 0.5 and fraction.max() < 0.6 and fraction.std() > 0.05
     light = np.full((3, 48, 64), 0.2)
-    np.testing.assert_allclose(with_smoke(settings, light, 0.5)[0], 0.2 + (GREY[0] - 0.2) * share)
+    np.testing.assert_allclose(with_smoke(settings, light, 0.5)[0], 0.2 + (GREY[0] - 0.2) * fraction)
 
 
 def test_smoke_drifts_to_the_right_and_does_not_depend_on_the_image_size():
@@ -207,7 +207,7 @@ def test_smoke_drifts_to_the_right_and_does_not_depend_on_the_image_size():
     large = _clouds(msgspec.structs.replace(settings, width=300, height=240), 0.2, 0)
     np.testing.assert_allclose(large[1::3, 1::3], first, atol=1e-12)
     for drift in (-0.5, 0.0, 2.0):
-        assert np.isfinite(smoke_share(changed(settings, "smoke", drift=drift), 0.5)).all()
+        assert np.isfinite(smoke_fraction(changed(settings, "smoke", drift=drift), 0.5)).all()
 
 
 def test_automatic_exposure_is_constant_between_its_jumps():

@@ -19,7 +19,6 @@ from endotsr.runs.files import refuse_unwritable, write_json
 
 LEAST = {"gaussians": 4, "largest": 1000, "repeats": 1, "width": 16, "height": 16, "threads": 0}
 MORE = {"stages": {"threads": 1}, "peers": {"threads": 1}}  # their results state the number, so 0 is not allowed
-LISTS = ("gaussians", "precisions", "threads", "axes")
 
 
 def run(words: list[str]) -> int:
@@ -45,11 +44,10 @@ def _refuse_nothing(what: str, options: Any) -> None:
         for value in values if isinstance(values, tuple) else (values,):
             if value < least:
                 raise InputError(f"bench: --{name} {value} is not allowed; allowed: an integer >= {least}")
-    scenes = getattr(options, "scenes", ())
-    for name in LISTS:
-        if getattr(options, name, None) == () and not (name == "gaussians" and scenes):
-            other = ", or none with --scenes" if name == "gaussians" and what == "stages" else ""
-            raise InputError(f"bench: --{name} is empty, which leaves nothing to time; allowed: one or more{other}")
+    if isinstance(options, StagesOptions) and not options.gaussians and not options.scenes:
+        raise InputError(
+            "bench: --gaussians is empty, which leaves nothing to time; allowed: one or more, or none with --scenes"
+        )
 
 
 def _refuse_other_pictures(plot: Path | None) -> None:

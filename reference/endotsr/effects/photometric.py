@@ -52,14 +52,14 @@ def photometric_verdict(clip: Clip, tracks: Tracks, noise: Noise, moving: bool) 
         "white balance": float((balance.var(axis=0, ddof=1) / error**2).max()),
     }
     critical = float(stats.f.isf(ALARM / 3, len(gain) - 1, max(2, ratios.values.shape[2] - 1)))
-    local, shares = local_change(clip, ratios, gain, moving)
+    local, sizes = local_change(clip, ratios, gain, moving)
     found = [name for name in f if f[name] > critical and ranges[name] >= LEAST_CHANGE]
-    share = float(local.mean())
-    if share >= LOCAL_FRACTION:
+    fraction = float(local.mean())
+    if fraction >= LOCAL_FRACTION:
         found.append("local")
     score = {name: min(f[name] / critical, ranges[name] / LEAST_CHANGE) for name in f}
-    statistic = max(*score.values(), share / LOCAL_FRACTION)
-    return _verdict(clip, found, statistic, ranges, share, common, balance, ratios, shares)
+    statistic = max(*score.values(), fraction / LOCAL_FRACTION)
+    return _verdict(clip, found, statistic, ranges, fraction, common, balance, ratios, sizes)
 
 
 def colour_ratios(clip: Clip, tracks: Tracks, noise: Noise) -> Ratios:
@@ -147,13 +147,13 @@ def _nothing(reason: str) -> Verdict:
 
 
 def _verdict(
-    clip: Clip, found: list[str], statistic: float, ranges: dict[str, float], share: float, common: FloatArray,
+    clip: Clip, found: list[str], statistic: float, ranges: dict[str, float], fraction: float, common: FloatArray,
     balance: FloatArray, ratios: Ratios, sizes: FloatArray,
 ) -> Verdict:  # fmt: skip
     words = {
         "gain": f"the gain of the frames ranges over {255 * ranges['gain']:.1f} grey levels",
         "white balance": f"the channels drift apart by {255 * ranges['white balance']:.1f} grey levels",
-        "local": f"the light changes by itself in {share:.0%} of the tissue",
+        "local": f"the light changes by itself in {fraction:.0%} of the tissue",
     }
     said = ", ".join(words[name] for name in found)
     reason = said[0].upper() + said[1:] + "." if said else "No gain, white balance or local light changes visibly."
@@ -163,7 +163,7 @@ def _verdict(
     return Verdict(
         "photometric", bool(found), " + ".join(found) or "none", statistic, 1.0, "times the threshold",
         "F ratio of the variance of the frame gain over noise, its range over one grey level, changed tiles over 2 %",
-        ALARM, reason, {"range": ranges, "local_fraction": share},
+        ALARM, reason, {"range": ranges, "local_fraction": fraction},
         Curve("gain, and red and blue against it, percent", "time", clip.times, lines),
         Map("local change of light, RMS, grey levels", tile_map(picture, *clip.images.shape[2:])),
     )  # fmt: skip

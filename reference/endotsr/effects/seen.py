@@ -52,14 +52,14 @@ def camera_verdict(sequence: Sequence, clip: Clip) -> Verdict:
 
 def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     """Saturated and colourless tissue pixels at full size."""
-    shares, sums = [], np.zeros(sequence.images.shape[2:])
+    fractions, sums = [], np.zeros(sequence.images.shape[2:])
     for i in sequence.train_index:
         bright = highlights(sequence.images[i]) & sequence.masks[i]
-        shares.append(bright.sum() / max(int(sequence.masks[i].sum()), 1))
+        fractions.append(bright.sum() / max(int(sequence.masks[i].sum()), 1))
         sums += bright
-    share = np.array(shares)
-    statistic = float(share.mean())
-    fixed = float((sums >= 0.9 * len(share)).sum() / max(int((sums > 0).sum()), 1))
+    fraction = np.array(fractions)
+    statistic = float(fraction.mean())
+    fixed = float((sums >= 0.9 * len(fraction)).sum() / max(int((sums > 0).sum()), 1))
     present = statistic >= LEAST_HIGHLIGHT
     kind = "none" if not present else "fixed" if fixed > 0.5 else "moving"
     reason = f"Saturated pixels without colour cover {statistic:.2%} of the tissue."
@@ -68,9 +68,9 @@ def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     picture = cut.reshape(cut.shape[0] // side, side, cut.shape[1] // side, side).mean(axis=(1, 3))
     return Verdict("highlights", present, kind, statistic, LEAST_HIGHLIGHT, "fraction of the tissue",
                    "saturated pixels without colour", 0.01, reason, {"fixed_fraction": fixed},
-                   Curve("highlights, percent of the tissue", "time", clip.times, {"highlights": 100 * share},
+                   Curve("highlights, percent of the tissue", "time", clip.times, {"highlights": 100 * fraction},
                          100 * LEAST_HIGHLIGHT),
-                   Map("highlight, percent of the frames", 100 * picture / len(share)))  # fmt: skip
+                   Map("highlight, percent of the frames", 100 * picture / len(fraction)))  # fmt: skip
 
 
 def highlights(image: FloatArray) -> FloatArray:

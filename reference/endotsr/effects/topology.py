@@ -27,8 +27,8 @@ def topology_verdict(clip: Clip, tracks: Tracks, noise: Noise) -> Verdict:
     best = np.nanpercentile(np.where(known, scores, -1.0), 90, axis=0)
     textured = (best > TEXTURED) & tracks.usable
     lost = known & (scores < LOST)
-    share = lost.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    gone = textured & (share >= STAYS)
+    fraction = lost.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    gone = textured & (fraction >= STAYS)
     needed = max(LEAST_TILES, TILE_FRACTION * int(textured.sum()))
     statistic = float(gone.sum()) / needed
     present = statistic >= 1.0
@@ -44,7 +44,7 @@ def topology_verdict(clip: Clip, tracks: Tracks, noise: Noise) -> Verdict:
                    Curve("tiles without the structure of the reference, percent", "time", clip.times,
                          {"lost": 100 * course}),
                    Map("structure lost, percent of the frames",
-                       tile_map(np.where(textured, 100 * share, np.nan), *clip.images.shape[2:])))  # fmt: skip
+                       tile_map(np.where(textured, 100 * fraction, np.nan), *clip.images.shape[2:])))  # fmt: skip
 
 
 def structure_scores(clip: Clip, tracks: Tracks, noise: Noise) -> np.ndarray:

@@ -119,9 +119,10 @@ def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling 
     mask     (H, W)  True = tissue
     returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
              tissue: 5-7, 13-17, 29-37 pixels an axis for `co_sited`, 7, 17, 37 for `half_pixel`
-    Edges:   a level may be empty; it then adds 0 to the loss.
+    Edges:   a level may be empty; it then adds 0 to the loss. Raises ValueError for an unknown `upsampling`.
     Oracle:  the impulse response of the pyramid, tests/oracle/laplacian_oracle.py.
     """
+    expand_weights(upsampling)  # refuses an unknown name also where nothing is propagated
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
     bands, valid = [], mask
     if mask.all():  # nothing to propagate: every band pixel is valid

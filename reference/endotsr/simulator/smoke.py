@@ -1,7 +1,7 @@
 """Smoke between camera and tissue: drifting clouds that replace a fraction of the light by their own grey.
 
-In: the size of the picture and a time. Out: the share of smoke in every pixel. The clouds are a smooth random field in
-the picture, drawn in image widths, so that another image size shows the same smoke.
+In: the size of the picture and a time. Out: the fraction of smoke in every pixel. The clouds are a smooth random field
+in the picture, drawn in image widths, so that another image size shows the same smoke.
 """
 
 import numpy as np
@@ -13,17 +13,17 @@ from endotsr.simulator.texture import SPLINE_DEVIATION, spline_basis
 
 GREY = np.array([0.50, 0.50, 0.53])  # linear light of dense smoke
 CONTRAST = 1.5  # of the clouds, deviations of the field
-RISE, FALL = 0.25, 0.35  # share of its time in which the smoke comes and goes
+RISE, FALL = 0.25, 0.35  # fraction of its time in which the smoke comes and goes
 TURNS = 2.0  # changes of shape during the sequence
 
 
 def with_smoke(settings: SimulatorSettings, light: FloatArray, t: float) -> FloatArray:
     """The light (3, H, W) behind the smoke."""
-    share = smoke_share(settings, t)
-    return light * (1 - share) + GREY[:, None, None] * share
+    fraction = smoke_fraction(settings, t)
+    return light * (1 - fraction) + GREY[:, None, None] * fraction
 
 
-def smoke_share(settings: SimulatorSettings, t: float) -> FloatArray:
+def smoke_fraction(settings: SimulatorSettings, t: float) -> FloatArray:
     """The fraction of the light that smoke replaces, (H, W), at most the density."""
     part = settings.smoke
     if not part.start < t < part.stop:

@@ -34,7 +34,7 @@ class IterationOptions:
 class StagesOptions:
     """Time every stage of an iteration, beside its limit from the measured peaks of this machine."""
 
-    gaussians: tuple[int, ...] = (20_000, 60_000, 150_000)
+    gaussians: Annotated[tuple[int, ...], Option("INT ...", may_be_empty=True)] = (20_000, 60_000, 150_000)
     """numbers of Gaussians of the common workload; may be empty with --scenes"""
     scenes: Annotated[tuple[Path, ...], Option("FILE ...")] = ()
     """trained scenes (npz) to time as well"""

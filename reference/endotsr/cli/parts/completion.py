@@ -10,37 +10,27 @@ from typing import Any
 from endotsr.cli.main import COMMANDS
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.mistakes import option_names
+from endotsr.simulator.scenes import SCENES
 
 ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
-# The options class of a command whose first word chooses what it does is that of the module's table.
-CLASSES = {
-    "demo": ("train", "TrainOptions"),
-    "train": ("train", "TrainOptions"),
-    "calibrate": ("calibrate", "CalibrateOptions"),
-    "render": ("render", "RenderOptions"),
-    "view": ("view", "ViewOptions"),
-    "export": ("export", "ExportOptions"),
-    "evaluate": ("evaluate", "EvaluateOptions"),
-    "compare": ("compare", "CompareOptions"),
-    "gradcheck": ("gradcheck", "GradcheckOptions"),
-    "tradeoff": ("tradeoff", "TradeoffOptions"),
-    "completion": ("completion", "CompletionOptions"),
-}
+SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # a command whose options are those of another
+CHOICES = {"bench": "MEASURES", "golden": "DOORS"}  # the table of a command module whose keys are its first words
 FIRST_WORDS = {
-    "bench": ("iteration", "stages", "scaling", "peers", "start", "all"),
-    "golden": ("judge", "run", "generate", "reference", "negative"),
     "tradeoff": ("train",),
     "train": ("simulated",),
+    "inspect": ("simulated",),
+    "simulate": tuple(SCENES),
     "completion": ("bash", "zsh", "fish"),
 }
 
 
 def words_of(command: str) -> list[str]:
     """What may follow a command: its first words, then its options in the order of the help."""
-    found: list[str] = list(FIRST_WORDS.get(command, ()))
-    if command in CLASSES:
-        module, name = CLASSES[command]
-        options: Any = getattr(importlib.import_module(f"endotsr.cli.{module}"), name)
+    module, name = SHARED_MODULE.get(command, (command, f"{command.capitalize()}Options"))
+    command_module: Any = importlib.import_module(f"endotsr.cli.{module}")
+    found = list(getattr(command_module, CHOICES[command]) if command in CHOICES else FIRST_WORDS.get(command, ()))
+    options = getattr(command_module, name, None)  # bench and golden have a class for each first word instead
+    if options is not None:
         found += [word for word in option_names(fields_of(options)) if word not in ALWAYS]
     return [*found, *ALWAYS]
 

@@ -28,6 +28,7 @@ class Option:
 
     metavar: str = ""  # the value in the help; empty = derived from the type
     positional: bool = False  # given without a name
+    may_be_empty: bool = False  # of several values: also without any value
     flat: bool = False  # a section of settings whose keys are options without the name of the field in front
 
 
@@ -43,6 +44,7 @@ class Field:
     section: type | None  # the settings it belongs to; None outside of a section
     metavar: str
     positional: bool
+    may_be_empty: bool = False
 
     @property
     def switch(self) -> bool:
@@ -96,6 +98,7 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 section=section,
                 metavar=note.metavar or _metavar(plain),
                 positional=note.positional,
+                may_be_empty=note.may_be_empty,
             )
 
 

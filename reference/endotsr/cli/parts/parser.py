@@ -83,8 +83,9 @@ def _parser(fields: list[Field]) -> argparse.ArgumentParser:
             parser.add_argument(field.name, dest=path, action="store_true")
             parser.add_argument(field.off, dest=path, action="store_false")
         else:
-            several = "+" if field.count == "*" else field.count  # an option without any value is a slip
-            parser.add_argument(field.name, dest=path, nargs=None if field.count == 1 else several)
+            several = field.count != "*" or field.may_be_empty  # otherwise an option without any value is a slip
+            count = field.count if several else "+"
+            parser.add_argument(field.name, dest=path, nargs=None if count == 1 else count)
     return parser
 
 
