@@ -25,8 +25,8 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene, render_forward
 
+# (reference frame, frame) -> (3, H, W): where the points seen at the pixels of the first are at the second.
 TruePositions = Callable[[int, int], FloatArray]
-"""(reference frame, frame) -> (3, H, W): where the points seen at the pixels of the first are at the second."""
 
 LEAST_OPACITY = 1e-6  # of a pixel; a pixel with less shows no Gaussian, and the model predicts no motion there
 
