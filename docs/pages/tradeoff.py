@@ -5,7 +5,7 @@
     python docs/pages/tradeoff.py                            pictures and page once more from the files
 
 Run it while the machine has nothing else to do. `train` goes on where it was interrupted: its file is kept in
-docs/_build/tradeoff until the study is complete. A SEQUENCE is an EndoNeRF folder or the word `simulated`.
+docs/_build/tradeoff until the study is complete. A SEQUENCE is a sequence folder or the word `simulated`.
 """
 
 import shutil

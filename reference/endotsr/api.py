@@ -106,7 +106,7 @@ def load_sequence(
 ) -> LoadedSequence:
     """The whole sequence in memory, fully checked.
 
-    source      EndoNeRF folder, or the word "simulated"
+    source      sequence folder, or the word "simulated"
     config      settings to start from (section `sequence`, and the near plane); default: preset `paper`
     simulator   settings of "simulated": {"frames": 16, "width": 96, "pull": {"on": False}}
     settings    keys of the section `sequence`: scale=0.5, frames="0:60", masks="gt_masks", split="blocks"

@@ -1,7 +1,9 @@
 """`-q`, `--log-file`, the short and the whole help, and completion scripts."""
 
+import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 from tiny import assert_refused
@@ -87,3 +89,15 @@ COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _endotsr; echo "${{COMPREPLY[@
     )
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=30)
     assert done.stdout.split() == [expected] and done.stderr == ""
+
+
+def test_the_readme_and_the_overview_list_every_command(capsys):
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `endotsr ([a-z]+)` \|", readme, re.MULTILINE) == [*COMMANDS]
+    assert main(["--help"]) == 0
+    assert re.findall(r"^  ([a-z]+)  ", capsys.readouterr().out, re.MULTILINE) == [*COMMANDS]
+
+
+def test_every_first_word_completes():
+    assert {"iteration", "effects", "all"} <= {*words_of("bench")} and "judge" in words_of("golden")
+    assert "moving-camera" in words_of("simulate") and "--stereo" in words_of("prepare")

@@ -31,7 +31,7 @@ class EvaluateOptions:
     label: Annotated[str, Option("TEXT")] = ""
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """EndoNeRF folder, or `simulated`; with RUN: its current location (default: the recorded one)"""
+    """sequence folder, or `simulated`; with RUN: its current location (default: the recorded one)"""
     json: Annotated[Path | None, Option("FILE")] = None
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE")] = None

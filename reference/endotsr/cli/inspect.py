@@ -24,7 +24,7 @@ class InspectOptions:
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)]
-    """EndoNeRF folder, or `simulated`"""
+    """sequence folder, or `simulated`"""
     out: Annotated[Path | None, Option("report.html")] = None
     """write a self-contained page with pictures"""
     json: Annotated[Path | None, Option("FILE")] = None
@@ -54,7 +54,7 @@ def run(words: list[str]) -> int:
     base, _ = base_settings(words)
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
     if not options.sequence:
-        raise InputError("inspect: SEQUENCE is missing: an EndoNeRF folder, or the word `simulated`")
+        raise InputError("inspect: SEQUENCE is missing: a sequence folder, or the word `simulated`")
     names = ("scale", "frames", "masks")
     config = with_short_names(options.settings, {name: getattr(options, name) for name in names})
     refuse_unwritable(options.out, options.json)

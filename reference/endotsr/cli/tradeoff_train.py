@@ -24,7 +24,7 @@ class TradeoffTrainOptions:
     """
 
     sequence: Annotated[str, Option("[SEQUENCE]", positional=True)] = SIMULATED
-    """EndoNeRF folder, or `simulated`"""
+    """sequence folder, or `simulated`"""
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
     minutes: float = 8.0

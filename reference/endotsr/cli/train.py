@@ -28,14 +28,14 @@ DEMONSTRATION = SimulatorSettings()
 
 @dataclass
 class TrainOptions:
-    """Train on an EndoNeRF folder (or on the word `simulated`), evaluate, and write a run folder.
+    """Train on a sequence folder (or on the word `simulated`), evaluate, and write a run folder.
 
     Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
     from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
-    """EndoNeRF folder, or `simulated`; with --resume the default is the sequence of the run"""
+    """sequence folder, or `simulated`; with --resume the default is the sequence of the run"""
     out: Annotated[Path | None, Option("RUN")] = None
     """run folder to create (required)"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
@@ -107,7 +107,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     from endotsr.runs.training import start_record, train_new_run
 
     if not options.sequence:
-        raise InputError("train: SEQUENCE is missing: an EndoNeRF folder, or the word `simulated`")
+        raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
     assert options.out is not None
     config, source = _settings(options), options.sequence
     refuse_existing(options.out)
