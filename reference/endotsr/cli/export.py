@@ -39,8 +39,9 @@ class ExportOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.export.files import Content, Times, export
+    from endotsr.export.files import Content, export
     from endotsr.export.scene import open_scene
+    from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
 
     options = parse(ExportOptions, words, "export")

@@ -55,7 +55,8 @@ def training_clip(sequence: Sequence) -> Clip:
     for k, i in enumerate(index):
         picture = sequence.images[i][:, :rows, :columns].reshape(3, height, side, width, side)
         images[k] = picture.mean(axis=(2, 4), dtype=np.float32) / np.float32(255)
-    masks = sequence.masks[index][:, :rows, :columns].reshape(-1, height, side, width, side).all(axis=(2, 4))
+    whole = sequence.masks[index][:, :rows, :columns].reshape(-1, height, side, width, side)
+    masks = np.logical_and.reduce(whole, axis=(2, 4))
     depth = sequence.depth[index][:, side // 2 : rows : side, side // 2 : columns : side]
     cameras = [sequence.cameras[i] for i in index]
     return Clip(images, masks, depth, sequence.times[index], cameras, side, sequence.count)

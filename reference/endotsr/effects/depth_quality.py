@@ -56,7 +56,7 @@ def temporal_flicker(clip: Clip) -> float:
     found = []
     for k in range(1, clip.count - 1):
         d = clip.depth[k - 1 : k + 2].astype(np.float64)
-        known = (d > 0).all(axis=0) & clip.masks[k - 1 : k + 2].all(axis=0)
+        known = np.logical_and.reduce((d > 0) & clip.masks[k - 1 : k + 2], axis=0)
         if not known.any() or abs(clip.times[k + 1] - 2 * clip.times[k] + clip.times[k - 1]) > 1e-9:
             continue
         over_time = np.median(np.abs((d[0] - 2 * d[1] + d[2])[known])) / (NORMAL_MAD * 6**0.5)

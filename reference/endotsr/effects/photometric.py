@@ -15,7 +15,7 @@ from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import Tracks
 from endotsr.effects.verdict import Curve, Map, Verdict
-from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.kernels.arrays import BoolArray, FloatArray, IndexArray
 
 DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside are not compared
 ALARM = 0.01
@@ -33,7 +33,7 @@ class Ratios(NamedTuple):
     values: FloatArray  # (m, 3, U) of the usable tiles, their mean over time removed
     noise: FloatArray  # (3, U) standard deviation that noise of the pixels explains
     level: FloatArray  # (U,) luminance of the tile, display units
-    tiles: FloatArray  # (U,) number of each tile in the grid
+    tiles: IndexArray  # (U,) number of each tile in the grid
 
 
 def photometric_verdict(clip: Clip, tracks: Tracks, noise: Noise, moving: bool) -> Verdict:

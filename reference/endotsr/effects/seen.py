@@ -1,10 +1,11 @@
 """Facts that need no estimate of motion: occluders in the masks, motion of the camera, and mirror highlights."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.effects.clip import Clip
 from endotsr.effects.verdict import Curve, Map, Verdict
-from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.arrays import BoolArray
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import camera_centre
 
@@ -52,7 +53,7 @@ def camera_verdict(sequence: Sequence, clip: Clip) -> Verdict:
 
 def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     """Saturated and colourless tissue pixels at full size."""
-    fractions, sums = [], np.zeros(sequence.images.shape[2:])
+    fractions, sums = [], np.zeros((sequence.height, sequence.width))
     for i in sequence.train_index:
         bright = highlights(sequence.images[i]) & sequence.masks[i]
         fractions.append(bright.sum() / max(int(sequence.masks[i].sum()), 1))
@@ -73,7 +74,7 @@ def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
                    Map("highlight, percent of the frames", 100 * picture / len(fraction)))  # fmt: skip
 
 
-def highlights(image: FloatArray) -> FloatArray:
+def highlights(image: NDArray[np.uint8]) -> BoolArray:
     """(3, H, W) uint8 to (H, W) bool: the largest channel above 0.98, the smallest within a tenth of it."""
     largest, smallest = image.max(axis=0).astype(np.float32), image.min(axis=0).astype(np.float32)
     return (largest > SATURATED * 255) & (largest - smallest < COLOURLESS * largest)

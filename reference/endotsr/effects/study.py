@@ -155,7 +155,8 @@ def _spoiled(sequence: Sequence, count: int, change: Callable[[np.ndarray], np.n
     for i in sequence.train_index[first : first + count]:
         images[i] = np.rint(change(images[i])).astype(np.uint8)
     fields: dict[str, Any] = {f.name: getattr(sequence, f.name) for f in dataclasses.fields(sequence) if f.init}
-    return Sequence(**(fields | {"images": images}))
+    fields["images"] = images
+    return Sequence(**fields)
 
 
 def answers(inspection: Inspection) -> dict[str, bool]:
