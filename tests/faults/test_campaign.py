@@ -1,4 +1,4 @@
-"""A short part of the fault campaign: one trial of each kind, at chosen operations. The whole: campaign.py."""
+"""A short part of the fault campaign, with `-m faults`: one trial of each kind. The whole: campaign.py."""
 
 import os
 

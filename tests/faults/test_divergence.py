@@ -12,6 +12,8 @@ from endotsr.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.runs.diverged import repeat_iteration
 from endotsr.scene.gaussians import Gaussians
 
+SLOW = pytest.mark.faults  # not by default
+
 
 def spoiled(monkeypatch, at, name, value=math.nan):
     """The gradient or the loss term `name` gets a value at iteration `at`."""
@@ -36,8 +38,11 @@ def spoiled(monkeypatch, at, name, value=math.nan):
         monkeypatch.setattr(trainer, "image_loss", spoil_loss)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-@pytest.mark.parametrize("name", ["d_position", "d_opacity_logit", "d_log_scale", "d_quaternion", "l1"])
+@pytest.mark.parametrize("value", [math.nan, pytest.param(math.inf, marks=SLOW)])
+@pytest.mark.parametrize(
+    "name",
+    [*("d_position", "l1"), *(pytest.param(n, marks=SLOW) for n in ("d_opacity_logit", "d_log_scale", "d_quaternion"))],
+)
 def test_the_iteration_stops_before_a_parameter_is_changed(name, value, trained, tmp_path, capsys, monkeypatch):
     out = tmp_path / "run"
     spoiled(monkeypatch, 17, name, value)

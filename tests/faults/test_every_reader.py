@@ -70,6 +70,9 @@ READERS = {
     "run/checkpoint.npz": ["calibrate", "{run}"],
 }
 
+SAME_READER = ("masks/000000.png", "depth/000008.png")  # as that of images/
+AS_IMAGES = pytest.mark.faults  # not by default
+
 
 @pytest.fixture
 def place(folder, run):
@@ -86,7 +89,7 @@ def place(folder, run):
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=AS_IMAGES) if n in SAME_READER else n for n in READERS])
 def test_every_fault_of_every_file_is_one_line(name, fault, place, tmp_path, capfd):
     if (name, fault) == ("settings.toml", "empty"):
         pytest.skip("an empty settings file asks for the preset")

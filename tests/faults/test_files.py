@@ -92,7 +92,8 @@ def test_every_piece_of_work_is_done_and_the_first_error_raised():
 
 
 STALLED = """
-import threading
+import signal, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where a shell runs the tests in the background
 from endotsr.untrusted.files import in_threads
 def work(k):
     print("waiting", flush=True)

@@ -168,13 +168,18 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
+    from endotsr.export.scene import RECORD
     from endotsr.export.times import Times
     from endotsr.runs.folder import RunFolder
     from endotsr.views.plan import Request, check_request, views_of
 
-    record = RunFolder(path.parent).sequence_record("names", "times", "train_index", "test_index")
-    for request in (Request(Times(frames="all")), Request(Times(count=3), camera="sway", size="20x20")):
+    folder = RunFolder(path.parent)
+    record = folder.sequence_record("names", "times", "train_index", "test_index")
+    requests = Request(Times(frames="all")), Request(Times(count=3), camera="sway", size="20x20")
+    for request in requests:
         check_request(request, record)
+    folder.sequence_record(*RECORD)  # as the model asks when it is loaded
+    for request in requests:
         for view in views_of(request, record, pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
