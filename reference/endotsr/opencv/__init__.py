@@ -56,14 +56,23 @@ def check_png_bytes(data: bytes, name: object) -> None:
 def decode_png(data: bytes, name: object) -> Array:
     """Pixels of a PNG held in memory; `name` is used in messages only. See `read_png`."""
     check_png_bytes(data, name)
-    data = pixels_only(data, name)
+    return decoded(pixels_only(data, name), name, "cannot be decoded as a PNG picture")
+
+
+def decoded(data: bytes, name: object, failure: str) -> Array:
+    """Pixels of a picture held in memory whose bytes were checked: (H, W) grey or (H, W, 3) RGB, in the stored type.
+
+    failure   words for a picture that OpenCV gives back as nothing
+
+    Raises:  InputError naming the picture.
+    """
     cv2 = _cv2()
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         raise InputError(f"{name}: cannot be decoded: {str(error).strip().splitlines()[-1]}") from None
     if pixels is None:
-        raise InputError(f"{name}: cannot be decoded as a PNG picture")
+        raise InputError(f"{name}: {failure}")
     if pixels.ndim == 3 and pixels.shape[2] == 1:
         pixels = pixels[:, :, 0]
     if pixels.ndim == 3:

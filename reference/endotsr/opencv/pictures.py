@@ -10,7 +10,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
-from endotsr.opencv import read_png
+from endotsr.opencv import decoded, read_png
 from endotsr.opencv.library import cv2_library
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.png import LARGEST_FILE
@@ -36,7 +36,7 @@ def read_picture(path: Path) -> Array:
         raise InputError(f"{path}: no picture by its name; allowed: .png, .jpg, .jpeg, .tif, .tiff, .exr")
     data = read_bytes(Path(path), LARGEST_FILE)
     _check_start_and_end(data, ending, path)
-    return _decoded(data, path)
+    return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
 
 
 def _check_start_and_end(data: bytes, ending: str, path: Path) -> None:
@@ -50,19 +50,6 @@ def _check_start_and_end(data: bytes, ending: str, path: Path) -> None:
     starts = TIFF_STARTS if ending in TIFF_ENDINGS else (EXR_START,)
     if ending not in JPEG_ENDINGS and not data.startswith(starts):
         raise InputError(f"{path}: not a {'TIFF' if ending in TIFF_ENDINGS else 'EXR'} file by its first bytes")
-
-
-def _decoded(data: bytes, path: Path) -> Array:
-    cv2 = cv2_library()
-    try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise InputError(f"{path}: cannot be decoded: {str(error).strip().splitlines()[-1]}") from None
-    if pixels is None:
-        raise InputError(f"{path}: cannot be decoded: the file is damaged, or this OpenCV lacks its format")
-    if pixels.ndim == 3 and pixels.shape[2] == 1:
-        pixels = pixels[:, :, 0]
-    return np.ascontiguousarray(pixels if pixels.ndim == 2 else pixels[:, :, 2::-1])
 
 
 def write_jpeg(path: Path, pixels: Array, quality: int = 95) -> None:
