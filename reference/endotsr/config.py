@@ -423,11 +423,16 @@ def _refuse_contradictions(config: Config, where: str) -> None:
 
 def config_to_toml(config: Config) -> str:
     """The resolved configuration as TOML text that `load_config` reads back to an equal Config."""
+    return toml_text(msgspec.to_builtins(config))
+
+
+def toml_text(data: dict[str, Any]) -> str:
+    """TOML of plain values and one level of sections; a key whose value is None is left out."""
     lines, sections = [], []
-    for key, value in msgspec.to_builtins(config).items():
+    for key, value in data.items():
         if isinstance(value, dict):
             sections += ["", f"[{key}]", *(f"{k} = {_toml_value(v)}" for k, v in value.items())]
-        else:
+        elif value is not None:
             lines.append(f"{key} = {_toml_value(value)}")
     return "\n".join(lines + sections) + "\n"
 
@@ -437,6 +442,8 @@ def _toml_value(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
+    if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
+        return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line a row
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml_value(v) for v in value) + "]"
     return repr(value)

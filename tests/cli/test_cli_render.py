@@ -7,7 +7,8 @@ import pytest
 from tiny import assert_refused
 
 from endotsr.cli.main import main
-from endotsr.opencv import read_png, read_video
+from endotsr.opencv import read_png
+from film_reader import read_video
 
 
 def render(run, out, *words):

@@ -97,6 +97,13 @@ def test_a_moving_camera_without_depth_leaves_motion_open():
     assert verdict.present and verdict.kind == "unknown"
 
 
+def test_a_moving_camera_without_depth_keeps_every_degree_and_gives_numbers():
+    sequence = clip("noise", "camera_motion")
+    verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["view change"]
+    assert verdict.present and verdict.kind == "unknown" and verdict.details["degree"] == 3
+    assert np.isfinite([verdict.statistic, verdict.details["angle_degrees"], *verdict.details["changes"]]).all()
+
+
 def test_depth_that_cannot_be_used_is_said():
     sequence = clip("noise")
     verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["depth quality"]

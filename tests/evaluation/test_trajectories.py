@@ -88,3 +88,16 @@ def on_the_sheet(still, frame: int) -> np.ndarray:
     x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx * depth
     y = ((np.arange(camera.height) + 0.5 - camera.cy) / camera.fy)[:, None] * depth
     return np.stack([x, y, depth])
+
+
+def test_pixels_without_a_material_point_are_left_out(still, model):
+    """A wound has no true position; the errors of the other pixels stay as they are."""
+
+    def true_positions(reference: int, frame: int) -> np.ndarray:
+        positions = on_the_sheet(still, reference) + (frame - reference) * SHIFT[:, None, None]
+        positions[:, 10:20, 10:20] = np.nan
+        return positions
+
+    error = trajectory_error(model, still, true_positions, [0])
+    assert error is not None
+    assert error.scene_units == pytest.approx(np.linalg.norm(SHIFT) * np.mean([1, 2, 3]))

@@ -13,7 +13,7 @@ from endotsr.effects.tracks import VISIBLE_FRAMES, Tracks, filled_tiles
 from endotsr.effects.verdict import Curve, Map, Verdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import backproject
+from endotsr.splatting.camera import backproject, project
 
 NULL_FACTOR = 2.0
 LEAST_MOTION = 0.05  # pixels of the full size
@@ -76,11 +76,8 @@ def camera_flow(sequence: Sequence, clip: Clip, tracks: Tracks) -> FloatArray:
     points = backproject(camera, u.ravel().astype(float), v.ravel().astype(float), depth.ravel())
     out = np.zeros_like(tracks.tiles)
     for k, other in enumerate(clip.cameras):
-        seen = other.rotation @ points + np.asarray(other.translation)[:, None]
-        with np.errstate(all="ignore"):
-            x = other.fx * seen[0] / seen[2] + other.cx - 0.5
-            y = other.fy * seen[1] / seen[2] + other.cy - 0.5
-        flow = np.stack([x.reshape(depth.shape) - u, y.reshape(depth.shape) - v])
+        x, y, _ = project(other, points)
+        flow = np.stack([(x - 0.5).reshape(depth.shape) - u, (y - 0.5).reshape(depth.shape) - v])
         known = tracks.valid[k] & (depth > 0) & np.isfinite(flow).all(axis=0)
         out[k] = tile_means(np.where(known, flow, 0.0), known)[0]
     return out

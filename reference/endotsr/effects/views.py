@@ -31,6 +31,10 @@ def view_verdict(sequence: Sequence, clip: Clip) -> Verdict:
                        "The camera is fixed: every point keeps one view direction.",
                        {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     directions = view_directions(clip)
+    if not len(directions):
+        return Verdict("view change", True, "unknown", LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
+                       "Without depth the view directions are not known; every degree is assumed.",
+                       {"degree": HIGHEST, "changes": [LEAST_CHANGE] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     changes = [float(np.median([band_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
     degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
     angle = float(np.degrees(np.median([_spread(d) for d in directions])))

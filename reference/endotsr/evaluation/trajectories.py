@@ -22,7 +22,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.runs.model import Model
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import Camera
+from endotsr.splatting.camera import Camera, project
 from endotsr.splatting.render import Scene, render_forward
 
 # (reference frame, frame) -> (3, H, W): where the points seen at the pixels of the first are at the second.
@@ -85,15 +85,10 @@ def _lengths(
     model: Model, sequence: Sequence, scenes: list[Scene], true_positions: TruePositions, reference: int, frame: int
 ) -> FloatArray:
     """(4, tissue pixels of the reference frame): the lengths that `TrajectoryError` names."""
-    tissue, camera = sequence.masks[reference], sequence.cameras[frame]
-    start, truth = (true_positions(reference, i)[:, tissue] for i in (reference, frame))
+    camera, positions = sequence.cameras[frame], [true_positions(reference, i) for i in (reference, frame)]
+    tissue = sequence.masks[reference] & np.isfinite(positions[0]).all(axis=0)  # a wound has no material point
+    start, truth = (position[:, tissue] for position in positions)
     moves = displacement(scenes[reference], scenes[frame], sequence.cameras[reference], model)[:, tissue]
-    place, still, moved = (_pixel(camera, point) for point in (truth, start, start + moves))
+    place, still, moved = (np.stack(project(camera, point)[:2]) for point in (truth, start, start + moves))
     lengths = (start + moves - truth, moved - place, truth - start, place - still)
     return np.stack([np.sqrt(np.square(vector).sum(axis=0)) for vector in lengths])
-
-
-def _pixel(camera: Camera, points: FloatArray) -> FloatArray:
-    """(3, P) world positions to (2, P) pixels."""
-    seen = camera.rotation @ points + np.asarray(camera.translation)[:, None]
-    return np.stack([camera.fx * seen[0] / seen[2] + camera.cx, camera.fy * seen[1] / seen[2] + camera.cy])

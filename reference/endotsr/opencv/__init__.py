@@ -1,4 +1,4 @@
-"""The only room that calls OpenCV: PNG files, films, Canny edges, flow, resizing; `video`, `stereo`, `pictures`.
+"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; `video`, `stereo`, `pictures`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
 (BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this room. `library`
@@ -6,11 +6,8 @@ imports `cv2` on first use, so that commands which read no picture start without
 room, except through the Canny edges, which are an input of the smoothness loss.
 """
 
-import contextlib
-import os
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -194,8 +191,18 @@ def warp_bilinear(image: Array, flow: Array) -> Array:
     Plain NumPy: OpenCV's own remap interpolates from a table of 1/32 pixel.
     """
     height, width = image.shape[-2:]
-    x = np.clip(np.arange(width)[None, :] + flow[0], 0, width - 1)
-    y = np.clip(np.arange(height)[:, None] + flow[1], 0, height - 1)
+    return sample_bilinear(image, np.arange(width)[None, :] + flow[0], np.arange(height)[:, None] + flow[1])
+
+
+def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
+    """image[..., y, x] by bilinear interpolation; outside, the nearest border value.
+
+    image    (..., H, W) float
+    x, y     columns and rows of one shape S; 0 = centre of the first pixel
+    returns  (..., S), dtype of the image
+    """
+    height, width = image.shape[-2:]
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
     left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
     right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
     across, down = (x - left).astype(image.dtype), (y - top).astype(image.dtype)
@@ -216,55 +223,3 @@ def area_resize(image: Array, width: int, height: int) -> Array:
         return image
     cv2 = _cv2()
     return cv2.resize(np.ascontiguousarray(image), (width, height), interpolation=cv2.INTER_AREA)
-
-
-def write_video(path: Path, pictures: Iterable[Array], rate: float) -> None:
-    """Write a film in the VP9 format; the ending of the name, .mp4 or .webm, chooses the container.
-
-    pictures  (H, W, 3) uint8 RGB, all of one size with even sides
-    rate      pictures a second
-    Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode VP9.
-    """
-    cv2, writer = _cv2(), None
-    try:
-        for picture in pictures:
-            if writer is None:
-                height, width = picture.shape[:2]
-                with _silent():  # the library warns of a tag that a webm file does not hold
-                    writer = cv2.VideoWriter(
-                        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), float(rate), (width, height)
-                    )
-                if not writer.isOpened():
-                    raise InputError(f"{path}: this build of OpenCV cannot encode the film; allowed: a name in .gif")
-            writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
-    finally:
-        if writer is not None:
-            writer.release()
-    if writer is None:
-        raise InputError(f"{path}: a film needs a picture")
-
-
-def read_video(path: Path) -> list[Array]:
-    """Every picture of a film, (H, W, 3) uint8 RGB. Raises: InputError if it cannot be read."""
-    cv2 = _cv2()
-    reader = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
-    found = []
-    while (read := reader.read())[0]:
-        found.append(np.ascontiguousarray(read[1][:, :, ::-1]))
-    reader.release()
-    if not found:
-        raise InputError(f"{path}: cannot be read as a film")
-    return found
-
-
-@contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """Nothing is written to the standard error of the process, by libraries in C either, during the block."""
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)

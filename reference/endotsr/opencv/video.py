@@ -1,10 +1,12 @@
-"""Video files: what a file holds, and its pictures in order.
+"""Video files: what a file holds, its pictures in order, and the writing of a film.
 
 Comes in: a path and the numbers of the wanted pictures, ascending; goes out: RGB pictures one by one. A video is
 decoded from its start: seeking by number is inexact for most codecs.
 """
 
-from collections.abc import Iterator
+import contextlib
+import os
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import Array
 from endotsr.opencv.library import cv2_library
 
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv")
@@ -76,3 +79,42 @@ def _opened(path: Path):
 
 def _ended(path: Path, position: int) -> InputError:
     return InputError(f"{path}: the video ends after {position} pictures: it is truncated or damaged")
+
+
+def write_video(path: Path, pictures: Iterable[Array], rate: float) -> None:
+    """Write a film in the VP9 format; the ending of the name, .mp4 or .webm, chooses the container.
+
+    pictures  (H, W, 3) uint8 RGB, all of one size with even sides
+    rate      pictures a second
+    Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode VP9.
+    """
+    cv2, writer = cv2_library(), None
+    try:
+        for picture in pictures:
+            if writer is None:
+                height, width = picture.shape[:2]
+                with _silent():  # the library warns of a tag that a webm file does not hold
+                    writer = cv2.VideoWriter(
+                        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), float(rate), (width, height)
+                    )
+                if not writer.isOpened():
+                    raise InputError(f"{path}: this build of OpenCV cannot encode the film; allowed: a name in .gif")
+            writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+    finally:
+        if writer is not None:
+            writer.release()
+    if writer is None:
+        raise InputError(f"{path}: a film needs a picture")
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Nothing is written to the standard error of the process, by libraries in C either, during the block."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

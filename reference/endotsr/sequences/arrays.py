@@ -18,15 +18,18 @@ PFM_HEADER = re.compile(rb"(P[Ff])\s+(\d{1,6})\s+(\d{1,6})\s+(-?\d*\.?\d+(?:[eE]
 ALLOWED = "allowed: an .npy file of numbers"
 
 
-def read_npy(path: Path) -> NDArray:
+def read_npy(path: Path, largest: int = LARGEST_FILE, allowed: str = ALLOWED) -> NDArray:
     """The array of an .npy file. Pickled objects are never loaded.
+
+    largest  bytes that the file may have
+    allowed  what the message says of the files that can be read
 
     Raises:  InputError if the file is missing, no .npy file, truncated, or holds anything but real numbers.
     """
     try:
-        array = untrusted.read_npy(Path(path), LARGEST_FILE)
+        array = untrusted.read_npy(Path(path), largest)
     except InputError as error:
-        raise InputError(f"{error}; {ALLOWED}") from None
+        raise InputError(f"{error}; {allowed}") from None
     if array.dtype.kind not in "fiu":
         raise InputError(f"{path}: not one array of real numbers")
     return array

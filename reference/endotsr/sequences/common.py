@@ -6,7 +6,6 @@ the units; `sequence.excluded_value` does not apply.
 """
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,12 +19,13 @@ from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_depth
 from endotsr.sequences.checks.cost import refuse_too_large
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
-from endotsr.sequences.masks import threshold_masks
+from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.recording import Pair, Pose, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.sequences.splits import parse_frame_range, split_frames
 from endotsr.splatting.camera import Camera
+from endotsr.untrusted.files import in_threads
 
 
 class Contents(NamedTuple):
@@ -168,14 +168,13 @@ def _read_frames(
         types[i] = raw.dtype
         depth[i] = clip_depth(depth_plane(raw, scale, contents.depth[i]), config.depth_percentiles)
 
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(read_frame, range(n)))  # the list raises the error of the first frame with one
+    in_threads(read_frame, n)
     check_depth_scale(depth, contents.depth, types, entry.unit)
     if not contents.masks:
         return images, np.ones((n, height, width), bool), depth
-    white = threshold_masks(masks, [str(file) for file in contents.masks], notes)
     assert contents.file.masks is not None
-    return images, ~white if contents.file.masks.excluded_value == "white" else white, depth
+    names = [str(file) for file in contents.masks]
+    return images, tissue_masks(masks, names, contents.file.masks.excluded_value, notes), depth
 
 
 def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:
@@ -206,8 +205,7 @@ def open_common(folder: Path) -> Recording:
         assert found.masks is not None
         path = contents.masks[i]
         plane = grey_plane(_sized(contents, read_picture(path), path), path)
-        white = threshold_masks([plane], [str(path)], [])[0]
-        return ~white if found.masks.excluded_value == "white" else white
+        return tissue_masks([plane], [str(path)], found.masks.excluded_value)[0]
 
     def depth(i: int) -> NDArray[np.float32]:
         path = contents.depth[i]

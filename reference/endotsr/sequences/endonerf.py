@@ -30,7 +30,7 @@ from endotsr.sequences.assemble import (
 from endotsr.sequences.checks.cost import refuse_too_large
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
-from endotsr.sequences.masks import threshold_masks
+from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
@@ -192,8 +192,7 @@ def _tissue(
     """True = tissue, (n, H, W); everywhere without masks."""
     if not files.masks:
         return np.ones(shape, bool)
-    white = threshold_masks(masks, [str(file) for file in files.masks], notes)
-    return ~white if config.excluded_value == "white" else white
+    return tissue_masks(masks, [str(file) for file in files.masks], config.excluded_value, notes)
 
 
 def _sized(pixels: NDArray, path: Path, width: int, height: int) -> NDArray:

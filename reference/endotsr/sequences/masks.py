@@ -63,6 +63,17 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
     return result
 
 
+def tissue_masks(
+    raw: list[NDArray], names: list[str], excluded_value: str, notes: list[str] | None = None
+) -> NDArray[np.bool_]:
+    """Tissue masks (n, H, W), True = tissue, from mask pictures as `threshold_masks` takes them.
+
+    excluded_value   `white` or `black`: the value of the pixels that are no tissue
+    """
+    white = threshold_masks(raw, names, [] if notes is None else notes)
+    return ~white if excluded_value == "white" else white
+
+
 def check_tissue_fraction(masks: NDArray[np.bool_], where: str, excluded_value: str, allow: bool) -> float:
     """The tissue fraction of all frames, refused below 5 % and at exactly 100 % unless `allow`.
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.sequences.arrays import read_npy
 from endotsr.splatting.camera import Camera, camera_centre
-from endotsr.untrusted.arrays import read_npy
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames
@@ -36,12 +36,7 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
 
     Raises:  InputError naming the file, the frame (row) and the reason. Pickled objects are never loaded.
     """
-    try:
-        rows = read_npy(path, LARGEST_POSES)
-    except InputError as error:
-        raise InputError(f"{error}; {ALLOWED_POSES}") from None
-    if rows.dtype.kind not in "fiu":
-        raise InputError(f"{path}: not one array of real numbers")
+    rows = read_npy(path, LARGEST_POSES, ALLOWED_POSES)
     if rows.ndim != 2 or rows.shape[1] != 17:
         raise InputError(f"{path}: shape {rows.shape}, expected (frames, 17)")
     if len(rows) != count:

@@ -37,7 +37,7 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.config import Section, checked, read_toml, refuse_unknown_keys
+from endotsr.config import Section, checked, read_toml, refuse_unknown_keys, toml_text
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Lens, Pose, checked_lens
@@ -221,22 +221,4 @@ def write_sequence_file(found: SequenceFile, folder: Path) -> None:
 
 def sequence_text(found: SequenceFile) -> str:
     """The TOML text."""
-    lines, sections = [], []
-    for key, value in msgspec.to_builtins(found).items():
-        if isinstance(value, dict):
-            sections += ["", f"[{key}]", *(f"{name} = {_toml(entry)}" for name, entry in value.items())]
-        elif value is not None:
-            lines.append(f"{key} = {_toml(value)}")
-    return "\n".join(lines + sections) + "\n"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
-    if isinstance(value, list) and value and isinstance(value[0], list):
-        return "[\n" + "".join(f"    {_toml(row)},\n" for row in value) + "]"
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml(entry) for entry in value) + "]"
-    return repr(value)
+    return toml_text(msgspec.to_builtins(found))

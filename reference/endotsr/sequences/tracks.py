@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.between import CONSISTENT, TOLERANCE, WHOLE, Flows, flows_between
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import Camera, backproject
+from endotsr.splatting.camera import Camera, backproject, project
 
+OUTSIDE = -1e6  # column and row of a point behind the camera
 BoolArray = NDArray[np.bool_]
 
 DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface
@@ -113,22 +114,15 @@ def _near(depth: FloatArray, expected: FloatArray, fraction: float) -> BoolArray
 
 def _project(camera: Camera, position: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Column and row (2, P), 0 = centre of the first pixel, and depth (P,)."""
-    seen = camera.rotation @ position + np.asarray(camera.translation)[:, None]
-    depth = np.where(seen[2] > 0, seen[2], np.nan)
-    u, v = camera.fx * seen[0] / depth + camera.cx, camera.fy * seen[1] / depth + camera.cy
-    return np.nan_to_num(np.stack([u, v]) - 0.5, nan=-1e6), seen[2]
+    u, v, depth = project(camera, position)
+    return np.where(depth > 0, np.stack([u, v]) - 0.5, OUTSIDE), depth
 
 
 def _sampled(planes: FloatArray, pixel: FloatArray) -> FloatArray:
-    """(C, H, W) bilinearly at (2, P) columns and rows; outside, the nearest border value. (C, P)."""
-    height, width = planes.shape[-2:]
-    x, y = np.clip(pixel[0], 0, width - 1), np.clip(pixel[1], 0, height - 1)
-    left, top = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    across, down = x - left, y - top
-    upper = planes[:, top, left] * (1 - across) + planes[:, top, right] * across
-    lower = planes[:, bottom, left] * (1 - across) + planes[:, bottom, right] * across
-    return upper * (1 - down) + lower * down
+    """(C, H, W) bilinearly at (2, P) columns and rows, in float64; outside, the nearest border value. (C, P)."""
+    from endotsr.opencv import sample_bilinear
+
+    return sample_bilinear(planes.astype(np.float64), *pixel)
 
 
 def _lifted(sequence: Sequence, frame: int, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -44,6 +44,17 @@ def scale_camera(camera: Camera, width: int, height: int) -> Camera:
     )
 
 
+def project(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Image position (u, v) in pixels and view depth z of world positions (3, M); each (M,).
+
+    The inverse of `backproject`, whose column and row are u - 1/2 and v - 1/2.
+    Edges:   a point with z <= 0 is not in front of the camera: its z is returned as it is, and (u, v) is no position.
+    """
+    x, y, z = camera.rotation @ points + np.asarray(camera.translation)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy, z
+
+
 def backproject(camera: Camera, column: FloatArray, row: FloatArray, depth: FloatArray) -> FloatArray:
     """World positions of pixel centres at view depth `depth` (z > 0, scene units).
 

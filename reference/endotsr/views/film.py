@@ -55,7 +55,7 @@ class _Counted:
 
 
 def _write_video(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
-    from endotsr.opencv import write_video
+    from endotsr.opencv.video import write_video
 
     write_video(file, (_even(picture) for picture in pictures), rate)
 

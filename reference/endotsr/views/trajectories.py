@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.equations.exposure import exposure_forward
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.sources import nearest_frame, remembered_cameras
@@ -69,7 +70,7 @@ def _moment(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bo
     colour = harmonics_forward(moment.harmonics, moment.residual, moment.position, camera_centre(camera), degree)[0]
     exposure = exposure_at(scene.model.frames, time)
     if exposure is not None:
-        colour = colour * np.exp(exposure.log_gain)[:, None] + exposure.bias[:, None]
+        colour = exposure_forward(colour[:, None], exposure.log_gain, exposure.bias)[0][:, 0]
     norm = np.maximum(np.linalg.norm(moment.quaternion, axis=0), 1e-12)
     values = np.concatenate([moment.position, moment.log_scale, colour])
     return values[:, seen], (moment.quaternion / norm)[:, seen]

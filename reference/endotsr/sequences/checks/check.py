@@ -22,7 +22,7 @@ from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findi
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.files import check_pairing
-from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, threshold_masks
+from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sources import beside
 from endotsr.sequences.splits import parse_frame_range, split_frames
@@ -149,10 +149,8 @@ def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, 
         if plane is not None:
             run.findings.append(_other_size(file, i, plane.shape, size))
         return None
-    white = run.tried(lambda: threshold_masks([plane], [str(file)], []), "mask-values", file, "store two values", i)
-    if white is None:
-        return None
-    return ~white[0] if parts.excluded_value == "white" else white[0]
+    read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
+    return run.tried(read, "mask-values", file, "store two values", i)
 
 
 def _depth(

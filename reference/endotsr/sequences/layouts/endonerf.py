@@ -12,7 +12,7 @@ from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.endonerf import UNIT, input_hashes, read_endonerf, select_files
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.masks import threshold_masks
+from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import POSE_FILES, cameras_from_rows, read_pose_rows
 from endotsr.sequences.recording import Lens, Pair, Pose, Recording, colour_picture, grey_plane
 from endotsr.sequences.source_options import SourceOptions
@@ -43,8 +43,7 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
 
     def mask(i: int) -> NDArray[np.bool_]:
         plane = grey_plane(read_picture(files.masks[i]), files.masks[i])
-        white = threshold_masks([plane], [str(files.masks[i])], [])[0]
-        return ~white if options.excluded_value == "white" else white
+        return tissue_masks([plane], [str(files.masks[i])], options.excluded_value)[0]
 
     first = cameras[0]
     return Recording(
