@@ -1,19 +1,19 @@
 """Train presets on simulated scenes whose true motion is known, over seeds, and write the table of the errors.
 
-    python docs/results/trajectories.py [--seeds 3] [--iterations 1500] [--table]
+    python docs/pages/trajectories.py [--seeds 3] [--iterations 1500] [--table]
 
 Every scene is trained with `paper` and `sharp`, both stretched to the same number of iterations and with the points of
-`demo`. The result is docs/results/trajectories.json; the table stands in docs/results/README.md between the
-`trajectories:start` and `trajectories:end` marks. --table writes the table of the last result again.
+`demo`. The result is docs/results/trajectories.json; the table stands in docs/results/README.md between
+its marks. --table writes the table of the last result again.
 """
 
 import argparse
-import json
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from marks import read_json, write_marked
 
 import endotsr
 from endotsr.config import DEMO
@@ -21,8 +21,7 @@ from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 
-FOLDER = Path(__file__).parent
-START, END = "<!-- trajectories:start (made by docs/results/trajectories.py) -->", "<!-- trajectories:end -->"
+RESULTS = Path(__file__).parents[1] / "results"
 SCENES: dict[str, dict[str, Any]] = {
     "demo": {},
     "pull and breath": {
@@ -40,14 +39,21 @@ SHOWN = (
 )
 
 
-def measured(scene: dict[str, Any], preset: str, seed: int, iterations: int) -> dict[str, float]:
-    """Train one preset on one scene, and measure it."""
+def measured(
+    scene: dict[str, Any], preset: str, seed: int, iterations: int, changed: dict[str, dict[str, Any]] | None = None
+) -> dict[str, float]:
+    """Train one preset, with settings changed by section, on one scene, and measure it."""
     sequence = endotsr.load_sequence("simulated", simulator=scene)
-    points = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
-    threshold = {"gradient_threshold": DEMO.density.gradient_threshold}
-    config = endotsr.make_config(
-        preset, iterations=iterations, training={"seed": seed}, initialisation=points, density=threshold
-    )
+    sections: dict[str, dict[str, Any]] = {
+        "training": {"seed": seed},
+        "initialisation": {
+            key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")
+        },
+        "density": {"gradient_threshold": DEMO.density.gradient_threshold},
+    }
+    for section, values in (changed or {}).items():
+        sections[section] = sections.get(section, {}) | values
+    config = endotsr.make_config(preset, iterations=iterations, **sections)
     metrics = endotsr.train(sequence, config, on_message=lambda text: None).evaluate()
     return metrics["trajectories"] | {
         "psnr_tissue": metrics["held_out"]["mean"]["psnr_tissue"],
@@ -83,7 +89,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=1500)
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
-    file = FOLDER / "trajectories.json"
+    file = RESULTS / "trajectories.json"
     if not options.table:
         scenes = {
             name: {p: [measured(scene, p, s, options.iterations) for s in range(options.seeds)] for p in PRESETS}
@@ -91,11 +97,7 @@ def main() -> None:
         }
         about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
         write_json(file, about | {"machine": machine(), "scenes": scenes})
-    page = FOLDER / "README.md"
-    head, _, rest = page.read_text(encoding="utf-8").partition("<!-- trajectories:start")
-    tail = rest.partition(END)[2]
-    text = table(json.loads(file.read_text(encoding="utf-8")))
-    page.write_text(f"{head}{START}\n{text}\n{END}{tail}", encoding="utf-8")
+    write_marked(RESULTS / "README.md", {"table": table(read_json(file, "docs/pages/trajectories.py"))}, "trajectories")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,129 @@
+"""Where a run is better and where it is worse than optical flow between the frames: by held-out frame, and by pixels.
+
+    python docs/pages/against_flow.py RUN NAME   write docs/results/NAME.json from a finished run, then the tables
+    python docs/pages/against_flow.py NAME       write the tables of the last result again
+
+The squared error of the tissue pixels is divided among kinds of pixels; a pixel belongs to the first kind that fits.
+The tables stand in docs/results/README.md between its marks.
+"""
+
+import argparse
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from marks import read_json, write_marked
+from numpy.typing import NDArray
+
+import endotsr
+from endotsr.evaluation.baselines import flow_interpolation, neighbours, unit_image
+from endotsr.report.tables import markdown
+from endotsr.runs.files import write_json
+from endotsr.sequences.between import flows_between
+from endotsr.sequences.sequence import Sequence
+
+RESULTS = Path(__file__).parents[1] / "results"
+BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a neighbour
+NEAR = 8  # px from an excluded pixel or from the border of the picture
+STEEP = 0.9  # quantile of the gradient over the tissue of a frame
+KINDS = {
+    "highlight": "highlights, here or in a neighbouring frame",
+    "mask": f"within {NEAR} px of an excluded pixel",
+    "border": f"within {NEAR} px of the border of the picture",
+    "steep": "the steepest tenth of the rest",
+    "plain": "all other pixels",
+}
+
+
+def kinds(sequence: Sequence, index: int) -> dict[str, NDArray[np.bool_]]:
+    """Disjoint masks (H, W) of the tissue pixels of a frame, in the order of `KINDS`."""
+    import cv2
+
+    near, tissue = neighbours(sequence, index), sequence.masks[index]
+    frames = sequence.images[[index, near.before, near.after]]
+    found = {"highlight": (frames.max(axis=1) >= BRIGHT).any(axis=0)}
+    apart = cv2.distanceTransform(tissue.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    found["mask"] = apart <= NEAR
+    inner = np.zeros_like(tissue)
+    inner[NEAR:-NEAR, NEAR:-NEAR] = True
+    found["border"] = ~inner
+    grey = cv2.GaussianBlur(sequence.images[index].mean(axis=0, dtype=np.float32), (0, 0), 1.0)
+    slope = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1))
+    found["steep"] = slope >= np.quantile(slope[tissue], STEEP)
+    found["plain"] = np.ones_like(tissue)
+    left, out = tissue.copy(), {}
+    for name in KINDS:
+        out[name] = left & found[name]
+        left = left & ~found[name]
+    return out
+
+
+def measured(run: Path) -> dict[str, Any]:
+    """Sums of squared errors of model and flow, by frame and by kind of pixel."""
+    finished = endotsr.open_run(run)
+    sequence = finished.sequence
+    frames, total = [], {name: np.zeros(3) for name in KINDS}
+    for index in (int(i) for i in sequence.test_index):
+        truth, colour = unit_image(sequence, index), finished.render(float(sequence.times[index]), index).colour
+        errors = [
+            np.square(np.clip(picture, 0, 1) - truth).mean(axis=0, dtype=np.float64)
+            for picture in (colour, flow_interpolation(sequence, index))
+        ]
+        for name, mask in kinds(sequence, index).items():
+            total[name] += [mask.sum(), *(error[mask].sum() for error in errors)]
+        frames.append(_frame(sequence, index, errors))
+    columns = ("pixels", "model", "flow")
+    pixels = {name: dict(zip(columns, map(float, sums), strict=True)) for name, sums in total.items()}
+    clip = Path(finished.record["input"]["source"]).name
+    return {"date": date.today().isoformat(), "sequence": clip, "frames": frames, "pixels": pixels}
+
+
+def _frame(sequence: Sequence, index: int, errors: list[NDArray[np.floating]]) -> dict[str, Any]:
+    """PSNR over the tissue of one frame, and how far the tissue moves between its neighbours."""
+    near, tissue = neighbours(sequence, index), sequence.masks[index]
+    flow = flows_between(sequence, near.before, near.after).forward
+    model, other = (float(-10 * np.log10(error[tissue].mean())) for error in errors)
+    moved = float(np.hypot(*flow)[tissue].mean())
+    return {"frame": index, "motion_px": moved, "model": model, "flow": other}
+
+
+def tables(result: dict[str, Any]) -> str:
+    """Both tables, frames sorted by their motion."""
+    values = ("motion_px", "model", "flow")
+    frames = sorted(result["frames"], key=lambda row: row["motion_px"])
+    by_frame = [
+        [str(row["frame"]), *(f"{row[key]:.2f}" for key in values), f"{row['model'] - row['flow']:+.2f}"]
+        for row in frames
+    ]
+    sums = {key: sum(row[key] for row in result["pixels"].values()) for key in ("pixels", "model", "flow")}
+    by_kind = []
+    for name, row in result["pixels"].items():
+        more = (row["model"] - row["flow"]) / sums["flow"]
+        share = [f"{row[key] / sums[key]:.1%}".replace("%", " %") for key in ("pixels", "model", "flow")]
+        by_kind.append([KINDS[name], *share, f"{more:+.1%}".replace("%", " %")])
+    head = ["Frame", "motion between its neighbours, px", "model, dB", "flow, dB", "difference, dB"]
+    other = ["Tissue pixels", "of the pixels", "of the model's error", "of the error of flow", "model minus flow"]
+    return (
+        markdown(head, by_frame) + "\n\n" + markdown(other, by_kind) + "\n\n"
+        "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
+        f"squared error of flow. {result['sequence']}, {result['date']}."
+    )
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("run", nargs="?", type=Path)
+    parser.add_argument("name")
+    options = parser.parse_args()
+    file = RESULTS / f"{options.name}.json"
+    if options.run:
+        write_json(file, measured(options.run))
+    write_marked(
+        RESULTS / "README.md", {"table": tables(read_json(file, "docs/pages/against_flow.py RUN NAME"))}, "against_flow"
+    )
+
+
+if __name__ == "__main__":
+    main()
