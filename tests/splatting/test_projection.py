@@ -21,7 +21,7 @@ from made_up_scenes import (
 )
 from scipy.spatial.transform import Rotation
 
-from endotsr.splatting.camera import Camera, backproject, camera_centre, scale_camera
+from endotsr.splatting.camera import Camera, backproject, camera_centre, project, scale_camera
 from endotsr.splatting.covariance import (
     Shape,
     covariance_forward,
@@ -270,6 +270,24 @@ def test_hard_P3_project_of_backproject_is_the_pixel_centre(width, height):
     half = scale_camera(camera, 2 * width, 2 * height)
     out2, _ = projection_forward(position, shape, half, PAPER)
     np.testing.assert_allclose(out2.mean2d, 2 * out.mean2d, rtol=1e-12, atol=1e-11)
+
+
+def test_the_position_of_points_is_that_of_the_projection_kernel_and_of_backprojection():
+    camera = turned_camera(65, 47, 40.0)._replace(fy=44.0, cx=30.0, cy=25.5, translation=np.array([0.3, -0.2, 0.5]))
+    rng = np.random.default_rng(11)
+    column, row, depth = rng.integers(0, 65, 50), rng.integers(0, 47, 50), rng.uniform(0.5, 200, 50)
+    position = backproject(camera, column, row, depth)
+    u, v, z = project(camera, position)
+    np.testing.assert_allclose([u, v, z], [column + 0.5, row + 0.5, depth], rtol=1e-11)
+    shape, _ = covariance_forward(np.ones((4, 50)), np.zeros((3, 50)))
+    out, _ = projection_forward(position, shape, camera, PAPER)
+    np.testing.assert_allclose([u, v], out.mean2d, rtol=1e-12)
+
+
+def test_a_point_behind_the_camera_keeps_its_depth():
+    camera = plain_camera(33, 29, 25.0)
+    _, _, z = project(camera, np.array([[0.1, 0.1], [0.2, 0.2], [-3.0, 0.0]]))
+    assert z.tolist() == [-3.0, 0.0]
 
 
 def test_hard_P4_no_epsilon_is_added_to_the_depth():
