@@ -28,6 +28,7 @@ BRIGHT = 250  # of 255: the largest channel of a highlight, in the frame or in a
 NEAR = 8  # px from an excluded pixel or from the border of the picture
 STEEP = 0.9  # quantile of the gradient over the tissue of a frame
 KINDS = {
+    "excluded": "excluded in a neighbouring training frame: flow reads them, the model does not",
     "highlight": "highlights, here or in a neighbouring frame",
     "mask": f"within {NEAR} px of an excluded pixel",
     "border": f"within {NEAR} px of the border of the picture",
@@ -42,7 +43,8 @@ def kinds(sequence: Sequence, index: int) -> dict[str, NDArray[np.bool_]]:
 
     near, tissue = neighbours(sequence, index), sequence.masks[index]
     frames = sequence.images[[index, near.before, near.after]]
-    found = {"highlight": (frames.max(axis=1) >= BRIGHT).any(axis=0)}
+    found = {"excluded": ~(sequence.masks[near.before] & sequence.masks[near.after])}
+    found["highlight"] = (frames.max(axis=1) >= BRIGHT).any(axis=0)
     apart = cv2.distanceTransform(tissue.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     found["mask"] = apart <= NEAR
     inner = np.zeros_like(tissue)
@@ -99,6 +101,8 @@ def tables(result: dict[str, Any]) -> str:
     sums = {key: sum(row[key] for row in result["pixels"].values()) for key in ("pixels", "model", "flow")}
     by_kind = []
     for name, row in result["pixels"].items():
+        if not row["pixels"]:
+            continue
         more = (row["model"] - row["flow"]) / sums["flow"]
         share = [f"{row[key] / sums[key]:.1%}".replace("%", " %") for key in ("pixels", "model", "flow")]
         by_kind.append([KINDS[name], *share, f"{more:+.1%}".replace("%", " %")])

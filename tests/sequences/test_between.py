@@ -72,7 +72,7 @@ def test_exchanged_frames_give_the_same_picture():
     a, b = frame_between(sequence, 0, 1, 0.25, there), frame_between(sequence, 1, 0, 0.75, back)
     np.testing.assert_allclose(a.image, b.image, atol=1e-5)
     assert np.array_equal(a.mask, b.mask)
-    np.testing.assert_allclose(motion_between(there, 0.25).field, -motion_between(back, 0.75).field, atol=1e-5)
+    np.testing.assert_allclose(motion_between(there, 0.25), -motion_between(back, 0.75), atol=1e-5)
 
 
 def test_the_field_is_that_of_the_point_at_the_moment():
@@ -81,38 +81,63 @@ def test_the_field_is_that_of_the_point_at_the_moment():
     x = np.arange(WIDTH, dtype=np.float32)[None, :] * np.ones((HEIGHT, 1), np.float32)
     forward = np.stack([stretch * x, 0 * x])
     backward = np.stack([-stretch * x / (1 + stretch), 0 * x])
-    motion = motion_between(Flows(forward, backward), fraction)
+    field = motion_between(Flows(forward, backward), fraction)
     exact = stretch * x / (1 + fraction * stretch)
-    np.testing.assert_allclose(motion.field[0][:, :80], exact[:, :80], atol=2e-3)
-    assert motion.consistent[:, :80].all()
+    np.testing.assert_allclose(field[0][:, :80], exact[:, :80], atol=2e-3)
 
 
-def test_flows_that_disagree_are_no_target():
-    flows = constant(4.0)
-    flows.backward[0, 20:40, 30:60] = 2.0  # says that these points moved the other way
-    motion = motion_between(flows, 0.5)
-    assert not motion.consistent[24:36, 40:50].any()
-    assert motion.consistent[60:, :].all()
-    mask = frame_between(two_frames(4.0), 0, 1, 0.5, flows).mask
-    assert not mask[24:36, 40:50].any() and mask[60:].all()
+def test_a_flow_that_the_pictures_contradict_gives_way_to_the_still_blend():
+    sequence = two_frames(0.0)
+    sequence.images[1, :, :48] = picture(8.0)[:, :48].round().astype(np.uint8)  # the upper half moves
+    frame = frame_between(sequence, 0, 1, 0.5, constant(8.0))
+    upper, lower = np.s_[:, 12:40, 16:-16], np.s_[:, 60:-12, 16:-16]
+    assert np.abs(frame.image - picture(4.0) / 255)[upper].mean() < 0.01
+    assert np.abs(frame.image - picture(0.0) / 255)[lower].mean() < 0.01
+    blurred = (picture(4.0) + picture(-4.0)) / 2  # the two frames, both moved by the wrong flow
+    assert np.abs(blurred - picture(0.0))[lower].mean() / 255 > 0.04
+
+
+def test_pairs_that_differ_equally_count_equally():
+    """Stripes of 16 px, black and white at first and 0.4 and 0.6 later: at rest and half a period on."""
+    sequence = two_frames(0.0)
+    stripe = np.arange(WIDTH) // 16 % 2
+    sequence.images[0], sequence.images[1] = np.where(stripe, 255, 0), np.where(stripe, 153, 102)
+    still = 0.5 * np.where(stripe, 1.0 + 0.6, 0.0 + 0.4)
+    moved = 0.5 * np.where(np.roll(stripe, 8), 1.0 + 0.4, 0.0 + 0.6)
+    frame = frame_between(sequence, 0, 1, 0.5, constant(16.0))
+    one_step = 1 / 255**2
+    of_still, of_moved = 0.4**2 + one_step, 0.6**2 + one_step  # at rest white meets 0.6, moved it meets 0.4
+    expected = (of_moved * still + of_still * moved) / (of_moved + of_still)
+    np.testing.assert_allclose(frame.image[0, 40, 40:-40], expected[40:-40], atol=0.02)
 
 
 @pytest.mark.parametrize("covered", [0, 1])
-def test_what_either_frame_excludes_is_excluded_where_it_moves_to(covered):
+def test_what_one_frame_excludes_is_made_of_the_other(covered):
     mask = np.ones((2, HEIGHT, WIDTH), bool)
     mask[covered, 30:50, 40:60] = False
-    frame = frame_between(two_frames(4.0, mask), 0, 1, 0.5, constant(4.0))
-    left = 42 if covered == 0 else 38
-    expected = np.ones((HEIGHT, WIDTH), bool)
-    expected[30:50, left : left + 20] = False
-    assert np.array_equal(frame.mask[:, 8:-8], expected[:, 8:-8])
-
-
-def test_depth_is_missing_where_one_frame_has_none():
-    sequence = two_frames(4.0)
-    sequence.depth[0, :, :20] = 0
+    sequence = two_frames(4.0, mask)
+    sequence.images[covered, :, 30:50, 40:60] = 255  # an instrument
     frame = frame_between(sequence, 0, 1, 0.5, constant(4.0))
-    assert not frame.depth[:, :21].any() and (frame.depth[:, 24:] == 5).all()
+    assert frame.mask[:, 8:-8].all()
+    left = 42 if covered == 0 else 38
+    hidden = np.s_[:, 32:48, left + 2 : left + 18]
+    np.testing.assert_allclose(frame.image[hidden], picture(2.0)[hidden] / 255, atol=0.01)
+
+
+def test_what_both_frames_exclude_is_no_target():
+    mask = np.ones((2, HEIGHT, WIDTH), bool)
+    mask[:, 30:50, 40:60] = False
+    frame = frame_between(two_frames(0.0, mask), 0, 1, 0.5, constant(0.0))
+    assert np.array_equal(frame.mask, mask[0])
+
+
+def test_depth_is_that_of_the_frame_that_has_one():
+    sequence = two_frames(4.0)
+    sequence.depth[0, :, :20], sequence.depth[1, :, 20:] = 0, 6.0
+    sequence.depth[1, 10:20, 60:80], sequence.depth[0, 10:20, 60:80] = 0, 0
+    frame = frame_between(sequence, 0, 1, 0.5, constant(4.0))
+    assert (frame.depth[:, 4:17] == 5).all() and np.allclose(frame.depth[30:, 24:-8], 5.5)
+    assert not frame.depth[11:19, 64:76].any()
 
 
 def test_held_out_pictures_are_not_read():

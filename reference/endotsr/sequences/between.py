@@ -2,12 +2,12 @@
 
 With the flows f from the earlier frame to the later and g back, the motion field at the moment a in [0, 1] solves
 
-    v_0(x) = f(x - a v_0(x)),    v_1(x) = -g(x + (1 - a) v_1(x)),    v = (1 - a) v_0 + a v_1,
+    v_0(x) = f(x - a v_0(x)),    v_1(x) = -g(x + (1 - a) v_1(x)),    v = (1 - a) v_0 + a v_1.
 
-and the picture is I_a(x) = (1 - a) I_0(x - a v(x)) + a I_1(x + (1 - a) v(x)), depth likewise. A pixel counts as tissue
-where both frames are tissue at the two places and the two fields agree (forward-backward consistency):
-
-    |v_0 - v_1|^2 <= CONSISTENT (|v_0|^2 + |v_1|^2) + TOLERANCE.
+A pixel x shows either the pair that moved, I_0(x - a v(x)) and I_1(x + (1 - a) v(x)), or the pair that stayed, I_0(x)
+and I_1(x). Each pair is blended in time, and the two blends are mixed with weights inverse to the local squared
+difference within the pair: where the flow is wrong, its two pictures disagree. A pixel counts as tissue where one of
+the frames is tissue at its moved place, and is made of the frames that are.
 
 Comes in: a sequence and the indices of two training frames; goes out: a `Frame`. No held-out picture is read.
 """
@@ -21,11 +21,12 @@ from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 
 FloatArray = NDArray[np.floating]
+BoolArray = NDArray[np.bool_]
 
 STEPS = 3  # fixed-point steps for v_0 and v_1; smooth flow contracts, and a fourth step moves it by under 0.05 px
-CONSISTENT = 0.01  # of the squared lengths
-TOLERANCE = 0.5  # px^2
 WHOLE = 0.999  # bilinear weight of tissue, or of pixels with a prior depth, above which all four neighbours are
+NEARBY = 2.0  # px, standard deviation of the Gaussian window of the differences; 1 to 4 give the same within 0.1 dB
+ONE_STEP = (1 / 255) ** 2  # squared difference that 8-bit pictures of the same thing have
 
 
 class Flows(NamedTuple):
@@ -33,13 +34,6 @@ class Flows(NamedTuple):
 
     forward: FloatArray  # (2, H, W) px, x first: earlier -> later
     backward: FloatArray  # (2, H, W) px: later -> earlier
-
-
-class MotionBetween(NamedTuple):
-    """The motion field at a moment between two frames."""
-
-    field: FloatArray  # (2, H, W) px from the earlier frame to the later, at the place where a point is at that moment
-    consistent: NDArray[np.bool_]  # (H, W) the two flows agree
 
 
 def flows_between(sequence: Sequence, earlier: int, later: int, method: str = "dis") -> Flows:
@@ -50,10 +44,11 @@ def flows_between(sequence: Sequence, earlier: int, later: int, method: str = "d
     return Flows(dense_flow(a, b, method), dense_flow(b, a, method))
 
 
-def motion_between(flows: Flows, fraction: float) -> MotionBetween:
-    """The motion field v at the moment `fraction` and where the two flows agree on it (B14).
+def motion_between(flows: Flows, fraction: float) -> FloatArray:
+    """The motion field v at the moment `fraction` (B14).
 
     fraction  a in [0, 1]: 0 is the earlier frame, 1 the later
+    returns   (2, H, W) px from the earlier frame to the later, at the place where a point is at that moment
 
     Edges:   equal flows in opposite directions give that flow at every moment. Swapping the frames and a -> 1 - a
              changes the sign of the field and nothing else.
@@ -65,43 +60,66 @@ def motion_between(flows: Flows, fraction: float) -> MotionBetween:
     for _ in range(STEPS):
         from_earlier = warp_bilinear(flows.forward, -a * from_earlier)
         from_later = -warp_bilinear(flows.backward, b * from_later)
-    apart = np.square(from_earlier - from_later).sum(axis=0)
-    lengths = (np.square(from_earlier) + np.square(from_later)).sum(axis=0)
-    return MotionBetween(b * from_earlier + a * from_later, apart <= CONSISTENT * lengths + TOLERANCE)
+    return b * from_earlier + a * from_later
 
 
 def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
     """The picture, tissue mask and prior depth at a moment between two frames, as `Frame` (B14).
 
     earlier, later  frame indices; the frames may be any distance apart
-    fraction        a in (0, 1)
+    fraction        a in [0, 1]
     flows           of `flows_between` for these frames
-    returns         Frame in float32; mask True where both frames are tissue and the flows agree; depth 0 where one of
-                    the frames has none; time and camera are interpolated
+    returns         Frame in float32; mask True where one of the frames is tissue; depth 0 where neither has a prior;
+                    time and camera are interpolated
 
     Reverse: none; the result is a constant of the training.
     """
     from endotsr.opencv import warp_bilinear, warp_cubic
 
-    a, b = np.float32(fraction), np.float32(1.0 - fraction)
-    motion = motion_between(flows, fraction)
-    back, ahead = -a * motion.field, b * motion.field
+    pair, a = [earlier, later], np.float32(fraction)
+    weights = np.array([1.0 - fraction, fraction], np.float32)
+    field = motion_between(flows, fraction)
+    places = (-a * field, (1 - a) * field)
 
-    def both(planes: NDArray, warp) -> tuple[FloatArray, FloatArray]:
-        return warp(planes[earlier].astype(np.float32), back), warp(planes[later].astype(np.float32), ahead)
+    def moved(planes: NDArray, warp) -> FloatArray:
+        return np.stack([warp(plane.astype(np.float32), place) for plane, place in zip(planes, places, strict=True)])
 
-    first, second = both(sequence.images, warp_cubic)
-    image = np.clip((b * first + a * second) / np.float32(255), 0, 1)
-    first, second = both(sequence.masks, warp_bilinear)
-    mask = (first > WHOLE) & (second > WHOLE) & motion.consistent
-    known = [sequence.depth[k] > 0 for k in (earlier, later)]
-    first, second = warp_bilinear(known[0].astype(np.float32), back), warp_bilinear(known[1].astype(np.float32), ahead)
-    known_in_both = (first > WHOLE) & (second > WHOLE)
-    first, second = both(sequence.depth, warp_bilinear)
-    depth = np.where(known_in_both, b * first + a * second, np.float32(0))
+    images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
+    seen = moved(tissue, warp_bilinear) > WHOLE
+    image = _mixed(moved(images, warp_cubic), images, seen, seen.all(axis=0) & tissue.all(axis=0), weights)
+    known = moved(tissue & (sequence.depth[pair] > 0), warp_bilinear) > WHOLE
+    depth = _blended(moved(sequence.depth[pair], warp_bilinear), known, weights)
+    mask = np.tensordot(weights, seen, 1) > 0
     time = (1.0 - fraction) * float(sequence.times[earlier]) + fraction * float(sequence.times[later])
     camera = camera_between(sequence.cameras[earlier], sequence.cameras[later], fraction)
-    return Frame(np.ascontiguousarray(image), mask, np.ascontiguousarray(depth), time, camera)
+    return Frame(np.ascontiguousarray(np.clip(image, 0, 1)), mask, depth, time, camera)
+
+
+def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArray, weights: FloatArray) -> FloatArray:
+    """(3, H, W) the moved and the still pair of pictures, mixed by how little the two pictures of each differ nearby.
+
+    moved, still  (2, 3, H, W)
+    seen          (2, H, W) the moved pictures are tissue
+    both          (H, W) both pairs are tissue in both frames; elsewhere the moved pictures alone are used
+    weights       (2,) of the two frames
+    """
+    of_moved, of_still = _difference(moved), _difference(still)
+    share = np.where(both, of_moved / (of_moved + of_still), np.float32(0))
+    return (1 - share) * _blended(moved, seen, weights) + share * np.tensordot(weights, still, 1)
+
+
+def _difference(pair: FloatArray) -> FloatArray:
+    """(H, W) mean squared difference of two pictures (2, 3, H, W) around a pixel, at least `ONE_STEP`."""
+    import cv2
+
+    return cv2.GaussianBlur(np.square(pair[0] - pair[1]).mean(axis=0), (0, 0), NEARBY) + np.float32(ONE_STEP)
+
+
+def _blended(pair: FloatArray, usable: BoolArray, weights: FloatArray) -> FloatArray:
+    """The planes (2, ..., H, W) of two frames, blended where both are usable, else the usable one, else 0."""
+    part = weights[:, None, None] * usable
+    part = part / np.maximum(part.sum(axis=0), np.finfo(np.float32).tiny)
+    return (part.reshape(2, *(1,) * (pair.ndim - 3), *usable.shape[1:]) * pair).sum(axis=0)
 
 
 def camera_between(earlier: Camera, later: Camera, fraction: float) -> Camera:

@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.between import CONSISTENT, TOLERANCE, WHOLE, Flows, flows_between
+from endotsr.sequences.between import WHOLE, Flows, flows_between
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, backproject, project
 
 OUTSIDE = -1e6  # column and row of a point behind the camera
 BoolArray = NDArray[np.bool_]
 
+CONSISTENT = 0.01  # of the squared lengths of the flows there and back
+TOLERANCE = 0.5  # px^2
 DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface
 NEIGHBOURS = 8  # followed points that a lost point moves with
 KEPT_PAIRS = 64  # flows of so many pairs of frames are kept for the way back; those of a longer clip are made again
