@@ -23,7 +23,7 @@
 # In these notebooks each equation is printed as in the specification. It is then **transcribed** into NumPy symbol by
 # symbol, and compared with the compiled function by an `assert`. If one sign is changed in either, the notebook stops.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -153,7 +153,9 @@ for t in (0.0, 0.31, 0.77):
     phi_bar, saved_bar = normalise_forward(phi, statistics)
     np.testing.assert_allclose(phi_bar, normalise_text(phi, stamps, omega), atol=1e-12)
 
-bars = np.array([normalise_forward(dictionary_forward(t, omega)[0], statistics)[0] for t in stamps])
+bars = np.array(
+    [normalise_forward(dictionary_forward(t, omega)[0], statistics)[0] for t in stamps]
+)
 np.testing.assert_allclose(bars.mean(axis=0), 0, atol=1e-14)
 np.testing.assert_allclose((bars**2).mean(axis=0), 1, rtol=1e-12)
 
@@ -172,8 +174,12 @@ assert np.flatnonzero(statistics_32.dead).tolist() == [F - 1]
 print(report_atoms(stamps_32, omega))
 
 naive = np.array([np.sin(2 * np.pi * 16.0 * t) for t in stamps_32])
-resurrected = (naive - naive.mean()) / naive.std()  # what a division without the rule makes of rounding noise
-right = [normalise_forward(dictionary_forward(t, omega)[0], statistics_32)[0][F - 1] for t in stamps_32]
+# What a division without the rule makes of rounding noise.
+resurrected = (naive - naive.mean()) / naive.std()
+right = [
+    normalise_forward(dictionary_forward(t, omega)[0], statistics_32)[0][F - 1]
+    for t in stamps_32
+]
 assert np.abs(resurrected).max() > 1 and not np.any(right)
 
 # %% tags=["hide-input"]
@@ -181,7 +187,11 @@ fine = np.linspace(0, 1, 801)
 raw = np.array([dictionary_forward(t, omega)[0] for t in fine])
 bar = np.array([normalise_forward(p, statistics)[0] for p in raw])
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
-shown = ((F, "cos, 1 cycle", "tab:blue"), (1, "sin, 1.5 cycles", "tab:red"), (3, "sin, 3.3 cycles", "tab:green"))
+shown = (
+    (F, "cos, 1 cycle", "tab:blue"),
+    (1, "sin, 1.5 cycles", "tab:red"),
+    (3, "sin, 3.3 cycles", "tab:green"),
+)
 for panel, values, title in (
     (axes[0], raw, "raw atoms $\\phi_k(t)$"),
     (axes[1], bar, "normalised atoms $\\bar\\phi_k(t)$"),
@@ -194,7 +204,13 @@ for panel, values, title in (
     panel.set(title=title, xlabel="t")
     panel.set_ylim(-1.7, 1.7)
 axes[0].legend(loc="lower left", fontsize=8, ncols=3, columnspacing=0.8)
-axes[1].text(0.02, 0.03, "dots: training stamps; dotted: their mean", transform=axes[1].transAxes, fontsize=8)
+axes[1].text(
+    0.02,
+    0.03,
+    "dots: training stamps; dotted: their mean",
+    transform=axes[1].transAxes,
+    fontsize=8,
+)
 axes[2].plot(fine, np.sin(2 * np.pi * 16 * fine), color="0.75", lw=0.8, label="sin, 16 cycles")
 axes[2].plot(stamps_32, resurrected, "x", color="tab:red", label="divided by its noise")
 axes[2].plot(stamps_32, right, "o", color="tab:green", ms=4, label="endotsr: dead, exactly 0")
@@ -245,7 +261,9 @@ np.testing.assert_allclose(grads.d_omega, g_omega, rtol=1e-11)
 
 _, saved_32 = normalise_forward(phi, statistics_32)
 np.testing.assert_allclose(
-    normalise_reverse(g_phi, saved_32), normalise_reverse_text(g_phi, statistics_32.rms), rtol=1e-14
+    normalise_reverse(g_phi, saved_32),
+    normalise_reverse_text(g_phi, statistics_32.rms),
+    rtol=1e-14,
 )
 
 # %% [markdown]
@@ -257,7 +275,10 @@ np.testing.assert_allclose(
 
 # %%
 with one_thread():
-    reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in ("dictionary", "normalise")]
+    reports = [
+        check_pair(all_pairs()[name], pair_stream(name, 0))
+        for name in ("dictionary", "normalise")
+    ]
 print(table(reports))
 assert all(report.passed for report in reports)
 
@@ -269,10 +290,14 @@ assert all(report.passed for report in reports)
 # normalised dictionary in both cases, then open the answer.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead, so at most 15 remain: that
-# is why the rank is reported, and why a clip whose frames lie on the grid of the highest frequency is a special one.
+# Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead,
+# so at most 15 remain: that is why the rank is reported, and why a clip whose frames lie on
+# the grid of the highest frequency is a special one.
 assert report_atoms(stamps, omega).rank == 16
-singular = np.linalg.svd(bars, compute_uv=False)  # how much worse the faintest combination is seen than the clearest
-np.testing.assert_allclose(report_atoms(stamps, omega).condition, singular[0] / singular[-1], rtol=1e-9)
+# How much worse the faintest combination is seen than the clearest.
+singular = np.linalg.svd(bars, compute_uv=False)
+np.testing.assert_allclose(
+    report_atoms(stamps, omega).condition, singular[0] / singular[-1], rtol=1e-9
+)
 assert report_atoms(stamps_32, omega).rank == 15
 print(report_atoms(stamps, omega).rank, report_atoms(stamps_32, omega).rank)

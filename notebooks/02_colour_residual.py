@@ -19,7 +19,7 @@
 #
 # The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` makes the atoms.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -27,6 +27,7 @@ from endotsr.equations.appearance import Y00, appearance_forward, appearance_rev
 from endotsr.equations.dictionary import atom_statistics, frequencies, normalised_atoms
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
+# %%
 rng = np.random.default_rng(2)
 F, N, beta = 8, 150, 0.3
 omega = frequencies(F, 1.0, 16.0)
@@ -86,7 +87,8 @@ assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 fine = np.linspace(0, 0.98, 197)
 target = 0.45 + 0.2 * np.exp(-(((fine - 0.55) / 0.12) ** 2))  # display brightness of a patch
 phis = np.array([normalised_atoms(t, omega, statistics) for t in fine])
-choices = np.linspace(0.4, 0.6, 2001)  # the base colour at which the argument x has mean 0, as every x must
+# The base colour at which the argument x has mean 0, as every x must.
+choices = np.linspace(0.4, 0.6, 2001)
 base = min(choices, key=lambda b: abs(np.arctanh((target - b) / beta).mean()))
 wanted = np.arctanh((target - base) / beta)
 coefficients = np.linalg.lstsq(phis, wanted, rcond=None)[0]
@@ -95,7 +97,8 @@ one[:, :, 0] = coefficients
 by_colour = base + np.array([Y00 * appearance_forward(one, p, beta)[0][0, 0] for p in phis])
 assert np.abs(by_colour - target).max() < 0.02
 
-# without A: a bright Gaussian (0.7) beside a dull one (0.45); the mixture at the pixel depends on how far it is
+# without A: a bright Gaussian (0.7) beside a dull one (0.45); the mixture at the pixel
+# depends on how far it is
 distance = np.linspace(4, 0, 400)
 mixed = 0.45 + 0.25 * np.exp(-(distance**2) / 3)
 by_motion = distance[np.searchsorted(mixed, target.clip(mixed[0], mixed[-1])).clip(max=399)]
@@ -104,17 +107,28 @@ assert 4 - by_motion.min() > 2, "the motion that explains the light is pixels, n
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
 axes[0].plot(fine, target, color="0.6", lw=4, label="brightness of the patch")
 axes[0].plot(fine, by_colour, color="tab:blue", lw=1.5, label="base + $\\beta\\tanh x(t)$")
-axes[0].axhspan(base - beta, base + beta, color="tab:blue", alpha=0.08, label="all that A can reach")
+axes[0].axhspan(
+    base - beta, base + beta, color="tab:blue", alpha=0.08, label="all that A can reach"
+)
 axes[0].set(title="explained by colour", xlabel="t", ylabel="display colour", ylim=(0.1, 0.9))
 axes[0].legend(fontsize=8, loc="lower left")
 axes[1].plot(fine, 4 - by_motion, color="tab:red", label="shift of a bright neighbour, no A")
 axes[1].axhline(0, color="tab:blue", label="true motion, and that with A")
-axes[1].set(title="explained by motion", xlabel="t", ylabel="displacement [px]", ylim=(-0.2, 4.6))
+axes[1].set(
+    title="explained by motion", xlabel="t", ylabel="displacement [px]", ylim=(-0.2, 4.6)
+)
 axes[1].legend(fontsize=8, loc="upper left")
 x = np.linspace(0, 14, 300)
 e = np.exp(-2 * x.astype(np.float32))
-axes[2].semilogy(x, np.maximum(1 - np.tanh(x.astype(np.float32)) ** 2, 1e-14), color="tab:red", label="$1-\\tanh^2x$")
-axes[2].semilogy(x, 4 * e / (1 + e) ** 2, color="tab:green", label="$4e/(1+e)^2,\\ e=\\exp(-2|x|)$")
+axes[2].semilogy(
+    x,
+    np.maximum(1 - np.tanh(x.astype(np.float32)) ** 2, 1e-14),
+    color="tab:red",
+    label="$1-\\tanh^2x$",
+)
+axes[2].semilogy(
+    x, 4 * e / (1 + e) ** 2, color="tab:green", label="$4e/(1+e)^2,\\ e=\\exp(-2|x|)$"
+)
 axes[2].set(title="slope of tanh in float32", xlabel="x", ylim=(1e-13, 2))
 axes[2].legend(fontsize=8)
 plt.show()
@@ -153,13 +167,20 @@ g_A, g_phi_bar = reverse_text(g_h, A, phi_bar, beta)
 np.testing.assert_allclose(grads.d_appearance_coefficients, g_A, rtol=1e-12)
 np.testing.assert_allclose(grads.d_phi_bar, g_phi_bar, rtol=1e-11)
 
-saturated = appearance_reverse(g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]).d_appearance_coefficients
+saturated = appearance_reverse(
+    g_h, appearance_forward(1e3 * A, phi_bar, beta)[1]
+).d_appearance_coefficients
+# Finite far out.
 np.testing.assert_allclose(
     saturated, reverse_text(g_h, 1e3 * A, phi_bar, beta)[0], rtol=1e-9, atol=1e-290
-)  # finite far out
+)
 
-start = appearance_reverse(g_h, appearance_forward(zero, phi_bar, beta)[1]).d_appearance_coefficients
-np.testing.assert_allclose(start, beta / Y00 * phi_bar[None, :, None] * g_h[:, None, :], rtol=1e-14)
+start = appearance_reverse(
+    g_h, appearance_forward(zero, phi_bar, beta)[1]
+).d_appearance_coefficients
+np.testing.assert_allclose(
+    start, beta / Y00 * phi_bar[None, :, None] * g_h[:, None, :], rtol=1e-14
+)
 assert np.abs(start).max() > 0
 
 # %% [markdown]
@@ -180,8 +201,9 @@ assert report.passed
 # mean of $\beta\tanh x$ also 0? Find an $A$ for which the mean colour over the training stamps changes.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for the rest saturates at the top only,
-# so its mean after tanh is negative. The bound is what limits this: the mean can move by less than beta.
+# Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for
+# the rest saturates at the top only, so its mean after tanh is negative. The bound is what
+# limits this: the mean can move by less than beta.
 bump = np.exp(-(((stamps - 0.5) / 0.05) ** 2))
 atoms = np.array([normalised_atoms(t, omega, statistics) for t in stamps])
 short = np.zeros((3, 2 * F, 1))

@@ -18,13 +18,14 @@
 #
 # The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.equations.deformation import deformation_forward, deformation_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
+# %%
 rng = np.random.default_rng(3)
 B, N = 17, 4
 
@@ -73,7 +74,9 @@ sigma = rng.uniform(-0.1, 0.1, (10, B, N))  # the sign does not matter: only its
 for basis in ("quartic", "gaussian"):
     for t in (0.0, 0.4, 0.93):
         psi, saved = deformation_forward(w, theta, sigma, t, basis)
-        np.testing.assert_allclose(psi, offsets_text(w, theta, sigma, t, basis), rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(
+            psi, offsets_text(w, theta, sigma, t, basis), rtol=1e-12, atol=1e-15
+        )
 
 for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
     one = np.ones((10, 1, 1))
@@ -96,8 +99,12 @@ unit = np.zeros((10, B, B))
 unit[0] = np.eye(B)  # Gaussian j has basis j alone: the offsets are the values of the bases
 spread = np.broadcast_to(centres[None, :, None], unit.shape).copy()
 for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
-    values = np.array([deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine])
-    np.testing.assert_allclose(values, basis_text(fine[:, None], centres, width, "quartic"), atol=1e-15)
+    values = np.array(
+        [deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine]
+    )
+    np.testing.assert_allclose(
+        values, basis_text(fine[:, None], centres, width, "quartic"), atol=1e-15
+    )
     highest = values.max(axis=1)
     panel.plot(fine, values, lw=0.8, color="tab:blue")
     panel.fill_between(fine, 0, 1, where=highest < 1e-3, color="tab:red", alpha=0.25, lw=0)
@@ -107,9 +114,18 @@ for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
         assert int((np.interp(frames, fine, highest) < 1e-3).sum()) == 16
         panel.text(0.01, 1.06, "red: no basis above 0.001 (16 of 63 frames)", fontsize=8)
 learned = rng.normal(0, 1, (10, B, 1))
-curve = [deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][:3, 0] for t in fine]
+curve = [
+    deformation_forward(learned, spread[:, :, :1].copy(), np.full((10, B, 1), 0.06), t)[0][
+        :3, 0
+    ]
+    for t in fine
+]
 axes[2].plot(fine, np.array(curve), label=["x", "y", "z"])
-axes[2].set(title="a trajectory: weights at random, width 0.06", xlabel="t", ylabel="offset [scene units]")
+axes[2].set(
+    title="a trajectory: weights at random, width 0.06",
+    xlabel="t",
+    ylabel="offset [scene units]",
+)
 axes[2].legend()
 plt.show()
 
@@ -164,7 +180,11 @@ for basis in ("quartic", "gaussian"):
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)
 still = deformation_reverse(g_psi, saved)
-assert np.any(still.d_fdm_weight) and not np.any(still.d_fdm_centre) and not np.any(still.d_fdm_width)
+assert (
+    np.any(still.d_fdm_weight)
+    and not np.any(still.d_fdm_centre)
+    and not np.any(still.d_fdm_width)
+)
 
 # %% [markdown]
 # ## The gradient check
@@ -172,7 +192,8 @@ assert np.any(still.d_fdm_weight) and not np.any(still.d_fdm_centre) and not np.
 # %%
 with one_thread():
     reports = [
-        check_pair(all_pairs()[f"deformation_{b}"], pair_stream(f"deformation_{b}", 0)) for b in ("quartic", "gaussian")
+        check_pair(all_pairs()[f"deformation_{b}"], pair_stream(f"deformation_{b}", 0))
+        for b in ("quartic", "gaussian")
     ]
 print(table(reports))
 assert all(report.passed for report in reports)
@@ -184,8 +205,9 @@ assert all(report.passed for report in reports)
 # distance is it largest for a `gaussian` basis of equal $\Sigma$?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v = (3/4)^(1/4) = 0.931.
-# Gaussian: g_theta ~ exp(-v^2/2) v, largest at v = 1. So the reach is alike; beyond it the quartic basis is much smaller.
+# Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v =
+# (3/4)^(1/4) = 0.931. Gaussian: g_theta ~ exp(-v^2/2) v, largest at v = 1. So the reach is
+# alike; beyond it the quartic basis is much smaller.
 v = np.linspace(0, 3, 300_001)
 assert abs(v[np.argmax(np.exp(-(v**4)) * v**3)] - 0.75**0.25) < 1e-4
 assert abs(v[np.argmax(np.exp(-(v**2) / 2) * v)] - 1) < 1e-4

@@ -18,16 +18,21 @@
 #
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 
 from endotsr.equations.dictionary import dictionary_forward, frequencies
-from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse, matern_weights
+from endotsr.equations.matern import (
+    matern_penalty_forward,
+    matern_penalty_reverse,
+    matern_weights,
+)
 from endotsr.equations.motion import motion_forward, motion_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
+# %%
 rng = np.random.default_rng(4)
 F, N, length = 8, 150, 0.2
 omega = frequencies(F, 1.0, 16.0)
@@ -132,7 +137,8 @@ np.testing.assert_allclose(rho, (1 / density) / np.mean(1 / density), rtol=1e-13
 turn = rng.uniform(0, 2 * np.pi, (3, F, N))
 sine, cosine = C[:, :F], C[:, F:]
 turned = np.concatenate(
-    [np.cos(turn) * sine - np.sin(turn) * cosine, np.sin(turn) * sine + np.cos(turn) * cosine], axis=1
+    [np.cos(turn) * sine - np.sin(turn) * cosine, np.sin(turn) * sine + np.cos(turn) * cosine],
+    axis=1,
 )
 np.testing.assert_allclose(matern_penalty_forward(turned, rho)[0], penalty, rtol=1e-13)
 
@@ -156,23 +162,31 @@ Phi_fine = np.array([dictionary_forward(t, omega)[0] for t in fine])
 def fit(weight):
     """Minimise mean((Phi c - seen)^2) + weight L_msp(c) for one Gaussian that moves along x."""
     columns = []
-    for k in range(2 * F):  # the penalty's gradient is linear in C: its columns are the gradients of unit vectors
+    # The penalty's gradient is linear in C: its columns are the gradients of unit vectors.
+    for k in range(2 * F):
         unit = np.zeros((3, 2 * F, 1))
         unit[0, k, 0] = 1
-        columns.append(matern_penalty_reverse(weight, matern_penalty_forward(unit, rho)[1])[0, :, 0])
+        columns.append(
+            matern_penalty_reverse(weight, matern_penalty_forward(unit, rho)[1])[0, :, 0]
+        )
     system = 2 / len(stamps) * Phi.T @ Phi + np.array(columns)
     return np.linalg.solve(system, 2 / len(stamps) * Phi.T @ seen)
 
 
 free, held = fit(1e-9), fit(1.0)
 error = lambda c: np.sqrt(np.mean((Phi_fine @ c - path(fine)) ** 2))
-print(f"error over all times: {error(free):.2f} without the prior, {error(held):.2f} with it; noise 0.10")
+print(
+    f"error over all times: {error(free):.2f} without the prior, {error(held):.2f} with it; "
+    "noise 0.10"
+)
 assert error(held) < 0.6 * error(free)
 
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
 axes[0].plot(fine, path(fine), color="0.5", lw=4, label="true path")
 axes[0].plot(fine, Phi_fine @ free, color="tab:red", lw=1.2, label="no prior")
-axes[0].plot(fine, Phi_fine @ held, color="tab:blue", lw=1.5, label="with $\\mathcal{L}_{\\rm msp}$")
+axes[0].plot(
+    fine, Phi_fine @ held, color="tab:blue", lw=1.5, label="with $\\mathcal{L}_{\\rm msp}$"
+)
 axes[0].plot(stamps, seen, "k.", ms=4)
 axes[0].set(title="a trajectory", xlabel="t", ylabel="x [scene units]", ylim=(-2.6, 3.4))
 axes[0].legend(fontsize=8, loc="upper right", ncols=2)
@@ -180,11 +194,17 @@ energy = lambda c: c[:F] ** 2 + c[F:] ** 2
 axes[1].loglog(omega, energy(free), "o-", color="tab:red", label="no prior")
 axes[1].loglog(omega, energy(held), "o-", color="tab:blue", label="with prior")
 axes[1].loglog(omega, 2 * rho[0] / rho, "k:", label="$\\propto 1/\\rho$")
-axes[1].set(title="energy of the coefficients", xlabel="$\\omega$ [cycles per sequence]", ylim=(1e-7, 30))
+axes[1].set(
+    title="energy of the coefficients",
+    xlabel="$\\omega$ [cycles per sequence]",
+    ylim=(1e-7, 30),
+)
 axes[1].legend(fontsize=8)
 for ell in (0.0, 0.05, 0.1, 0.2, np.inf):
     axes[2].loglog(omega, matern_weights(omega, ell), "o-", ms=4, label=f"$\\ell=${ell:g}")
-axes[2].set(title="weights $\\rho_f$", xlabel="$\\omega$ [cycles per sequence]", ylim=(1e-7, 20))
+axes[2].set(
+    title="weights $\\rho_f$", xlabel="$\\omega$ [cycles per sequence]", ylim=(1e-7, 20)
+)
 axes[2].legend(fontsize=8)
 plt.show()
 
@@ -225,7 +245,9 @@ def penalty_reverse_text(g, C, rho):
 g = rng.normal(size=(3, N))
 for found, text in zip(motion_reverse(g, saved), motion_reverse_text(g, C, phi)):
     np.testing.assert_allclose(found, text, rtol=1e-11)
-np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), penalty_reverse_text(0.7, C, rho), rtol=1e-13)
+np.testing.assert_allclose(
+    matern_penalty_reverse(0.7, saved_penalty), penalty_reverse_text(0.7, C, rho), rtol=1e-13
+)
 
 # %% [markdown]
 # ## The gradient check
@@ -236,7 +258,10 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), penalty_r
 
 # %%
 with one_thread():
-    reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in ("motion", "matern_penalty")]
+    reports = [
+        check_pair(all_pairs()[name], pair_stream(name, 0))
+        for name in ("motion", "matern_penalty")
+    ]
 print(table(reports))
 assert all(report.passed for report in reports)
 
@@ -248,8 +273,9 @@ assert all(report.passed for report in reports)
 # fitted by the atoms, compared with an oscillation of the same size at 16 cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Nothing forbids it, but it costs, and the canonical position costs nothing: so training leaves the offset there.
-# A drift is drawn mostly by the lowest frequencies, whose weights are 1e-5: it is thousands of times cheaper than a wiggle.
+# Answer. Nothing forbids it, but it costs, and the canonical position costs nothing: so
+# training leaves the offset there. A drift is drawn mostly by the lowest frequencies, whose
+# weights are 1e-5: it is thousands of times cheaper than a wiggle.
 cost = lambda c: matern_penalty_forward(np.stack([c, 0 * c, 0 * c])[:, :, None], rho)[0]
 Phi_all = np.array([dictionary_forward(t, omega)[0] for t in np.arange(63) / 63])
 low = np.r_[:4, F : F + 4]

@@ -18,13 +18,26 @@
 #
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.gradcheck import all_pairs, check_function, check_pair, one_thread, pair_stream, table
-from endotsr.splatting.covariance import Shape, covariance_forward, covariance_matrix, covariance_reverse
+from endotsr.gradcheck import (
+    all_pairs,
+    check_function,
+    check_pair,
+    one_thread,
+    pair_stream,
+    table,
+)
+from endotsr.splatting.covariance import (
+    Shape,
+    covariance_forward,
+    covariance_matrix,
+    covariance_reverse,
+)
 
+# %%
 rng = np.random.default_rng(5)
 N = 6
 
@@ -58,7 +71,9 @@ def rotation_text(q_tilde):
 
 def covariance_text(R, s):
     S = np.exp(s)
-    return np.stack([R[:, :, i] @ np.diag(S[:, i] ** 2) @ R[:, :, i].T for i in range(s.shape[1])], axis=-1)
+    return np.stack(
+        [R[:, :, i] @ np.diag(S[:, i] ** 2) @ R[:, :, i].T for i in range(s.shape[1])], axis=-1
+    )
 
 
 # %%
@@ -66,7 +81,9 @@ q, s = 3 * rng.normal(size=(4, N)), rng.normal(0, 0.7, (3, N))
 shape, saved = covariance_forward(q, s)
 np.testing.assert_allclose(shape.rotation, rotation_text(q), atol=1e-14)
 np.testing.assert_allclose(shape.scale, np.exp(s), rtol=1e-14)
-np.testing.assert_allclose(covariance_matrix(shape), covariance_text(shape.rotation, s), rtol=1e-11, atol=1e-13)
+np.testing.assert_allclose(
+    covariance_matrix(shape), covariance_text(shape.rotation, s), rtol=1e-11, atol=1e-13
+)
 
 # %% [markdown]
 # The length of the raw quaternion has no effect, even if its square would overflow or underflow. $q$ and $-q$ are the
@@ -75,7 +92,9 @@ np.testing.assert_allclose(covariance_matrix(shape), covariance_text(shape.rotat
 # %%
 for factor in (1e-300, 1e-30, -1.0, 1e300):
     np.testing.assert_allclose(
-        covariance_forward(q / np.abs(q).max() * factor, s)[0].rotation, shape.rotation, atol=1e-14
+        covariance_forward(q / np.abs(q).max() * factor, s)[0].rotation,
+        shape.rotation,
+        atol=1e-14,
     )
 assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(3))
 
@@ -119,13 +138,22 @@ def quaternion_reverse_text(G, q_tilde):
     w, x, y, z = q_tilde / norm
     g_w = 2 * (x * (G[2, 1] - G[1, 2]) + y * (G[0, 2] - G[2, 0]) + z * (G[1, 0] - G[0, 1]))
     g_x = 2 * (
-        -2 * x * (G[1, 1] + G[2, 2]) + y * (G[0, 1] + G[1, 0]) + z * (G[0, 2] + G[2, 0]) + w * (G[2, 1] - G[1, 2])
+        -2 * x * (G[1, 1] + G[2, 2])
+        + y * (G[0, 1] + G[1, 0])
+        + z * (G[0, 2] + G[2, 0])
+        + w * (G[2, 1] - G[1, 2])
     )
     g_y = 2 * (
-        x * (G[0, 1] + G[1, 0]) - 2 * y * (G[0, 0] + G[2, 2]) + z * (G[1, 2] + G[2, 1]) + w * (G[0, 2] - G[2, 0])
+        x * (G[0, 1] + G[1, 0])
+        - 2 * y * (G[0, 0] + G[2, 2])
+        + z * (G[1, 2] + G[2, 1])
+        + w * (G[0, 2] - G[2, 0])
     )
     g_z = 2 * (
-        x * (G[0, 2] + G[2, 0]) + y * (G[1, 2] + G[2, 1]) - 2 * z * (G[0, 0] + G[1, 1]) + w * (G[1, 0] - G[0, 1])
+        x * (G[0, 2] + G[2, 0])
+        + y * (G[1, 2] + G[2, 1])
+        - 2 * z * (G[0, 0] + G[1, 1])
+        + w * (G[1, 0] - G[0, 1])
     )
     g_q = np.array([g_w, g_x, g_y, g_z])
     q = q_tilde / norm
@@ -134,19 +162,28 @@ def quaternion_reverse_text(G, q_tilde):
 
 # %%
 g_Sigma = rng.normal(size=(3, 3, N))
-pairs = [from_sigma_text(g_Sigma[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)]
+pairs = [
+    from_sigma_text(g_Sigma[:, :, i], shape.rotation[:, :, i], shape.scale[:, i])
+    for i in range(N)
+]
 g_R, g_S = (np.stack(parts, axis=-1) for parts in zip(*pairs))
 grads = covariance_reverse(Shape(g_R, g_S), saved)
 for i in range(N):
     np.testing.assert_allclose(
-        grads.d_quaternion[:, i], quaternion_reverse_text(g_R[:, :, i], q[:, i]), rtol=1e-9, atol=1e-12
+        grads.d_quaternion[:, i],
+        quaternion_reverse_text(g_R[:, :, i], q[:, i]),
+        rtol=1e-9,
+        atol=1e-12,
     )
 np.testing.assert_allclose(grads.d_log_scale, np.exp(s) * g_S, rtol=1e-12)
 
-along = np.abs((q * grads.d_quaternion).sum(axis=0)) / np.linalg.norm(grads.d_quaternion, axis=0)
+along = np.abs((q * grads.d_quaternion).sum(axis=0)) / np.linalg.norm(
+    grads.d_quaternion, axis=0
+)
 assert along.max() < 1e-12, "a gradient along the quaternion would change nothing"
 np.testing.assert_allclose(
-    covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).d_quaternion, grads.d_quaternion / 5
+    covariance_reverse(Shape(g_R, g_S), covariance_forward(5 * q, s)[1]).d_quaternion,
+    grads.d_quaternion / 5,
 )
 
 # %% [markdown]
@@ -158,7 +195,9 @@ np.testing.assert_allclose(
 # %% tags=["hide-input"]
 q_now, s_now = np.array([[1.0], [0.1], [0.2], [0.1]]), np.log([[0.6], [0.5], [0.55]])
 target = covariance_matrix(
-    covariance_forward(np.array([[0.9], [0.3], [-0.2], [0.6]]), np.log([[1.4], [0.7], [0.2]]))[0]
+    covariance_forward(np.array([[0.9], [0.3], [-0.2], [0.6]]), np.log([[1.4], [0.7], [0.2]]))[
+        0
+    ]
 )[:, :, 0]
 path, losses = [], []
 for _ in range(800):
@@ -171,7 +210,9 @@ for _ in range(800):
     q_now, s_now = q_now - 0.05 * step.d_quaternion, s_now - 0.05 * step.d_log_scale
 assert losses[-1] < 1e-3 * losses[0]
 
-circle = np.stack([np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))])
+circle = np.stack(
+    [np.cos(np.linspace(0, 2 * np.pi, 100)), np.sin(np.linspace(0, 2 * np.pi, 100))]
+)
 figure = plt.figure(figsize=(13, 3.8), layout="constrained")
 for column, (a, b) in enumerate(((0, 1), (0, 2))):
     panel = figure.add_subplot(1, 3, column + 1)
@@ -206,14 +247,22 @@ def sigma_forward(inputs):
 
 def sigma_reverse(inputs, g):
     shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
-    parts = [from_sigma_text(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)]
+    parts = [
+        from_sigma_text(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i])
+        for i in range(N)
+    ]
     grads = covariance_reverse(Shape(*(np.stack(p, axis=-1) for p in zip(*parts))), saved)
     return {"quaternion": grads.d_quaternion, "log_scale": grads.d_log_scale}
 
 
 with one_thread():
     reports = [
-        check_function(sigma_forward, sigma_reverse, {"quaternion": q, "log_scale": s}, label=("Sigma", "B2", "")),
+        check_function(
+            sigma_forward,
+            sigma_reverse,
+            {"quaternion": q, "log_scale": s},
+            label=("Sigma", "B2", ""),
+        ),
         check_pair(all_pairs()["covariance"], pair_stream("covariance", 0)),
     ]
 print(table(reports))
@@ -226,8 +275,9 @@ assert all(report.passed for report in reports)
 # gives the same $\Sigma$ as before? How many parameter sets describe one ellipsoid?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1: the quaternion product q (1, 1, 1, 1)/2. There are
-# 24 proper rotations of a box onto itself up to permuting its axes; each has two quaternions, so 48 sets (times all lengths).
+# Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1:
+# the quaternion product q (1, 1, 1, 1)/2. There are 24 proper rotations of a box onto itself
+# up to permuting its axes; each has two quaternions, so 48 sets (times all lengths).
 w, x, y, z = q[:, 0]
 p = np.array([0.5, 0.5, 0.5, 0.5])
 product = np.array(

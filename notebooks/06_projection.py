@@ -18,22 +18,31 @@
 #
 # The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward
-from endotsr.splatting.projection import projection_forward, projection_reverse, projection_reverse_footprint
+from endotsr.splatting.projection import (
+    projection_forward,
+    projection_reverse,
+    projection_reverse_footprint,
+)
 from endotsr.splatting.settings import EXACT, PAPER
 
+# %%
 rng = np.random.default_rng(6)
 N = 8
 turn, _ = covariance_forward(np.array([[1.0], [0.1], [-0.08], [0.05]]), np.zeros((3, 1)))
-camera = Camera(turn.rotation[:, :, 0].copy(), np.array([0.1, -0.2, 0.3]), 60.0, 66.0, 33.0, 23.5, 64, 48)
+camera = Camera(
+    turn.rotation[:, :, 0].copy(), np.array([0.1, -0.2, 0.3]), 60.0, 66.0, 33.0, 23.5, 64, 48
+)
 z = rng.uniform(3, 6, N)
-off_axis = np.array([[0.1, -0.2, 0.3, 0.9, -0.9, 0.1, 0.9, 0.0], [0.0, 0.1, -0.2, 0.1, 0.1, 0.8, -0.8, 0.0]])
+off_axis = np.array(
+    [[0.1, -0.2, 0.3, 0.9, -0.9, 0.1, 0.9, 0.0], [0.0, 0.1, -0.2, 0.1, 0.1, 0.8, -0.8, 0.0]]
+)
 mu = camera.rotation.T @ (np.vstack([off_axis * z, z]) - camera.translation[:, None])
 shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N)))
 
@@ -65,14 +74,20 @@ def project_text(mu, R, S, camera, kappa, eps=0.3):
     L_x = kappa * camera.width / (2 * camera.fx) if kappa else np.inf
     L_y = kappa * camera.height / (2 * camera.fy) if kappa else np.inf
     x_, y_ = z * np.clip(x / z, -L_x, L_x), z * np.clip(y / z, -L_y, L_y)
-    J = np.array([[camera.fx / z, 0, -camera.fx * x_ / z**2], [0, camera.fy / z, -camera.fy * y_ / z**2]])
+    J = np.array(
+        [[camera.fx / z, 0, -camera.fx * x_ / z**2], [0, camera.fy / z, -camera.fy * y_ / z**2]]
+    )
     T = J @ W @ R
     (a, b), (_, c) = T @ np.diag(S) ** 2 @ T.T + eps * np.eye(2)
     return (u, v), (a, b, c), z, (x, y, x_, y_, L_x, L_y, J, T)
 
 
 def determinant_text(T, S, eps=0.3):
-    crosses = [(S[k] * S[m] * (T[0, k] * T[1, m] - T[1, k] * T[0, m])) ** 2 for k in range(3) for m in range(k + 1, 3)]
+    crosses = [
+        (S[k] * S[m] * (T[0, k] * T[1, m] - T[1, k] * T[0, m])) ** 2
+        for k in range(3)
+        for m in range(k + 1, 3)
+    ]
     return eps**2 + eps * sum(S[k] ** 2 * (T[:, k] ** 2).sum() for k in range(3)) + sum(crosses)
 
 
@@ -86,7 +101,9 @@ for settings in (PAPER, EXACT):
         np.testing.assert_allclose(projected.mean2d[:, i], uv, rtol=1e-12)
         np.testing.assert_allclose(projected.covariance2d[:, i], abc, rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(projected.depth[i], depth, rtol=1e-13)
-        np.testing.assert_allclose(projected.determinant[i], determinant_text(parts[-1], S), rtol=1e-11)
+        np.testing.assert_allclose(
+            projected.determinant[i], determinant_text(parts[-1], S), rtol=1e-11
+        )
         clamped += abs(parts[0] / depth) > parts[4] or abs(parts[1] / depth) > parts[5]
     print(f"{clamped} of {N} Gaussians beyond the clamp")
 
@@ -105,15 +122,21 @@ for settings in (PAPER, EXACT):
 # %% tags=["hide-input"]
 front = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 32.0, 24.0, 64, 48)
 figure, axes = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
-circle = 2 * np.stack([np.cos(np.linspace(0, 2 * np.pi, 200)), np.sin(np.linspace(0, 2 * np.pi, 200))])
+circle = 2 * np.stack(
+    [np.cos(np.linspace(0, 2 * np.pi, 200)), np.sin(np.linspace(0, 2 * np.pi, 200))]
+)
 scenes = (
     ("small and far: the ellipse fits", [0.8, -0.3, 5.0], [0.35, 0.15, 0.3]),
     ("deep and near: it cannot", [0.5, -0.2, 2.0], [0.25, 0.1, 0.55]),
 )
 for panel, (title, centre, axes_length) in zip(axes, scenes):
-    tilt, _ = covariance_forward(np.array([[0.9], [0.2], [0.3], [0.1]]), np.log(axes_length)[:, None])
+    tilt, _ = covariance_forward(
+        np.array([[0.9], [0.2], [0.3], [0.1]]), np.log(axes_length)[:, None]
+    )
     flat, _ = projection_forward(np.array(centre)[:, None], tilt, front, EXACT)
-    cloud = np.array(centre)[:, None] + tilt.rotation[:, :, 0] @ (tilt.scale[:, :1] * rng.normal(size=(3, 3000)))
+    cloud = np.array(centre)[:, None] + tilt.rotation[:, :, 0] @ (
+        tilt.scale[:, :1] * rng.normal(size=(3, 3000))
+    )
     cloud = cloud[:, cloud[2] > 0.3]
     panel.plot(
         60 * cloud[0] / cloud[2] + 32,
@@ -137,14 +160,18 @@ for pixels in lengths:
         *(
             part.astype(np.float32)
             for part in covariance_forward(
-                np.array([[0.92], [0.0], [0.0], [0.38]]), np.log([[pixels / 60], [1e-3], [1e-3]])
+                np.array([[0.92], [0.0], [0.0], [0.38]]),
+                np.log([[pixels / 60], [1e-3], [1e-3]]),
             )[0]
         )
     )
     at = np.array([[0.0], [0.0], [1.0]], np.float32)
     single, _ = projection_forward(at, needle, front, EXACT)
     double, _ = projection_forward(
-        at.astype(float), Shape(needle.rotation.astype(float), needle.scale.astype(float)), front, EXACT
+        at.astype(float),
+        Shape(needle.rotation.astype(float), needle.scale.astype(float)),
+        front,
+        EXACT,
     )
     a, b, c = single.covariance2d[:, 0]
     errors["$ac-b^2$"].append(abs(float(a * c - b * b) / double.determinant[0] - 1))
@@ -223,7 +250,12 @@ def reverse_text(g_uv, g_abc, g_z_image, mu, R, S, camera, kappa):
     g_x_, g_y_ = -fx / z**2 * g_J[0, 2], -fy / z**2 * g_J[1, 2]
     g_x = fx / z * g_u + (abs(x / z) <= L_x) * g_x_
     g_y = fy / z * g_v + (abs(y / z) <= L_y) * g_y_
-    g_z = g_z_image - (fx * x * g_u + fy * y * g_v) / z**2 - fx / z**2 * g_J[0, 0] - fy / z**2 * g_J[1, 1]
+    g_z = (
+        g_z_image
+        - (fx * x * g_u + fy * y * g_v) / z**2
+        - fx / z**2 * g_J[0, 0]
+        - fy / z**2 * g_J[1, 1]
+    )
     g_z = g_z + 2 * fx * x_ / z**3 * g_J[0, 2] + 2 * fy * y_ / z**3 * g_J[1, 2]
     g_z = g_z + (abs(x / z) > L_x) * x_ / z * g_x_ + (abs(y / z) > L_y) * y_ / z * g_y_
     g_xyz = np.array([g_x, g_y, g_z])
@@ -265,10 +297,21 @@ def footprint_reverse_text(g_A, g_m, g_r, T, S, a, b, c, det, eps=0.3):
     A, m, r = c / det, b / c, 1 / c
     g_S, g_T = np.zeros(3), np.zeros((2, 3))
     for k in range(3):
-        e_k = r * (eps * T[0, k] + sum(S[l] ** 2 * T[1, l] * (T[0, k] * T[1, l] - T[1, k] * T[0, l]) for l in range(3)))
-        g_S[k] = -2 * S[k] * (A**2 * g_A * e_k**2 - r * g_m * T[1, k] * e_k + r**2 * g_r * T[1, k] ** 2)
+        e_k = r * (
+            eps * T[0, k]
+            + sum(
+                S[l] ** 2 * T[1, l] * (T[0, k] * T[1, l] - T[1, k] * T[0, l]) for l in range(3)
+            )
+        )
+        g_S[k] = (
+            -2
+            * S[k]
+            * (A**2 * g_A * e_k**2 - r * g_m * T[1, k] * e_k + r**2 * g_r * T[1, k] ** 2)
+        )
         g_T[0, k] = S[k] ** 2 * (r * g_m * T[1, k] - 2 * A**2 * g_A * e_k)
-        g_T[1, k] = S[k] ** 2 * (2 * A**2 * m * g_A * e_k + r * g_m * (e_k - m * T[1, k]) - 2 * r**2 * g_r * T[1, k])
+        g_T[1, k] = S[k] ** 2 * (
+            2 * A**2 * m * g_A * e_k + r * g_m * (e_k - m * T[1, k]) - 2 * r**2 * g_r * T[1, k]
+        )
     return g_S, g_T
 
 
@@ -278,18 +321,30 @@ projected, saved = projection_forward(mu, shape, camera, PAPER)
 direct = projection_reverse_footprint(g_uv, g_abc, g_z, saved)
 a, b, c = projected.covariance2d
 A, m, r = c / projected.determinant, b / c, 1 / c
-g_through = np.stack([-(A**2) * g_A, 2 * A**2 * m * g_A + r * g_m, -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r])
+g_through = np.stack(
+    [
+        -(A**2) * g_A,
+        2 * A**2 * m * g_A + r * g_m,
+        -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r,
+    ]
+)
 through = projection_reverse(g_uv, g_through, g_z, saved)
 for i in range(N):
     S, (J, T) = (
         shape.scale[:, i],
         project_text(mu[:, i], shape.rotation[:, :, i], shape.scale[:, i], camera, 1.3)[3][-2:],
     )
-    g_S, g_T = footprint_reverse_text(g_A[i], g_m[i], g_r[i], T, S, a[i], b[i], c[i], projected.determinant[i])
+    g_S, g_T = footprint_reverse_text(
+        g_A[i], g_m[i], g_r[i], T, S, a[i], b[i], c[i], projected.determinant[i]
+    )
     np.testing.assert_allclose(direct.d_scale[:, i], g_S, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(direct.d_rotation[:, :, i], (J @ camera.rotation).T @ g_T, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        direct.d_rotation[:, :, i], (J @ camera.rotation).T @ g_T, rtol=1e-9, atol=1e-12
+    )
 for name in ("position", "rotation", "scale"):
-    np.testing.assert_allclose(getattr(direct, f"d_{name}"), getattr(through, f"d_{name}"), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(
+        getattr(direct, f"d_{name}"), getattr(through, f"d_{name}"), rtol=1e-7, atol=1e-9
+    )
 
 # %% [markdown]
 # ## The gradient check
@@ -299,7 +354,10 @@ for name in ("position", "rotation", "scale"):
 
 # %%
 with one_thread():
-    reports = [check_pair(all_pairs()[name], pair_stream(name, 0)) for name in ("projection_exact", "projection_paper")]
+    reports = [
+        check_pair(all_pairs()[name], pair_stream(name, 0))
+        for name in ("projection_exact", "projection_paper")
+    ]
 print(table(reports))
 assert all(report.passed for report in reports)
 
@@ -311,8 +369,9 @@ assert all(report.passed for report in reports)
 # the cell.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles. The gradient of the position halves
-# (if no loss looks at z), because a step of one scene unit now means half as many pixels.
+# Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles.
+# The gradient of the position halves (if no loss looks at z), because a step of one scene
+# unit now means half as many pixels.
 doubled = projection_forward(
     2 * mu,
     shape._replace(scale=2 * shape.scale),
@@ -321,7 +380,12 @@ doubled = projection_forward(
 )
 single = projection_forward(mu, shape, camera, PAPER)
 np.testing.assert_allclose(doubled[0].mean2d, single[0].mean2d, rtol=1e-12)
-np.testing.assert_allclose(doubled[0].covariance2d, single[0].covariance2d, rtol=1e-9, atol=1e-9)
+np.testing.assert_allclose(
+    doubled[0].covariance2d, single[0].covariance2d, rtol=1e-9, atol=1e-9
+)
 np.testing.assert_allclose(doubled[0].depth, 2 * single[0].depth, rtol=1e-13)
-back = [projection_reverse(g_uv, g_abc, 0 * g_z, saved).d_position for saved in (doubled[1], single[1])]
+back = [
+    projection_reverse(g_uv, g_abc, 0 * g_z, saved).d_position
+    for saved in (doubled[1], single[1])
+]
 np.testing.assert_allclose(back[0], back[1] / 2, rtol=1e-9, atol=1e-10)

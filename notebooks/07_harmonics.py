@@ -19,7 +19,7 @@
 #
 # The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.special import factorial, lpmv
@@ -27,6 +27,7 @@ from scipy.special import factorial, lpmv
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 
+# %%
 rng = np.random.default_rng(7)
 N = 9
 
@@ -45,8 +46,16 @@ N = 9
 
 # %% tags=["transcription"]
 C_0, C_1 = np.sqrt(1 / (4 * np.pi)), np.sqrt(3 / (4 * np.pi))
-C_2a, C_2b, C_2c = np.sqrt(15 / (4 * np.pi)), np.sqrt(5 / (16 * np.pi)), np.sqrt(15 / (16 * np.pi))
-C_3a, C_3b, C_3c = np.sqrt(35 / (32 * np.pi)), np.sqrt(105 / (4 * np.pi)), np.sqrt(21 / (32 * np.pi))
+C_2a, C_2b, C_2c = (
+    np.sqrt(15 / (4 * np.pi)),
+    np.sqrt(5 / (16 * np.pi)),
+    np.sqrt(15 / (16 * np.pi)),
+)
+C_3a, C_3b, C_3c = (
+    np.sqrt(35 / (32 * np.pi)),
+    np.sqrt(105 / (4 * np.pi)),
+    np.sqrt(21 / (32 * np.pi)),
+)
 C_3d, C_3e = np.sqrt(7 / (16 * np.pi)), np.sqrt(105 / (16 * np.pi))
 
 
@@ -77,7 +86,9 @@ def colour_text(h, Delta_h0, mu, o, degree):
     v = mu - o[:, None]
     n = v / np.sqrt((v**2).sum(axis=0))
     Y = Y_text(*n)
-    before = 1 / 2 + Y[0] * (h[0] + Delta_h0) + sum(Y[k] * h[k] for k in range(1, (degree + 1) ** 2))
+    before = (
+        1 / 2 + Y[0] * (h[0] + Delta_h0) + sum(Y[k] * h[k] for k in range(1, (degree + 1) ** 2))
+    )
     return np.maximum(0, before)
 
 
@@ -86,7 +97,9 @@ h, residual = rng.normal(0, 0.6, (16, 3, N)), rng.normal(0, 0.3, (3, N))
 mu, centre = rng.normal(0, 1, (3, N)) + [[0], [0], [4]], rng.normal(0, 0.4, 3)
 for degree in range(4):
     colour, saved = harmonics_forward(h, residual, mu, centre, degree)
-    np.testing.assert_allclose(colour, colour_text(h, residual, mu, centre, degree), rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(
+        colour, colour_text(h, residual, mu, centre, degree), rtol=1e-11, atol=1e-13
+    )
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
@@ -100,8 +113,14 @@ polar, azimuth = np.arccos(direction[2]), np.arctan2(direction[1], direction[0])
 k = 0
 for band in range(4):
     for m in range(-band, band + 1):
-        norm = np.sqrt((2 * band + 1) / (4 * np.pi) * factorial(band - abs(m)) / factorial(band + abs(m)))
-        wave = 1 if m == 0 else np.sqrt(2) * (np.cos(m * azimuth) if m > 0 else np.sin(-m * azimuth))
+        norm = np.sqrt(
+            (2 * band + 1) / (4 * np.pi) * factorial(band - abs(m)) / factorial(band + abs(m))
+        )
+        wave = (
+            1
+            if m == 0
+            else np.sqrt(2) * (np.cos(m * azimuth) if m > 0 else np.sin(-m * azimuth))
+        )
         real = norm * wave * lpmv(abs(m), band, np.cos(polar))
         np.testing.assert_allclose(Y_text(*direction)[k], real, atol=1e-13)
         k += 1
@@ -114,7 +133,9 @@ for band in range(4):
 
 # %% tags=["hide-input"]
 lon, lat = np.meshgrid(np.linspace(-np.pi, np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37))
-around = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]).reshape(3, -1)
+around = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]).reshape(
+    3, -1
+)
 figure = plt.figure(figsize=(13, 6), layout="constrained")
 grid = figure.add_gridspec(4, 7)
 for band in range(4):
@@ -125,11 +146,22 @@ for band in range(4):
         value = (harmonics_forward(alone, None, around, np.zeros(3), 3)[0][0] - 0.5) / 0.4
         np.testing.assert_allclose(value, Y_text(*around)[k], atol=1e-12)
         panel = figure.add_subplot(grid[band, 3 + m])
-        panel.imshow(value.reshape(lon.shape), cmap="RdBu_r", vmin=-1, vmax=1, origin="lower", aspect="auto")
+        panel.imshow(
+            value.reshape(lon.shape),
+            cmap="RdBu_r",
+            vmin=-1,
+            vmax=1,
+            origin="lower",
+            aspect="auto",
+        )
         panel.set_title(f"$Y_{{{k}}}$", fontsize=10)
         panel.axis("off")
 weights = np.cos(lat).ravel()
-gram = np.einsum("ku,lu,u->kl", Y_text(*around), Y_text(*around), weights) * (2 * np.pi / 73) * (np.pi / 36)
+gram = (
+    np.einsum("ku,lu,u->kl", Y_text(*around), Y_text(*around), weights)
+    * (2 * np.pi / 73)
+    * (np.pi / 36)
+)
 assert np.abs(gram - np.eye(16)).max() < 0.05, "orthonormal on the sphere"
 plt.show()
 
@@ -207,7 +239,10 @@ for found, text in zip(grads, reverse_text(g_rgb, h, residual, mu, centre)):
 # %%
 with one_thread():
     reports = [
-        check_pair(all_pairs()[f"harmonics_degree_{d}"], pair_stream(f"harmonics_degree_{d}", 0)) for d in range(4)
+        check_pair(
+            all_pairs()[f"harmonics_degree_{d}"], pair_stream(f"harmonics_degree_{d}", 0)
+        )
+        for d in range(4)
     ]
 print(table(reports))
 assert all(report.passed for report in reports)
@@ -225,5 +260,7 @@ mirror = np.array([-1.0, 1, 1])
 flipped = h.copy()
 flipped[odd] *= -1
 np.testing.assert_allclose(
-    harmonics_forward(flipped, residual, mirror[:, None] * mu, mirror * centre, 3)[0], colour, atol=1e-12
+    harmonics_forward(flipped, residual, mirror[:, None] * mu, mirror * centre, 3)[0],
+    colour,
+    atol=1e-12,
 )

@@ -19,7 +19,7 @@
 #
 # The equations are {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -38,13 +38,15 @@ from endotsr.splatting.records import gather_gradients, log_opacity, pack_record
 from endotsr.splatting.render import Scene, render_forward
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
 
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 rng = np.random.default_rng(8)
 WIDTH, HEIGHT, N = 18, 14, 5
 a, c = rng.uniform(8, 60, N), rng.uniform(8, 60, N)
 scene = {
     "mean2d": np.stack([rng.uniform(3, 15, N), rng.uniform(3, 11, N)]),
     "covariance2d": np.stack([a, rng.uniform(-0.6, 0.6, N) * np.sqrt(a * c), c]),
-    "logit": np.array([0.3, -1.0, 7.0, 1.5, -0.5]),  # the third is opaque enough to meet the clamp
+    # The third is opaque enough to meet the clamp.
+    "logit": np.array([0.3, -1.0, 7.0, 1.5, -0.5]),
     "colour": rng.uniform(0.1, 1, (3, N)),
     "depth": np.array([4.0, 3.0, 6.0, 5.0, 3.5]),  # not in the order of the index
 }
@@ -54,7 +56,13 @@ background = np.array([0.1, 0.2, 0.3])
 def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background):
     """The stages of the package between projection and image."""
     a, b, c = scene["covariance2d"]
-    projected = Projected(scene["mean2d"], scene["covariance2d"], a * c - b * b, scene["depth"], np.ones(a.size, bool))
+    projected = Projected(
+        scene["mean2d"],
+        scene["covariance2d"],
+        a * c - b * b,
+        scene["depth"],
+        np.ones(a.size, bool),
+    )
     log_o = log_opacity(scene["logit"])
     box, visible = screen_boxes(projected, log_o, settings, width, height)
     order = depth_order(scene["depth"], visible)
@@ -126,14 +134,21 @@ def pixel_text(column, row, scene, settings):
 
 
 def images_text(scene, settings):
-    colour, depth, opacity = np.zeros((3, HEIGHT, WIDTH)), np.zeros((HEIGHT, WIDTH)), np.zeros((HEIGHT, WIDTH))
+    colour, depth, opacity = (
+        np.zeros((3, HEIGHT, WIDTH)),
+        np.zeros((HEIGHT, WIDTH)),
+        np.zeros((HEIGHT, WIDTH)),
+    )
     for row in range(HEIGHT):
         for column in range(WIDTH):
             contributors, T_n = pixel_text(column, row, scene, settings)
             colour[:, row, column] = (
-                sum(alpha * T * scene["colour"][:, i] for i, alpha, T in contributors) + T_n * background
+                sum(alpha * T * scene["colour"][:, i] for i, alpha, T in contributors)
+                + T_n * background
             )
-            depth[row, column] = sum(alpha * T * scene["depth"][i] for i, alpha, T in contributors)
+            depth[row, column] = sum(
+                alpha * T * scene["depth"][i] for i, alpha, T in contributors
+            )
             opacity[row, column] = sum(alpha * T for i, alpha, T in contributors)
     return colour, depth, opacity
 
@@ -159,15 +174,22 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 # within three standard deviations; here this removes a strip of visible values at the bottom.
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1])
+figure, axes = plt.subplots(
+    1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1]
+)
 contributors, T_n = pixel_text(9, 7, scene, PAPER)
 for k, (i, alpha, T) in enumerate(contributors):
     axes[0].bar(k, T, color="0.9", edgecolor="0.6")
     axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
     axes[0].text(k, alpha * T + 0.02, f"$\\alpha$={alpha:.2f}", ha="center", fontsize=8)
 axes[0].bar(len(contributors), T_n, color=background, edgecolor="k", lw=0.5)
-axes[0].set(title="pixel (9, 7): $T_k$, and the fraction $\\alpha_kT_k$", xticks=range(len(contributors) + 1))
-axes[0].set_xticklabels([f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"])
+axes[0].set(
+    title="pixel (9, 7): $T_k$, and the fraction $\\alpha_kT_k$",
+    xticks=range(len(contributors) + 1),
+)
+axes[0].set_xticklabels(
+    [f"#{i}\nz={scene['depth'][i]:g}" for i, _, _ in contributors] + ["back"]
+)
 camera = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 37.5, 26.5, 72, 56)
 splat = Scene(
     np.array([[0.0], [0.0], [1.0]]),
@@ -177,16 +199,25 @@ splat = Scene(
     np.zeros((1, 3, 1)),
 )
 reached = {}
-for panel, (name, settings) in zip(axes[1:], (("exact", EXACT), ("paper", PAPER), ("legacy", LEGACY))):
-    opacity = render_forward(splat, camera, settings, degree=0, compositor="definition")[0].opacity
+for panel, (name, settings) in zip(
+    axes[1:], (("exact", EXACT), ("paper", PAPER), ("legacy", LEGACY))
+):
+    opacity = render_forward(splat, camera, settings, degree=0, compositor="definition")[
+        0
+    ].opacity
     reached[name] = opacity
     shown = panel.imshow(
-        np.where(opacity > 0, np.log10(np.maximum(opacity, 1e-12)), np.nan), vmin=-6, vmax=0, cmap="magma"
+        np.where(opacity > 0, np.log10(np.maximum(opacity, 1e-12)), np.nan),
+        vmin=-6,
+        vmax=0,
+        cmap="magma",
     )
     panel.contour(reached["exact"], levels=[1 / 255], colors="tab:green", linewidths=1)
     panel.set(title=f"{name}: {np.count_nonzero(opacity)} pixels", xticks=[], yticks=[])
 figure.colorbar(shown, ax=axes[1:], label="$\\log_{10}\\alpha$; green line 1/255", shrink=0.8)
-assert np.array_equal(reached["paper"] > 0, np.minimum(reached["exact"], 0.99) >= 1 / 255), "the ellipse loses nothing"
+assert np.array_equal(reached["paper"] > 0, np.minimum(reached["exact"], 0.99) >= 1 / 255), (
+    "the ellipse loses nothing"
+)
 assert np.count_nonzero(reached["exact"]) == 72 * 56
 assert np.count_nonzero(reached["legacy"]) < np.count_nonzero(reached["paper"])
 plt.show()
@@ -268,7 +299,11 @@ def reverse_text(g_I, g_D, g_O, scene, settings):
                 g_alpha = T * ((rgb - R) @ g_I_p + (z - Z) * g_D_p + (1 - Q) * g_O_p)  # line 3
                 g["colour"][:, i] += alpha * T * g_I_p  # line 5
                 g["depth"][i] += alpha * T * g_D_p
-                R, Z, Q = alpha * rgb + (1 - alpha) * R, alpha * z + (1 - alpha) * Z, alpha + (1 - alpha) * Q
+                R, Z, Q = (
+                    alpha * rgb + (1 - alpha) * R,
+                    alpha * z + (1 - alpha) * Z,
+                    alpha + (1 - alpha) * Q,
+                )
                 o = 1 / (1 + np.exp(-scene["logit"][i]))
                 q, eta, d_y, m, r, A = footprint_text(i, column, row, scene)
                 if o * np.exp(-q / 2) > settings.alpha_max:
@@ -289,7 +324,11 @@ def reverse_text(g_I, g_D, g_O, scene, settings):
 
 
 # %%
-g_I, g_D, g_O = rng.normal(size=(3, HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH)), rng.normal(size=(HEIGHT, WIDTH))
+g_I, g_D, g_O = (
+    rng.normal(size=(3, HEIGHT, WIDTH)),
+    rng.normal(size=(HEIGHT, WIDTH)),
+    rng.normal(size=(HEIGHT, WIDTH)),
+)
 
 
 def kernel_reverse(scene, settings, g_I, g_D, g_O, conic_epsilon=0.0, **size):
@@ -310,7 +349,10 @@ def kernel_reverse(scene, settings, g_I, g_D, g_O, conic_epsilon=0.0, **size):
 
 
 for settings in (PAPER, EXACT):
-    found, text = kernel_reverse(scene, settings, g_I, g_D, g_O), reverse_text(g_I, g_D, g_O, scene, settings)
+    found, text = (
+        kernel_reverse(scene, settings, g_I, g_D, g_O),
+        reverse_text(g_I, g_D, g_O, scene, settings),
+    )
     for name in text:
         np.testing.assert_allclose(found[name], text[name], rtol=1e-9, atol=1e-11, err_msg=name)
 
@@ -320,9 +362,13 @@ for settings in (PAPER, EXACT):
 # number that is large enough to be visible.
 
 # %%
-exact, damped = (kernel_reverse(scene, PAPER, g_I, g_D, g_O, conic_epsilon=number) for number in (0.0, 1e4))
+exact, damped = (
+    kernel_reverse(scene, PAPER, g_I, g_D, g_O, conic_epsilon=number) for number in (0.0, 1e4)
+)
 det = scene["covariance2d"][0] * scene["covariance2d"][2] - scene["covariance2d"][1] ** 2
-np.testing.assert_allclose(damped["covariance2d"], exact["covariance2d"] * det**2 / (det**2 + 1e4), rtol=1e-12)
+np.testing.assert_allclose(
+    damped["covariance2d"], exact["covariance2d"] * det**2 / (det**2 + 1e4), rtol=1e-12
+)
 
 # %% [markdown]
 # ## The gradient check
@@ -347,8 +393,9 @@ assert all(report.passed for report in reports)
 # What would such a program compute here?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The first two have gradients, the opaque one included (less opacity would show the third). The third has none. Division
-# starts from T_n = 0: 0 / (1 - 0.5) = 0, then 0 / (1 - 1) = nan, and everything in front is lost.
+# Answer. The first two have gradients, the opaque one included (less opacity would show the
+# third). The third has none. Division starts from T_n = 0: 0 / (1 - 0.5) = 0, then 0 / (1 -
+# 1) = nan, and everything in front is lost.
 wide = 1e12  # px^2: the pixel sees the centre
 one = {
     "mean2d": np.full((2, 3), 0.5),
@@ -361,9 +408,8 @@ white = np.ones((3, 1, 1)) * np.array([1.0, 2.0, 4.0])[:, None, None]
 zero = np.zeros((1, 1))
 grads = kernel_reverse(one, EXACT, white, zero, zero, width=1, height=1)
 np.testing.assert_allclose(grads["colour"].sum(axis=0), np.array([0.3, 0.7, 0.0]) * 7)
-np.testing.assert_allclose(
-    grads["logit"], [0.3 * 0.7 * (1 - 2), 0, 0], atol=1e-14
-)  # a logit of 700 is flat: (1 - o) = 0
+# A logit of 700 is flat: (1 - o) = 0.
+np.testing.assert_allclose(grads["logit"], [0.3 * 0.7 * (1 - 2), 0, 0], atol=1e-14)
 with np.errstate(invalid="ignore"):
     T_2 = np.float64(0.0) / (1 - 0.5)
     assert np.isnan(T_2 / np.float64(1 - 1.0))

@@ -18,14 +18,20 @@
 #
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.equations.laplacian import laplacian_levels, laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.equations.laplacian import (
+    laplacian_levels,
+    laplacian_loss_forward,
+    laplacian_loss_reverse,
+    support_masks,
+)
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
+# %%
 rng = np.random.default_rng(9)
 
 # %% [markdown]
@@ -78,7 +84,10 @@ def U_matrix(n, rule):
         if rule == "co_sited":
             even, odd = [(k, 1)], [(k, 1 / 2), (min(k + 1, n_c - 1), 1 / 2)]
         else:
-            even, odd = [(max(k - 1, 0), 1 / 4), (k, 3 / 4)], [(k, 3 / 4), (min(k + 1, n_c - 1), 1 / 4)]
+            even, odd = (
+                [(max(k - 1, 0), 1 / 4), (k, 3 / 4)],
+                [(k, 3 / 4), (min(k + 1, n_c - 1), 1 / 4)],
+            )
         for row, parents in ((2 * k, even), (2 * k + 1, odd)):
             for q, weight in parents:
                 if row < n:
@@ -163,11 +172,19 @@ def support_text(M, rule):
         for y in range(coarse.shape[0]):
             for x in range(coarse.shape[1]):
                 coarse[y, x] = all(
-                    S[j - 1][refl(2 * y + r, h), refl(2 * x + s, w)] for r in range(-2, 3) for s in range(-2, 3)
+                    S[j - 1][refl(2 * y + r, h), refl(2 * x + s, w)]
+                    for r in range(-2, 3)
+                    for s in range(-2, 3)
                 )
         U_rows, U_columns = U_matrix(h, rule) != 0, U_matrix(w, rule) != 0
         V.append(
-            S[j - 1] & np.array([[coarse[np.ix_(rows, columns)].all() for columns in U_columns] for rows in U_rows])
+            S[j - 1]
+            & np.array(
+                [
+                    [coarse[np.ix_(rows, columns)].all() for columns in U_columns]
+                    for rows in U_rows
+                ]
+            )
         )
         S.append(coarse)
     return V
@@ -204,7 +221,9 @@ loss, saved = laplacian_loss_forward(rendered, observed, masks)
 spoiled = [np.where(mask, image, np.nan) for image in (rendered, observed)]
 loss_spoiled, saved_spoiled = laplacian_loss_forward(*spoiled, masks)
 assert loss_spoiled == loss
-assert np.array_equal(laplacian_loss_reverse(1.0, saved_spoiled), laplacian_loss_reverse(1.0, saved))
+assert np.array_equal(
+    laplacian_loss_reverse(1.0, saved_spoiled), laplacian_loss_reverse(1.0, saved)
+)
 
 # %% [markdown]
 # ## Figure: valid masks per level, and the effect of masking first
@@ -224,11 +243,17 @@ for j, valid in enumerate(masks.bands):
     tissue = mask[:: 2**j, :: 2**j]
     picture = np.where(valid, 1.0, np.where(tissue, 0.6, 0.0))
     axes[0, j + 1].imshow(picture, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
-    axes[0, j + 1].set_title(f"$V_{j + 1}$: {valid.mean():.0%} of {valid.shape[1]}x{valid.shape[0]}")
-    axes[1, j + 1].imshow(np.abs(naive[j]).mean(axis=0), cmap="magma", vmin=0, vmax=0.2, interpolation="nearest")
+    axes[0, j + 1].set_title(
+        f"$V_{j + 1}$: {valid.mean():.0%} of {valid.shape[1]}x{valid.shape[0]}"
+    )
+    axes[1, j + 1].imshow(
+        np.abs(naive[j]).mean(axis=0), cmap="magma", vmin=0, vmax=0.2, interpolation="nearest"
+    )
     axes[1, j + 1].set_title(f"$|P_{j + 1}|$, masked first")
     false = np.abs(naive[j]).mean(axis=0)
-    assert false[~valid].max() > false[valid].max(), "the false edge is stronger than all true detail"
+    assert false[~valid].max() > false[valid].max(), (
+        "the false edge is stronger than all true detail"
+    )
 for panel in axes.flat:
     panel.set(xticks=[], yticks=[])
 plt.show()
@@ -271,7 +296,9 @@ for rule in ("co_sited", "half_pixel"):
     masks = support_masks(mask, 3, rule)
     _, saved = laplacian_loss_forward(rendered, observed, masks, rule)
     found = laplacian_loss_reverse(0.83, saved)
-    np.testing.assert_allclose(found, reverse_text(0.83, rendered, observed, masks.bands, rule), rtol=1e-9, atol=1e-16)
+    np.testing.assert_allclose(
+        found, reverse_text(0.83, rendered, observed, masks.bands, rule), rtol=1e-9, atol=1e-16
+    )
     assert not np.any(found[:, ~mask])
 
 # %% [markdown]
@@ -280,7 +307,9 @@ for rule in ("co_sited", "half_pixel"):
 # %%
 with one_thread():
     reports = [
-        check_pair(all_pairs()[f"laplacian_loss_{rule}"], pair_stream(f"laplacian_loss_{rule}", 0))
+        check_pair(
+            all_pairs()[f"laplacian_loss_{rule}"], pair_stream(f"laplacian_loss_{rule}", 0)
+        )
         for rule in ("co_sited", "half_pixel")
     ]
 print(table(reports))
@@ -293,8 +322,9 @@ assert all(report.passed for report in reports)
 # Does the number depend on whether the coordinates of the pixel are even or odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned round: an even pixel is read by more
-# coarse samples than an odd one, so it costs more values.
+# Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned
+# round: an even pixel is read by more coarse samples than an odd one, so it costs more
+# values.
 costs = {}
 for at in (64, 65):
     hole = np.ones((129, 129), bool)

@@ -22,19 +22,24 @@
 # The optional exposure of a frame, {eq}`eq-b13` of {doc}`/specification/b13_exposure`, acts on the render before the
 # losses do.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.equations.exposure import exposure_forward, exposure_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.losses.depth import (
+    depth_target,
+    normalised_depth_forward,
+    normalised_depth_reverse,
+)
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
 from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.simulator import SimulatorSettings, simulate
 
+# %%
 rng = np.random.default_rng(10)
 sequence = simulate(SimulatorSettings(width=64, height=48, frames=8)).sequence
 frame = sequence.frame(5, np.float64)
@@ -91,7 +96,11 @@ def window(image):
     """k * image, zeros outside."""
     padded = np.pad(image, ((0, 0), (5, 5), (5, 5)))
     h, w = image.shape[1:]
-    return sum(kappa[i] * kappa[j] * padded[:, i : i + h, j : j + w] for i in range(11) for j in range(11))
+    return sum(
+        kappa[i] * kappa[j] * padded[:, i : i + h, j : j + w]
+        for i in range(11)
+        for j in range(11)
+    )
 
 
 def ssim_map_text(x, y):
@@ -168,7 +177,9 @@ def smoothness_text(D_hat, I_hat, M, E, f):
 
     def TV(image):
         bar = np.where(M, 0, image)
-        return (np.abs(np.diff(bar, axis=1)).sum() + np.abs(np.diff(bar, axis=2)).sum()) / bar.size
+        return (
+            np.abs(np.diff(bar, axis=1)).sum() + np.abs(np.diff(bar, axis=2)).sum()
+        ) / bar.size
 
     return Q + f * TV(D_hat[None]) + f * TV(I_hat)
 
@@ -177,7 +188,9 @@ def smoothness_text(D_hat, I_hat, M, E, f):
 prior = depth_target(D_prior, M)
 L_D, saved_depth = normalised_depth_forward(D_hat, prior)
 np.testing.assert_allclose(L_D, depth_text(D_hat, D_prior, M), rtol=1e-12)
-np.testing.assert_allclose(normalised_depth_forward(D_hat, depth_target(7 * D_prior, M))[0], L_D, rtol=1e-12)
+np.testing.assert_allclose(
+    normalised_depth_forward(D_hat, depth_target(7 * D_prior, M))[0], L_D, rtol=1e-12
+)
 
 step = D_hat + 80 * (np.arange(W) > 20)  # a fold, so that there is an edge
 E = canny_edges(step)
@@ -206,7 +219,9 @@ for column, (name, change) in enumerate(changes.items(), start=1):
     render = I + change * (l1_text(blurred, 0 * I, M) / l1_text(change, 0 * I, M))
     scores[name] = masked_ssim_forward(render, target)[0]
     axes[0, column].imshow(np.clip(render, 0, 1).transpose(1, 2, 0))
-    axes[0, column].set_title(f"{name}: L1 {l1_text(render, I, M):.3f}, SSIM {scores[name]:.3f}")
+    axes[0, column].set_title(
+        f"{name}: L1 {l1_text(render, I, M):.3f}, SSIM {scores[name]:.3f}"
+    )
     lost = np.where(M, 1 - ssim_map_text(np.where(M, render, 0), y)[0].mean(axis=0), np.nan)
     axes[1, column].imshow(lost, vmin=0, vmax=1, cmap="magma")
 for panel in axes.flat:
@@ -296,15 +311,25 @@ def smoothness_reverse_text(g, D_hat, I_hat, M, E, f):
 # %%
 n = M.sum()
 np.testing.assert_allclose(
-    masked_l1_reverse(0.9, saved_l1), np.where(M, 0.9 / (3 * n) * np.sign(I_hat - I), 0), rtol=1e-13
+    masked_l1_reverse(0.9, saved_l1),
+    np.where(M, 0.9 / (3 * n) * np.sign(I_hat - I), 0),
+    rtol=1e-13,
 )
 np.testing.assert_allclose(
-    masked_ssim_reverse(-0.1, saved_ssim), ssim_reverse_text(-0.1, x, y, M), rtol=1e-6, atol=1e-12
+    masked_ssim_reverse(-0.1, saved_ssim),
+    ssim_reverse_text(-0.1, x, y, M),
+    rtol=1e-6,
+    atol=1e-12,
 )
 np.testing.assert_allclose(
-    normalised_depth_reverse(1.0, saved_depth), depth_reverse_text(1.0, D_hat, D_prior, M), rtol=1e-9, atol=1e-16
+    normalised_depth_reverse(1.0, saved_depth),
+    depth_reverse_text(1.0, D_hat, D_prior, M),
+    rtol=1e-9,
+    atol=1e-16,
 )
-for found, text in zip(smoothness_reverse(0.5, saved_smooth), smoothness_reverse_text(0.5, step, I_hat, M, E, 30.0)):
+for found, text in zip(
+    smoothness_reverse(0.5, saved_smooth), smoothness_reverse_text(0.5, step, I_hat, M, E, 30.0)
+):
     np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-18)
 
 # %% [markdown]
@@ -326,7 +351,9 @@ for c in range(3):
     gain = np.exp(gamma[c])
     np.testing.assert_allclose(exposed[c], gain * I_hat[c] + b[c], rtol=1e-14)
     np.testing.assert_allclose(found.d_colour[c], gain * g_I[c], rtol=1e-14)
-    np.testing.assert_allclose(found.d_log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11)
+    np.testing.assert_allclose(
+        found.d_log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11
+    )
     np.testing.assert_allclose(found.d_bias[c], g_I[c].sum(), rtol=1e-11)
 
 # %% [markdown]
@@ -346,9 +373,10 @@ assert all(report.passed for report in reports)
 # $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum makes it so: without it every pixel
-# would be pulled, and the scale of the scene with them.
+# Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum
+# makes it so: without it every pixel would be pulled, and the scale of the scene with them.
 g_D = normalised_depth_reverse(1.0, saved_depth)
-print(f"sum: {(g_D * D_hat).sum():.1e}; without the largest pixel: {(g_D * D_hat)[D_hat < D_hat.max()].sum():.2f}")
-assert abs((g_D * D_hat).sum()) < 1e-12
-assert abs((g_D * D_hat)[D_hat < D_hat.max()].sum()) > 1e-3
+whole, without_largest = (g_D * D_hat).sum(), (g_D * D_hat)[D_hat < D_hat.max()].sum()
+print(f"sum: {whole:.1e}; without the largest pixel: {without_largest:.2f}")
+assert abs(whole) < 1e-12
+assert abs(without_largest) > 1e-3

@@ -19,7 +19,7 @@
 #
 # The equation is {eq}`eq-7` of {doc}`/specification/07_calibration`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
@@ -33,6 +33,7 @@ from endotsr.fitting.objective import frame_targets, photometric_loss
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
+# %%
 sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 
 # %% [markdown]
@@ -62,7 +63,7 @@ def g_text(gradient):
 
 
 def lambda_text(views, r):
-    """views: (gradient of the photometric term, gradient of the Laplacian loss) by the render."""
+    """views: gradients of the photometric term and of the Laplacian loss by the render."""
     ratios = sorted(g_text(g_lap) / g_text(g_rgb) for g_rgb, g_lap in views)
     middle = len(ratios) // 2
     median = ratios[middle] if len(ratios) % 2 else (ratios[middle - 1] + ratios[middle]) / 2
@@ -71,25 +72,33 @@ def lambda_text(views, r):
 
 # %%
 w, r = PAPER.loss.ssim_weight, PAPER.loss.gradient_ratio
-chosen = sequence.train_index[calibration_views(len(sequence.train_index), PAPER.loss.calibration_views)]
+chosen = sequence.train_index[
+    calibration_views(len(sequence.train_index), PAPER.loss.calibration_views)
+]
 assert len(chosen) == 16 and not set(chosen) & set(sequence.test_index)
 
 
 def gradients(index, blur, w, stretch=1.0):
     """Both gradients of one view, with a blurred frame in place of the base render."""
     frame = sequence.frame(int(index), np.float64)
-    render = frame.image + stretch * (gaussian_filter(frame.image, (0, blur, blur)) - frame.image)
+    render = frame.image + stretch * (
+        gaussian_filter(frame.image, (0, blur, blur)) - frame.image
+    )
     targets = frame_targets(frame, PAPER)
     _, saved = laplacian_loss_forward(render, targets.image, targets.supports)
     return photometric_loss(render, targets, w).d_colour, laplacian_loss_reverse(1.0, saved)
 
 
 views = [gradients(index, 1.5, w) for index in chosen]
-sizes = [(sequence.names[index], rms(rgb), rms(lap)) for index, (rgb, lap) in zip(chosen, views)]
+sizes = [
+    (sequence.names[index], rms(rgb), rms(lap)) for index, (rgb, lap) in zip(chosen, views)
+]
 calibration = calibrate(sizes, r)
 print("\n".join(calibration.table.splitlines()[:4]), "\n...")
 np.testing.assert_allclose(calibration.lambda_lap, lambda_text(views, r), rtol=1e-13)
-np.testing.assert_allclose(calibrate(sizes[:15], r).lambda_lap, lambda_text(views[:15], r), rtol=1e-13)
+np.testing.assert_allclose(
+    calibrate(sizes[:15], r).lambda_lap, lambda_text(views[:15], r), rtol=1e-13
+)
 
 # %% [markdown]
 # After calibration the Laplacian loss has the required gradient in the median view:
@@ -97,7 +106,9 @@ np.testing.assert_allclose(calibrate(sizes[:15], r).lambda_lap, lambda_text(view
 # %%
 force = [calibration.lambda_lap * lap / rgb for _, rgb, lap in sizes]
 np.testing.assert_allclose(np.median(force), r, rtol=1e-13)
-np.testing.assert_allclose(calibrate(sizes, 2 * r).lambda_lap, 2 * calibration.lambda_lap, rtol=1e-14)
+np.testing.assert_allclose(
+    calibrate(sizes, 2 * r).lambda_lap, 2 * calibration.lambda_lap, rtol=1e-14
+)
 
 # %% [markdown]
 # ## Figure: two gradients of the same image
@@ -157,7 +168,10 @@ assert all(report.passed for report in reports)
 # the median is 0, an error with the table of all views is raised. The weight is never infinite.
 
 # %%
-assert calibrate([*sizes, ("perfect", 0.0, 0.0), ("broken", np.nan, 1.0)], r).lambda_lap == calibration.lambda_lap
+assert (
+    calibrate([*sizes, ("perfect", 0.0, 0.0), ("broken", np.nan, 1.0)], r).lambda_lap
+    == calibration.lambda_lap
+)
 for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
     try:
         calibrate(hopeless, r)
@@ -173,10 +187,14 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 # of a mean of absolute values depends on.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Not at all. The gradient of a mean of absolute values depends on how many residuals are not zero, not on how large they
-# are; both losses are of this kind. With SSIM in the photometric term it does change.
+# Answer. Not at all. The gradient of a mean of absolute values depends on how many residuals
+# are not zero, not on how large they are; both losses are of this kind. With SSIM in the
+# photometric term it does change.
 whole = calibrate([("", *map(rms, gradients(i, 1.5, 0.0))) for i in chosen[::4]], r).lambda_lap
-half = calibrate([("", *map(rms, gradients(i, 1.5, 0.0, stretch=0.5))) for i in chosen[::4]], r).lambda_lap
+half = calibrate(
+    [("", *map(rms, gradients(i, 1.5, 0.0, stretch=0.5))) for i in chosen[::4]], r
+).lambda_lap
 print(whole, half)
 np.testing.assert_allclose(half, whole, rtol=1e-6)
-assert msgspec.structs.replace(PAPER.loss, lambda_lap="auto").lambda_lap == "auto"  # the setting that asks for all this
+# The setting that asks for all this.
+assert msgspec.structs.replace(PAPER.loss, lambda_lap="auto").lambda_lap == "auto"

@@ -20,7 +20,7 @@
 # The equations are {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of
 # {doc}`/specification/b11_density`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -28,13 +28,19 @@ from endotsr.config import PAPER, DensityConfig
 from endotsr.fitting.adam import adam_state, adam_step, adam_update, regather
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
-from endotsr.scene.density_control import DensityStatistics, densify, empty_statistics, gather_statistics
+from endotsr.scene.density_control import (
+    DensityStatistics,
+    densify,
+    empty_statistics,
+    gather_statistics,
+)
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.render import Scene, render_forward, render_reverse
 from endotsr.splatting.settings import PAPER as RASTER
 
+# %%
 rng = np.random.default_rng(12)
 
 # %% [markdown]
@@ -61,7 +67,11 @@ def adam_text(theta, g, m, v, k, eta):
 
 
 # %%
-assert (PAPER.optimiser.beta1, PAPER.optimiser.beta2, PAPER.optimiser.epsilon) == (beta_1, beta_2, epsilon)
+assert (PAPER.optimiser.beta1, PAPER.optimiser.beta2, PAPER.optimiser.epsilon) == (
+    beta_1,
+    beta_2,
+    epsilon,
+)
 theta = rng.normal(size=(3, 40))
 mine = (theta.copy(), np.zeros_like(theta), np.zeros_like(theta))
 kernel = [part.copy() for part in mine]
@@ -88,7 +98,9 @@ np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 # %%
 for size in (1.0, 1e-10):
     p = np.zeros(2)
-    adam_step(p, np.array([size, -size]), np.zeros(2), np.zeros(2), 1, 0.01, beta_1, beta_2, epsilon)
+    adam_step(
+        p, np.array([size, -size]), np.zeros(2), np.zeros(2), 1, 0.01, beta_1, beta_2, epsilon
+    )
     np.testing.assert_allclose(p, [-0.01, 0.01], rtol=2e-5)
 
 # %% [markdown]
@@ -117,8 +129,12 @@ for i in (1, 1500, 3000, 3001, 4500, 6000):
     np.testing.assert_allclose(rates["fdm_centre"], rate_text(i, 1.6e-3, 0, T), rtol=1e-12)
     assert ("appearance_coefficients" in rates) == (i > K_s)
     if i > K_s:
-        np.testing.assert_allclose(rates["appearance_coefficients"], rate_text(i, 3.125e-3, K_s, T), rtol=1e-12)
-        np.testing.assert_allclose(rates["motion_coefficients"], rate_text(i, 1.6e-4, K_s, T), rtol=1e-12)
+        np.testing.assert_allclose(
+            rates["appearance_coefficients"], rate_text(i, 3.125e-3, K_s, T), rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            rates["motion_coefficients"], rate_text(i, 1.6e-4, K_s, T), rtol=1e-12
+        )
 assert [active_degree(i, PAPER) for i in (499, 500, 1000, 1500, 6000)] == [0, 1, 2, 3, 3]
 assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000, 100))
 
@@ -142,7 +158,8 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 def statistic_text(views, width, height):
     """views: (g_u, g_v, visible) of each view."""
     total = sum(
-        np.where(seen, np.sqrt((width / 2 * g_u) ** 2 + (height / 2 * g_v) ** 2), 0) for g_u, g_v, seen in views
+        np.where(seen, np.sqrt((width / 2 * g_u) ** 2 + (height / 2 * g_v) ** 2), 0)
+        for g_u, g_v, seen in views
     )
     count = sum(seen.astype(int) for _, _, seen in views)
     return np.where(count > 0, total / np.maximum(count, 1), 0)
@@ -173,7 +190,11 @@ gaussians = Gaussians(
 gaussians.opacity_logit[0] = -5.2983  # an opacity of 0.00498: just below the bound
 camera = Camera(np.eye(3), np.zeros(3), 40.0, 40.0, 32.0, 24.0, 64, 48)
 scene = Scene(
-    gaussians.position, gaussians.quaternion, gaussians.log_scale, gaussians.opacity_logit, gaussians.harmonics
+    gaussians.position,
+    gaussians.quaternion,
+    gaussians.log_scale,
+    gaussians.opacity_logit,
+    gaussians.harmonics,
 )
 statistics, views = empty_statistics(N), []
 for _ in range(3):  # three views: a shifted camera, and a random pull on the image
@@ -183,7 +204,9 @@ for _ in range(3):  # three views: a shifted camera, and a random pull on the im
     gather_statistics(statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
     views.append((*grads.d_mean2d, grads.visible))
 steep = statistic_text(views, 64, 48)
-np.testing.assert_allclose(statistics.gradient_sum / np.maximum(statistics.visits, 1), steep, rtol=1e-12)
+np.testing.assert_allclose(
+    statistics.gradient_sum / np.maximum(statistics.visits, 1), steep, rtol=1e-12
+)
 
 # %%
 rule = DensityConfig(gradient_threshold=float(np.quantile(steep, 0.6)))
@@ -193,24 +216,36 @@ alive = 1 / (1 + np.exp(-gaussians.opacity_logit)) >= rule.prune_opacity
 candidate = alive & (steep >= rule.gradient_threshold)
 small = np.exp(gaussians.log_scale).max(axis=0) <= p * extent
 to_clone, to_split = np.flatnonzero(candidate & small), np.flatnonzero(candidate & ~small)
-assert (after.pruned, after.cloned, after.split) == (np.sum(~alive), len(to_clone), len(to_split))
+assert (after.pruned, after.cloned, after.split) == (
+    np.sum(~alive),
+    len(to_clone),
+    len(to_split),
+)
 assert min(after.pruned, after.cloned, after.split) > 0, "the example shows all three"
 survivors = np.flatnonzero(alive & ~np.isin(np.arange(N), to_split))
 adam = adam_state(arrays(gaussians))
 adam.first["position"] += np.arange(1.0, N + 1)
-regather(adam, arrays(gaussians), after.plan.source, after.plan.survivors)  # moments follow; fresh ones start at 0
+# Moments follow; fresh ones start at 0.
+regather(adam, arrays(gaussians), after.plan.source, after.plan.survivors)
 np.testing.assert_array_equal(
-    adam.first["position"][0], [*(survivors + 1.0), *np.zeros(len(to_clone) + 2 * len(to_split))]
+    adam.first["position"][0],
+    [*(survivors + 1.0), *np.zeros(len(to_clone) + 2 * len(to_split))],
 )
-np.testing.assert_array_equal(after.gaussians.position[:, : len(survivors)], gaussians.position[:, survivors])
 np.testing.assert_array_equal(
-    after.gaussians.position[:, len(survivors) :][:, : len(to_clone)], gaussians.position[:, to_clone]
+    after.gaussians.position[:, : len(survivors)], gaussians.position[:, survivors]
+)
+np.testing.assert_array_equal(
+    after.gaussians.position[:, len(survivors) :][:, : len(to_clone)],
+    gaussians.position[:, to_clone],
 )
 xi = np.random.default_rng(5).standard_normal((2, 3, len(to_split)))
 start = len(survivors) + len(to_clone)
 for column, parent in enumerate(to_split):
     centres, log_scale = children_text(
-        gaussians.position[:, parent], gaussians.quaternion[:, parent], gaussians.log_scale[:, parent], xi[:, :, column]
+        gaussians.position[:, parent],
+        gaussians.quaternion[:, parent],
+        gaussians.log_scale[:, parent],
+        xi[:, :, column],
     )
     for child in (0, 1):
         at = start + child * len(to_split) + column
@@ -221,7 +256,9 @@ for column, parent in enumerate(to_split):
 # ## Figure: rates over a run, and one step of density control
 
 # %% tags=["hide-input"]
-figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1])
+figure, axes = plt.subplots(
+    1, 3, figsize=(13.5, 3.9), layout="constrained", width_ratios=[1.1, 1, 1]
+)
 steps = np.arange(1, T + 1, 10)
 for name, label in (
     ("position", "position, FDM"),
@@ -231,11 +268,15 @@ for name, label in (
     ("log_scale", "scale"),
     ("quaternion", "rotation"),
 ):
-    axes[0].semilogy(steps, [learning_rates(int(i), PAPER).get(name, np.nan) for i in steps], label=label)
+    axes[0].semilogy(
+        steps, [learning_rates(int(i), PAPER).get(name, np.nan) for i in steps], label=label
+    )
 axes[0].axvspan(500, 4000, color="0.93", label="density control")
 axes[0].set(title="learning rates, preset paper", xlabel="iteration", ylim=(3e-8, 0.2))
 axes[0].legend(fontsize=7, loc="lower left", ncols=2)
-circle = np.stack([np.cos(np.linspace(0, 2 * np.pi, 40)), np.sin(np.linspace(0, 2 * np.pi, 40))])
+circle = np.stack(
+    [np.cos(np.linspace(0, 2 * np.pi, 40)), np.sin(np.linspace(0, 2 * np.pi, 40))]
+)
 
 
 def outlines(panel, some, colours):
@@ -252,7 +293,10 @@ outlines(axes[1], gaussians, before)
 now = ["0.75"] * len(survivors) + ["tab:blue"] * len(to_clone) + ["tab:red"] * 2 * len(to_split)
 outlines(axes[2], after.gaussians, now)
 axes[1].set_title(f"before: {N}. black: to prune, blue: to clone,\nred: to split", fontsize=10)
-axes[2].set_title(f"after: {after.gaussians.count}. blue: clones (on their parents),\nred: children", fontsize=10)
+axes[2].set_title(
+    f"after: {after.gaussians.count}. blue: clones (on their parents),\nred: children",
+    fontsize=10,
+)
 for panel in axes[1:]:
     panel.set(xlim=(-2.7, 2.7), ylim=(-2.5, 2.5), aspect="equal", xticks=[], yticks=[])
 plt.show()
@@ -277,7 +321,8 @@ assert report.passed
 # of a child added at $k=600$, in units of $\eta$? How large is it when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and the corrections no longer make up for it.
+# Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and the
+# corrections no longer make up for it.
 for k, factor in ((600, 2.13), (10**6, 3.162)):
     p = np.zeros(1)
     adam_step(p, np.ones(1), np.zeros(1), np.zeros(1), k, 1.0, beta_1, beta_2, epsilon)

@@ -19,7 +19,7 @@
 #
 # The equation is {eq}`eq-b12` of {doc}`/specification/b12_initialisation`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import os
 
 import matplotlib.pyplot as plt
@@ -31,6 +31,7 @@ from endotsr.scene.initialisation import Y00, gaussians_at, initialise
 from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.splatting.camera import backproject
 
+# %%
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
 settings = SimulatorSettings(width=64, height=51, frames=12) if SMALL else SimulatorSettings()
 simulated = simulate(settings)
@@ -54,7 +55,9 @@ def sheet_text(surface, a, b, t):
     )
     X = np.stack([a, b, surface.distance + h])
     for motion in surface.motions:
-        X = X + motion.course(t) * motion.weight(a, b)[0] * motion.direction.reshape(3, *[1] * a.ndim)
+        X = X + motion.course(t) * motion.weight(a, b)[0] * motion.direction.reshape(
+            3, *[1] * a.ndim
+        )
     return X
 
 
@@ -67,11 +70,19 @@ for index in (0, 5, 11):
     t = float(sequence.times[index])
     a, b = truth.material_coordinates[index]
     X = sheet_text(truth.surface, a, b, t)
-    np.testing.assert_allclose(simulated.surface_point(truth.material_coordinates[index], t), X, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(truth.depth[index], X[2], rtol=1e-12)  # the camera rests at the origin
+    np.testing.assert_allclose(
+        simulated.surface_point(truth.material_coordinates[index], t), X, rtol=1e-12, atol=1e-12
+    )
+    # The camera rests at the origin.
+    np.testing.assert_allclose(truth.depth[index], X[2], rtol=1e-12)
     u = camera.fx * X[0] / X[2] + camera.cx
-    np.testing.assert_allclose(u, np.broadcast_to(np.arange(camera.width) + 0.5, u.shape), atol=1e-6)  # pixel centres
-    np.testing.assert_allclose(truth.surface.motions[0].course(t), breathing_text(settings.breathing, t), rtol=1e-12)
+    # Pixel centres.
+    np.testing.assert_allclose(
+        u, np.broadcast_to(np.arange(camera.width) + 0.5, u.shape), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        truth.surface.motions[0].course(t), breathing_text(settings.breathing, t), rtol=1e-12
+    )
 
 # %% [markdown]
 # ## Each effect is a switch
@@ -114,22 +125,38 @@ middle = sequence.count // 2
 for panel, index in zip(axes[0], np.linspace(0, sequence.count - 1, 4).astype(int)):
     panel.imshow(sequence.images[index].transpose(1, 2, 0))
     panel.set_title(
-        f"frame {index}, t = {sequence.times[index]:.2f}" + (" (held out)" if index in sequence.test_index else "")
+        f"frame {index}, t = {sequence.times[index]:.2f}"
+        + (" (held out)" if index in sequence.test_index else "")
     )
 axes[1, 0].imshow(truth.depth[middle], cmap="viridis")
-axes[1, 0].set_title(f"true depth, {truth.depth[middle].min():.0f} to {truth.depth[middle].max():.0f} mm")
-axes[1, 1].imshow(np.where(sequence.depth[middle] > 0, sequence.depth[middle], np.nan), cmap="viridis")
+axes[1, 0].set_title(
+    f"true depth, {truth.depth[middle].min():.0f} to {truth.depth[middle].max():.0f} mm"
+)
+axes[1, 1].imshow(
+    np.where(sequence.depth[middle] > 0, sequence.depth[middle], np.nan), cmap="viridis"
+)
 axes[1, 1].set_title("depth prior (none under the tool)")
 flow = simulated.true_flow(0, middle)
 axes[1, 2].imshow(np.hypot(*flow), cmap="magma")
 step = max(4, camera.width // 14)
 rows, columns = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
 axes[1, 2].quiver(
-    columns, rows, *flow[:, rows, columns], color="w", angles="xy", scale_units="xy", scale=1, width=0.006
+    columns,
+    rows,
+    *flow[:, rows, columns],
+    color="w",
+    angles="xy",
+    scale_units="xy",
+    scale=1,
+    width=0.006,
 )
 axes[1, 2].set_title(f"true flow from frame 0, up to {np.hypot(*flow).max():.1f} px")
 times = np.linspace(0, 1, 200)
-for (a, b), label in (((-10.0, 5.0), "on the beat"), ((3.0, 2.0), "on the pull"), ((15.0, -10.0), "breathing only")):
+for (a, b), label in (
+    ((-10.0, 5.0), "on the beat"),
+    ((3.0, 2.0), "on the pull"),
+    ((15.0, -10.0), "breathing only"),
+):
     heights = [-simulated.surface_point(np.array([a, b]), t)[2] for t in times]
     axes[1, 3].plot(times, np.array(heights) - heights[0], label=label)
 axes[1, 3].set(title="lift towards the camera [mm]", xlabel="t")
@@ -154,7 +181,9 @@ plt.show()
 
 # %% tags=["transcription"]
 def lift_text(i, j, D, camera):
-    in_camera = np.array([(i + 1 / 2 - camera.cx) * D / camera.fx, (j + 1 / 2 - camera.cy) * D / camera.fy, D])
+    in_camera = np.array(
+        [(i + 1 / 2 - camera.cx) * D / camera.fx, (j + 1 / 2 - camera.cy) * D / camera.fy, D]
+    )
     return camera.rotation.T @ (in_camera - camera.translation)
 
 
@@ -166,13 +195,19 @@ def log_scale_text(positions):
 
 # %%
 j, i = np.mgrid[0 : camera.height, 0 : camera.width]
-lifted = backproject(camera, i.ravel().astype(float), j.ravel().astype(float), truth.depth[0].ravel())
+lifted = backproject(
+    camera, i.ravel().astype(float), j.ravel().astype(float), truth.depth[0].ravel()
+)
 np.testing.assert_allclose(
-    lifted[:, 777], lift_text(i.flat[777], j.flat[777], truth.depth[0].flat[777], camera), rtol=1e-13
+    lifted[:, 777],
+    lift_text(i.flat[777], j.flat[777], truth.depth[0].flat[777], camera),
+    rtol=1e-13,
 )
 # projecting and lifting are inverse to each other, and the lifted depth is the sheet itself:
 np.testing.assert_allclose(
-    lifted, simulated.surface_point(truth.material_coordinates[0].reshape(2, -1), 0.0), atol=1e-8
+    lifted,
+    simulated.surface_point(truth.material_coordinates[0].reshape(2, -1), 0.0),
+    atol=1e-8,
 )
 turned = simulate(with_effects(tiny, "camera_motion")).sequence.cameras[3]
 np.testing.assert_allclose(
@@ -188,7 +223,9 @@ start = initialise(
     np.random.default_rng(0),
     np.float64,
 )
-np.testing.assert_allclose(start.log_scale, np.tile(log_scale_text(start.position), (3, 1)), rtol=1e-9, atol=1e-12)
+np.testing.assert_allclose(
+    start.log_scale, np.tile(log_scale_text(start.position), (3, 1)), rtol=1e-9, atol=1e-12
+)
 np.testing.assert_allclose(1 / (1 + np.exp(-start.opacity_logit)), 0.1, rtol=1e-12)
 colour = start.harmonics[0] * Y00 + 0.5
 assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
@@ -215,11 +252,16 @@ assert report.passed
 # Answer. Change the held-out frames to anything, and see whether one bit of the result moves.
 import dataclasses
 
-spoiled = dataclasses.replace(sequence, images=sequence.images.copy(), depth=sequence.depth.copy())
+spoiled = dataclasses.replace(
+    sequence, images=sequence.images.copy(), depth=sequence.depth.copy()
+)
 spoiled.images[sequence.test_index] = 7
 spoiled.depth[sequence.test_index] = 1e6
 few = InitialisationConfig(first_frame_points=300, other_frame_points=600, motion_threshold=1.0)
-one, other = (initialise(s, few, ModelConfig(), np.random.default_rng(3)) for s in (sequence, spoiled))
+one, other = (
+    initialise(s, few, ModelConfig(), np.random.default_rng(3)) for s in (sequence, spoiled)
+)
 assert all(np.array_equal(x, y) for x, y in zip(one[:8], other[:8]))
-lone = gaussians_at(np.zeros((3, 1)), np.full((3, 1), 0.5), ModelConfig(), np.float64)  # a single point gets the floor
+# A single point gets the floor.
+lone = gaussians_at(np.zeros((3, 1)), np.full((3, 1), 0.5), ModelConfig(), np.float64)
 np.testing.assert_allclose(lone.log_scale, np.log(np.sqrt(1e-7)))

@@ -19,7 +19,7 @@
 # The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
 # {doc}`/specification/metrics`.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import base64
 import dataclasses
 import io
@@ -41,6 +41,7 @@ from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
 
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 replace = msgspec.structs.replace
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
 if SMALL:  # a thumbnail, for the tests; the book shows the demonstration at full size
@@ -48,14 +49,20 @@ if SMALL:  # a thumbnail, for the tests; the book shows the demonstration at ful
 else:
     simulation, T, points = SimulatorSettings(), 600, 6000
 sequence = simulate(simulation).sequence
-config = with_iterations(PAPER, T)  # the published method, with time bases as wide as its few frames need
+# The published method, with time bases as wide as its few frames need.
+config = with_iterations(PAPER, T)
 config = replace(
     config,
     model=replace(config.model, initial_width=0.1),
-    initialisation=replace(config.initialisation, first_frame_points=points, other_frame_points=points // 4),
+    initialisation=replace(
+        config.initialisation, first_frame_points=points, other_frame_points=points // 4
+    ),
     training=replace(config.training, bridge_fraction=1.0),
 )
-print(f"{sequence.count} frames of {sequence.width}x{sequence.height}; held out: {sequence.test_index.tolist()}")
+print(
+    f"{sequence.count} frames of {sequence.width}x{sequence.height}; "
+    f"held out: {sequence.test_index.tolist()}"
+)
 
 # %% [markdown]
 # ## The objective
@@ -111,7 +118,12 @@ def train(sequence, config):
 
 def render(state, shop, index, **components):
     out = render_at(
-        state.gaussians, shop.spectral, shop.config, sequence.cameras[index], float(sequence.times[index]), **components
+        state.gaussians,
+        shop.spectral,
+        shop.config,
+        sequence.cameras[index],
+        float(sequence.times[index]),
+        **components,
     )
     return np.clip(out.colour, 0, 1)
 
@@ -120,7 +132,11 @@ def score(state, shop, frames, **components):
     """Mean PSNR over tissue, dB."""
     return np.mean(
         [
-            psnr_tissue(render(state, shop, int(k), **components), sequence.frame(int(k)).image, sequence.masks[k])
+            psnr_tissue(
+                render(state, shop, int(k), **components),
+                sequence.frame(int(k)).image,
+                sequence.masks[k],
+            )
             for k in frames
         ]
     )
@@ -142,9 +158,12 @@ still = replace(
 one_state, one_shop, one_log = train(alone, still)
 others = sequence.train_index[len(sequence.train_index) // 2 :]
 print(
-    f"the fitted frame: {score(one_state, one_shop, [first]):.1f} dB; later frames: {score(one_state, one_shop, others):.1f} dB"
+    f"the fitted frame: {score(one_state, one_shop, [first]):.1f} dB; "
+    f"later frames: {score(one_state, one_shop, others):.1f} dB"
 )
-assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, "it was fitted to one time only"
+assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) + 5, (
+    "it was fitted to one time only"
+)
 
 # %% [markdown]
 # ## The full sequence
@@ -152,11 +171,13 @@ assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) 
 # %%
 state, shop, log = train(sequence, config)
 for entry in log:
-    np.testing.assert_allclose(entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12)
+    np.testing.assert_allclose(
+        entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12
+    )
 activation = config.training.residual_activation
-assert "matern_penalty" not in log[activation - 1] and log[activation]["matern_penalty"] == 0.0, (
-    "the residuals start at zero, one iteration after K_s"
-)
+assert (
+    "matern_penalty" not in log[activation - 1] and log[activation]["matern_penalty"] == 0.0
+), "the residuals start at zero, one iteration after K_s"
 assert np.mean([e["l1"] for e in log[-20:]]) < 0.4 * np.mean([e["l1"] for e in log[:20]])
 
 # %% tags=["hide-input"]
@@ -172,18 +193,35 @@ for name, label in (
 ):
     there = [e for e in log if name in e]
     values = np.array([1 - e[name] if name == "ssim" else e[name] for e in there])
-    axes[0].semilogy([e["iteration"] for e in there][4:-4], np.maximum(smooth(values), 1e-9)[4:-4], label=label)
-for milestone, label in ((config.loss.laplacian_from, "Laplacian loss begins"), (activation, "A and S activated")):
+    axes[0].semilogy(
+        [e["iteration"] for e in there][4:-4],
+        np.maximum(smooth(values), 1e-9)[4:-4],
+        label=label,
+    )
+for milestone, label in (
+    (config.loss.laplacian_from, "Laplacian loss begins"),
+    (activation, "A and S activated"),
+):
     axes[0].axvline(milestone, color="0.7", lw=1)
     axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
 axes[0].legend(fontsize=8, ncols=3, loc="lower left")
 per_frame = [score(state, shop, [k]) for k in range(sequence.count)]
 held = np.isin(np.arange(sequence.count), sequence.test_index)
-axes[1].plot(np.arange(sequence.count)[~held], np.array(per_frame)[~held], "o", label="training frames")
-axes[1].plot(np.arange(sequence.count)[held], np.array(per_frame)[held], "D", color="tab:red", label="held-out frames")
 axes[1].plot(
-    [score(one_state, one_shop, [k]) for k in range(sequence.count)], color="0.6", label="the fit of one frame"
+    np.arange(sequence.count)[~held], np.array(per_frame)[~held], "o", label="training frames"
+)
+axes[1].plot(
+    np.arange(sequence.count)[held],
+    np.array(per_frame)[held],
+    "D",
+    color="tab:red",
+    label="held-out frames",
+)
+axes[1].plot(
+    [score(one_state, one_shop, [k]) for k in range(sequence.count)],
+    color="0.6",
+    label="the fit of one frame",
 )
 axes[1].set(title="PSNR over tissue", xlabel="frame", ylabel="dB")
 axes[1].legend(fontsize=8)
@@ -213,19 +251,27 @@ def psnr_text(x_hat, x, M):
     _, H, W = x.shape
     n = M.sum()
     squares = (x_hat - x) ** 2
-    return -10 * np.log10(squares.sum() / (3 * H * W)), -10 * np.log10(squares[:, M].sum() / (3 * n))
+    return -10 * np.log10(squares.sum() / (3 * H * W)), -10 * np.log10(
+        squares[:, M].sum() / (3 * n)
+    )
 
 
 def ssim_text(x_hat, x, M):
     """(full, tissue): the mean of the map, zeros outside the image."""
     kappa = np.exp(-(np.arange(-5, 6) ** 2) / (2 * 1.5**2))
     kappa = kappa / kappa.sum()
-    window = lambda f: correlate1d(correlate1d(f, kappa, axis=1, mode="constant"), kappa, axis=2, mode="constant")
+    window = lambda f: correlate1d(
+        correlate1d(f, kappa, axis=1, mode="constant"), kappa, axis=2, mode="constant"
+    )
     mu_x, mu_y = window(x_hat), window(x)
     sigma_xy = window(x_hat * x) - mu_x * mu_y
     sigma_x, sigma_y = window(x_hat**2) - mu_x**2, window(x**2) - mu_y**2
     C_1, C_2 = 1e-4, 9e-4
-    s = (2 * mu_x * mu_y + C_1) * (2 * sigma_xy + C_2) / ((mu_x**2 + mu_y**2 + C_1) * (sigma_x + sigma_y + C_2))
+    s = (
+        (2 * mu_x * mu_y + C_1)
+        * (2 * sigma_xy + C_2)
+        / ((mu_x**2 + mu_y**2 + C_1) * (sigma_x + sigma_y + C_2))
+    )
     return s.mean(), s[:, M].mean()
 
 
@@ -235,10 +281,14 @@ for k in sequence.test_index:
     rendered = render(state, shop, int(k)).astype(np.float64)
     masked = (np.where(M, rendered, 0), np.where(M, truth, 0), M)
     np.testing.assert_allclose(
-        (psnr(rendered, truth, M), psnr_tissue(rendered, truth, M)), psnr_text(*masked), rtol=1e-12
+        (psnr(rendered, truth, M), psnr_tissue(rendered, truth, M)),
+        psnr_text(*masked),
+        rtol=1e-12,
     )
     np.testing.assert_allclose(
-        (ssim_full(rendered, truth, M), ssim_tissue(rendered, truth, M)), ssim_text(*masked), rtol=1e-10
+        (ssim_full(rendered, truth, M), ssim_tissue(rendered, truth, M)),
+        ssim_text(*masked),
+        rtol=1e-10,
     )
 
 # %% [markdown]
@@ -254,7 +304,9 @@ shown = sequence.test_index[[0, -1]]
 figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
 for row, k in zip(axes, shown):
     truth, full = sequence.frame(int(k)).image, render(state, shop, int(k))
-    without_A, without_S = (render(state, shop, int(k), **{c: False}) for c in ("appearance", "spectral_motion"))
+    without_A, without_S = (
+        render(state, shop, int(k), **{c: False}) for c in ("appearance", "spectral_motion")
+    )
     error = np.where(sequence.masks[k], np.abs(full - truth).mean(axis=0), np.nan)
     pictures = (
         truth.transpose(1, 2, 0),
@@ -273,7 +325,9 @@ for row, k in zip(axes, shown):
     for panel, picture, title in zip(row, pictures, titles):
         signed = "adds" in title
         limits = (
-            {"vmin": -0.15, "vmax": 0.15, "cmap": "RdBu_r"} if signed else {"vmin": 0, "vmax": 0.2, "cmap": "magma"}
+            {"vmin": -0.15, "vmax": 0.15, "cmap": "RdBu_r"}
+            if signed
+            else {"vmin": 0, "vmax": 0.2, "cmap": "magma"}
         )
         panel.imshow(picture, **({} if picture.ndim == 3 else limits))
         panel.set(title=title, xticks=[], yticks=[])
@@ -290,16 +344,22 @@ for j, t in enumerate(times):
     out = render_at(state.gaussians, shop.spectral, shop.config, sequence.cameras[0], float(t))
     pair = [sequence.images[j // 2] / 255, np.clip(out.colour, 0, 1)]
     strip = np.concatenate(pair, axis=2).transpose(1, 2, 0)
-    strip[: max(2, sequence.height // 40)] = (0.9, 0.1, 0.1) if j % 2 == 0 and j // 2 in sequence.test_index else 1.0
-    enlarged = Image.fromarray((255 * strip).astype(np.uint8)).resize((640, 640 * strip.shape[0] // strip.shape[1]))
+    strip[: max(2, sequence.height // 40)] = (
+        (0.9, 0.1, 0.1) if j % 2 == 0 and j // 2 in sequence.test_index else 1.0
+    )
+    enlarged = Image.fromarray((255 * strip).astype(np.uint8)).resize(
+        (640, 640 * strip.shape[0] // strip.shape[1])
+    )
     strips.append(enlarged)
 film = io.BytesIO()
-strips[0].save(film, "WEBP", save_all=True, append_images=strips[1:], duration=120, loop=0, quality=70)
+strips[0].save(
+    film, "WEBP", save_all=True, append_images=strips[1:], duration=120, loop=0, quality=70
+)
 assert film.tell() < 1_000_000, "small enough for a page"
 source = "data:image/webp;base64," + base64.b64encode(film.getvalue()).decode()
-SimpleNamespace(
-    _repr_html_=lambda: f'<img src="{source}" alt="observed frames and render, over time" style="max-width:100%">'
-)
+words = "observed frames and render, over time"
+picture = f'<img src="{source}" alt="{words}" style="max-width:100%">'
+SimpleNamespace(_repr_html_=lambda: picture)
 
 # %% [markdown]
 # ## Ablation
@@ -325,7 +385,10 @@ for name, parts in variants.items():
 for name, (_, make) in BASELINES.items():
     predict = make(sequence)
     scores[name.replace("_", " ")] = np.mean(
-        [psnr_tissue(predict(int(k)), sequence.frame(int(k)).image, sequence.masks[k]) for k in sequence.test_index]
+        [
+            psnr_tissue(predict(int(k)), sequence.frame(int(k)).image, sequence.masks[k])
+            for k in sequence.test_index
+        ]
     )
 for name, value in scores.items():
     print(f"{name:20s} {value:6.2f} dB")
@@ -334,7 +397,11 @@ assert scores["full"] > scores["without A"] and scores["full"] > scores["tempora
 figure, axis = plt.subplots(figsize=(8, 3.4), layout="constrained")
 axis.barh(list(scores), list(scores.values()), color=["tab:blue"] * 5 + ["0.7"] * 4)
 axis.invert_yaxis()
-axis.set(title="held-out PSNR over tissue", xlabel="dB", xlim=(min(scores.values()) - 2, max(scores.values()) + 0.5))
+axis.set(
+    title="held-out PSNR over tissue",
+    xlabel="dB",
+    xlim=(min(scores.values()) - 2, max(scores.values()) + 0.5),
+)
 plt.show()
 
 # %% [markdown]
@@ -401,10 +468,13 @@ assert report.passed
 # was trained without A. Which is better on the training frames? Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The one trained without A: its other parameters have learned to do without (wrongly, by moving things). The difference
-# between "taken out" and "never there" is what the rest of the model would abuse.
+# Answer. The one trained without A: its other parameters have learned to do without (wrongly,
+# by moving things). The difference between "taken out" and "never there" is what the rest of
+# the model would abuse.
 with_all = score(state, shop, sequence.train_index)
 taken_out = score(state, shop, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)
-print(f"all {with_all:.2f} dB, A never there {never_there:.2f} dB, A taken out {taken_out:.2f} dB")
+print(
+    f"all {with_all:.2f} dB, A never there {never_there:.2f} dB, A taken out {taken_out:.2f} dB"
+)
 assert with_all > max(never_there, taken_out) + 0.3

@@ -21,11 +21,15 @@
 # Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears again, because its **form** is what makes the
 # first case accurate.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
-from endotsr.equations.laplacian import laplacian_loss_forward, laplacian_loss_reverse, support_masks
+from endotsr.equations.laplacian import (
+    laplacian_loss_forward,
+    laplacian_loss_reverse,
+    support_masks,
+)
 from endotsr.gradcheck import (
     all_pairs,
     check_function,
@@ -37,17 +41,24 @@ from endotsr.gradcheck import (
     table,
 )
 from endotsr.kernels.constants import Y00
-from endotsr.losses.depth import depth_target, normalised_depth_forward, normalised_depth_reverse
+from endotsr.losses.depth import (
+    depth_target,
+    normalised_depth_forward,
+    normalised_depth_reverse,
+)
 from endotsr.losses.masked_l1 import masked_l1_forward, masked_l1_reverse
 from endotsr.losses.masked_ssim import masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene, render_forward, render_reverse
 from endotsr.splatting.settings import EXACT, PAPER
 
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 rng = np.random.default_rng(15)
 
 
-def made(position, log_scale=-2.0, logit=1.0, colour=0.7, quaternion=(1, 0, 0, 0), dtype=np.float64):
+def made(
+    position, log_scale=-2.0, logit=1.0, colour=0.7, quaternion=(1, 0, 0, 0), dtype=np.float64
+):
     """Gaussians at given places (3, N); the rest one value for all, or one per Gaussian."""
     position = np.asarray(position, dtype)
     n = position.shape[1]
@@ -56,7 +67,10 @@ def made(position, log_scale=-2.0, logit=1.0, colour=0.7, quaternion=(1, 0, 0, 0
         position,
         np.repeat(np.array(quaternion, dtype)[:, None], n, axis=1),
         np.broadcast_to(
-            np.asarray(log_scale, dtype).reshape(-1, 1) if np.ndim(log_scale) == 1 else dtype(log_scale), (3, n)
+            np.asarray(log_scale, dtype).reshape(-1, 1)
+            if np.ndim(log_scale) == 1
+            else dtype(log_scale),
+            (3, n),
         ).copy(),
         np.broadcast_to(np.asarray(logit, dtype), n).copy(),
         ((rgb - dtype(0.5)) / dtype(Y00))[None].copy(),
@@ -99,18 +113,28 @@ def textbook(d_x, d_y, a, b, c, det, o):
 
 
 # %%
-wide = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, -700.0, -700.0, 300, 300)  # its centre is 700 px off the image
+# Its centre is 700 px off the image.
+wide = Camera(np.eye(3), np.zeros(3), 100.0, 100.0, -700.0, -700.0, 300, 300)
 half_turn = (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))
-needle = dict(position=[[0.0], [0.0], [1.0]], log_scale=np.log([10.0, 1e-3, 1e-3]), logit=2.0, quaternion=half_turn)
+needle = dict(
+    position=[[0.0], [0.0], [1.0]],
+    log_scale=np.log([10.0, 1e-3, 1e-3]),
+    logit=2.0,
+    quaternion=half_turn,
+)
 double, saved = render(made(**needle), wide)
 single, saved_32 = render(made(**needle, dtype=np.float32), wide)
 a, b, c = saved.projected.covariance2d[:, 0]
 det, o = saved.projected.determinant[0], 1 / (1 + np.exp(-2.0))
 along = np.arange(300)
-d = along + 0.5 - saved.projected.mean2d[:, :1]  # the pixels of the diagonal, which lie on the needle
+# The pixels of the diagonal, which lie on the needle.
+d = along + 0.5 - saved.projected.mean2d[:, :1]
 truth = double.opacity[along, along]
 np.testing.assert_allclose(truth, alpha_text(*d, a, b, c, det, o), rtol=1e-9)
-parts_32 = [np.float32(x) for x in (*saved_32.projected.covariance2d[:, 0], saved_32.projected.determinant[0], o)]
+parts_32 = [
+    np.float32(x)
+    for x in (*saved_32.projected.covariance2d[:, 0], saved_32.projected.determinant[0], o)
+]
 lost = textbook(*d.astype(np.float32), *parts_32)
 np.testing.assert_allclose(single.opacity[along, along], truth, rtol=2e-3)
 print(
@@ -120,7 +144,8 @@ print(
     np.abs(lost / truth - 1).max(),
 )
 assert np.abs(lost / truth - 1).max() > 0.01
-np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)  # the same formula, while digits last
+# The same formula, while digits last.
+np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)
 
 # %% [markdown]
 # ## Equal depths: an undefined order
@@ -132,7 +157,10 @@ np.testing.assert_allclose(textbook(*d, a, b, c, det, o), truth, rtol=1e-6)  # t
 tie = made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
 middle = render(tie, small)[0].colour[:, 6, 8]
 assert middle[0] > middle[2], "index 0 is in front"
-many = made(np.vstack([rng.uniform(-1, 1, (2, 30)), rng.uniform(2, 4, 30)]), colour=rng.uniform(0, 1, (3, 30)))
+many = made(
+    np.vstack([rng.uniform(-1, 1, (2, 30)), rng.uniform(2, 4, 30)]),
+    colour=rng.uniform(0, 1, (3, 30)),
+)
 shuffle = rng.permutation(30)
 shuffled = Scene(*(part[..., shuffle].copy() for part in many[:5]))
 assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].colour)
@@ -144,11 +172,19 @@ assert np.array_equal(render(many, small)[0].colour, render(shuffled, small)[0].
 
 # %%
 def crossing(gap):
-    return render(made([[0.0, 0.0], [0.0, 0.0], [2.0, 2.0 + gap]], colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]), small)
+    return render(
+        made(
+            [[0.0, 0.0], [0.0, 0.0], [2.0, 2.0 + gap]],
+            colour=[[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]],
+        ),
+        small,
+    )
 
 
 (before, stage), (after, _) = crossing(1e-9), crossing(-1e-9)
-alpha = (1 / (1 + np.exp(-1.0))) * np.exp(-0.5 * (0.25 + 0.25) / stage.projected.covariance2d[0, 0])
+alpha = (1 / (1 + np.exp(-1.0))) * np.exp(
+    -0.5 * (0.25 + 0.25) / stage.projected.covariance2d[0, 0]
+)
 jump = before.colour[:, 6, 8] - after.colour[:, 6, 8]
 np.testing.assert_allclose(jump, alpha**2 * np.array([1.0, 0.0, -1.0]), atol=1e-6)
 
@@ -166,7 +202,8 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
     assert np.array_equal(out.colour, render(plain, small, PAPER)[0].colour)
     grads = render_reverse(np.ones_like(out.colour), np.ones_like(out.depth), None, saved)
     assert not any(
-        np.any(getattr(grads, f"d_{name}")[..., 1]) for name in ("position", "quaternion", "log_scale", "opacity_logit")
+        np.any(getattr(grads, f"d_{name}")[..., 1])
+        for name in ("position", "quaternion", "log_scale", "opacity_logit")
     )
 
 # %% [markdown]
@@ -176,7 +213,9 @@ for z in (-1.0, 0.0, 1e-300, PAPER.near):
 
 # %%
 nothing = made(np.zeros((3, 0)))
-out, saved = render(nothing, small._replace(width=1, height=1), background=np.array([0.1, 0.2, 0.3]))
+out, saved = render(
+    nothing, small._replace(width=1, height=1), background=np.array([0.1, 0.2, 0.3])
+)
 assert out.colour.ravel().tolist() == [0.1, 0.2, 0.3] and out.depth.item() == 0
 assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3, 0)
 
@@ -189,7 +228,10 @@ assert render_reverse(out.colour, out.depth, None, saved).d_position.shape == (3
 # %%
 n, faint = 2000, 1e-3
 sheets = made(
-    np.vstack([np.zeros((2, n)), np.linspace(2, 3, n)]), log_scale=8.0, logit=np.log(faint / (1 - faint)), colour=0.8
+    np.vstack([np.zeros((2, n)), np.linspace(2, 3, n)]),
+    log_scale=8.0,
+    logit=np.log(faint / (1 - faint)),
+    colour=0.8,
 )
 value = render(sheets, small)[0].colour[0, 6, 8]
 expected = 0.8 * -np.expm1(n * np.log1p(-faint))
@@ -228,7 +270,9 @@ def losses(image, observed, prior):
 
 clean_values, clean = losses(image, observed, prior)
 for poison in (np.nan, np.inf, 1e300):
-    values, grads = losses(*(np.where(mask, x, poison) for x in (image, observed)), np.where(mask, prior, np.nan))
+    values, grads = losses(
+        *(np.where(mask, x, poison) for x in (image, observed)), np.where(mask, prior, np.nan)
+    )
     assert values == clean_values and all(np.array_equal(x, y) for x, y in zip(grads, clean))
 
 slit = np.zeros((40, 48), bool)
@@ -248,10 +292,14 @@ assert np.isfinite(loss) and np.isfinite(laplacian_loss_reverse(1.0, saved)).all
 # %%
 reference = render(many, small, PAPER)[0]
 for factor in (1e-3, 1e3):
-    scaled = many._replace(position=many.position * factor, log_scale=many.log_scale + np.log(factor))
+    scaled = many._replace(
+        position=many.position * factor, log_scale=many.log_scale + np.log(factor)
+    )
     again = render(scaled, small, PAPER._replace(near=PAPER.near * factor))[0]
     np.testing.assert_allclose(again.colour, reference.colour, atol=1e-11)
-    np.testing.assert_allclose(again.depth, reference.depth * factor, rtol=1e-9, atol=1e-9 * factor)
+    np.testing.assert_allclose(
+        again.depth, reference.depth * factor, rtol=1e-9, atol=1e-9 * factor
+    )
 
 # %% [markdown]
 # ## Figure: three of these cases
@@ -260,14 +308,22 @@ for factor in (1e-3, 1e3):
 figure, axes = plt.subplots(1, 3, figsize=(13.5, 3.7), layout="constrained")
 axes[0].plot(along, truth, color="0.7", lw=5, label="float64")
 axes[0].plot(along, lost, color="tab:red", lw=0.8, label="textbook form, float32")
-axes[0].plot(along, single.opacity[along, along], color="tab:green", lw=1.2, label="endotsr, float32")
-axes[0].set(title="$\\alpha$ along a needle of 1000 px", xlabel="pixel on the diagonal", ylim=(0, 1))
+axes[0].plot(
+    along, single.opacity[along, along], color="tab:green", lw=1.2, label="endotsr, float32"
+)
+axes[0].set(
+    title="$\\alpha$ along a needle of 1000 px", xlabel="pixel on the diagonal", ylim=(0, 1)
+)
 axes[0].legend(fontsize=8, loc="upper right")
 gaps = np.linspace(-0.4, 0.4, 81)
 seen = np.array([crossing(gap)[0].colour[:, 6, 8] for gap in gaps])
 for channel, colour in ((0, "tab:red"), (2, "tab:blue")):
     axes[1].plot(gaps, np.where(np.abs(gaps) < 1e-9, np.nan, seen[:, channel]), color=colour)
-axes[1].set(title="two Gaussians pass in depth: a jump", xlabel="$z_1-z_0$", ylabel="colour of the pixel")
+axes[1].set(
+    title="two Gaussians pass in depth: a jump",
+    xlabel="$z_1-z_0$",
+    ylabel="colour of the pixel",
+)
 counts = np.unique(np.geomspace(1, 2000, 25).astype(int))
 for alpha_one, colour in ((1e-3, "tab:blue"), (1e-2, "tab:orange"), (0.1, "tab:green")):
     stack = [
@@ -284,7 +340,10 @@ for alpha_one, colour in ((1e-3, "tab:blue"), (1e-2, "tab:orange"), (0.1, "tab:g
     ]
     axes[2].semilogx(counts, stack, "o", color=colour, ms=4, label=f"$\\alpha={alpha_one:g}$")
     axes[2].semilogx(counts, 0.8 * -np.expm1(counts * np.log1p(-alpha_one)), color=colour, lw=1)
-axes[2].set(title="equal sheets: dots render, lines $c\\,(1-(1-\\alpha)^n)$", xlabel="number of sheets $n$")
+axes[2].set(
+    title="equal sheets: dots render, lines $c\\,(1-(1-\\alpha)^n)$",
+    xlabel="number of sheets $n$",
+)
 axes[2].legend(fontsize=8)
 plt.show()
 
@@ -316,11 +375,14 @@ with one_thread():
     for name, damage in wrong.items():
         report = check_function(
             pair.forward,
-            lambda i, up, damage=damage: {key: damage(g) for key, g in pair.reverse(i, up).items()},
+            lambda i, up, damage=damage: {
+                key: damage(g) for key, g in pair.reverse(i, up).items()
+            },
             inputs,
             hard={"motion_coefficients": np.arange(inputs["motion_coefficients"].size)},
         )
-        print(f"{name:14s} {'accepted' if report.passed else 'refused: ' + report.failures[0][:90]}")
+        verdict = "accepted" if report.passed else f"refused: {report.failures[0][:90]}"
+        print(f"{name:14s} {verdict}")
         assert report.passed == (name == "right")
 
 # %% [markdown]
@@ -341,11 +403,15 @@ assert report.passed and precision.passed
 # quaternion. What should the image be, and what the gradient? Why is it worse to add a small epsilon to the norm?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The identity rotation and no gradient: a defined result. With an epsilon the "rotation" matrix shrinks to something that is
-# no rotation (R = 1 - 2(y^2 + z^2) with a q that is too short), for every short quaternion and not only for 0.
+# Answer. The identity rotation and no gradient: a defined result. With an epsilon the
+# "rotation" matrix shrinks to something that is no rotation (R = 1 - 2(y^2 + z^2) with a q
+# that is too short), for every short quaternion and not only for 0.
 identity, zero = (
-    made([[0.0], [0.0], [2.0]], log_scale=[-1.0, -2.0, -1.5], quaternion=q) for q in ((1, 0, 0, 0), (0, 0, 0, 0))
+    made([[0.0], [0.0], [2.0]], log_scale=[-1.0, -2.0, -1.5], quaternion=q)
+    for q in ((1, 0, 0, 0), (0, 0, 0, 0))
 )
 (one, _), (two, saved) = render(identity, small), render(zero, small)
 assert np.array_equal(one.colour, two.colour)
-assert not render_reverse(np.ones_like(two.colour), np.ones_like(two.depth), None, saved).d_quaternion.any()
+assert not render_reverse(
+    np.ones_like(two.colour), np.ones_like(two.depth), None, saved
+).d_quaternion.any()

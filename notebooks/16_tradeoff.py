@@ -19,7 +19,7 @@
 # The equation is {eq}`eq-b5b` of {doc}`/specification/b05_compositing`. The page {doc}`/tradeoff` shows the same
 # measurement for every setting.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import os
 
 import matplotlib.pyplot as plt
@@ -37,6 +37,7 @@ from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
 from endotsr.tradeoff.study import reference_setting
 
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
 N, WIDTH = (60, 40) if SMALL else (600, 128)
 model = ModelConfig(bases=5, frequencies=3, initial_width=0.2)
@@ -44,7 +45,15 @@ training = msgspec.structs.replace(RUN.training, precision="float64")
 gaussians = workload.gaussians(N, msgspec.structs.replace(RUN, model=model, training=training))
 camera, time = workload.camera(WIDTH, WIDTH * 3 // 4), 0.4
 study = StudyScene(
-    "notebook", "", gaussians, spectral_from(model, np.arange(12) / 12), model, time, camera, near=0.2, noise=0.01
+    "notebook",
+    "",
+    gaussians,
+    spectral_from(model, np.arange(12) / 12),
+    model,
+    time,
+    camera,
+    near=0.2,
+    noise=0.01,
 )
 reference = frame(prepare(study, reference_setting(study)))[0]
 
@@ -95,7 +104,10 @@ def pixel_text(column, row, alpha_cut, T_stop):
 
 
 def image_text(alpha_cut, T_stop):
-    pixels = [[pixel_text(x, y, alpha_cut, T_stop) for x in range(camera.width)] for y in range(camera.height)]
+    pixels = [
+        [pixel_text(x, y, alpha_cut, T_stop) for x in range(camera.width)]
+        for y in range(camera.height)
+    ]
     image = np.array([[I for I, _ in row] for row in pixels]).transpose(2, 0, 1)
     return image, sum(visits for row in pixels for _, visits in row)
 
@@ -121,25 +133,35 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 
 # %%
 cutoffs = 10.0 ** -np.arange(2, 11)
-measured = [frame(prepare(study, ACCURATE._replace(raster=CLOSE._replace(alpha_cutoff=cut)))) for cut in cutoffs]
+measured = [
+    frame(prepare(study, ACCURATE._replace(raster=CLOSE._replace(alpha_cutoff=cut))))
+    for cut in cutoffs
+]
 largest = np.array([errors(found, reference).max for found, _ in measured])
 visits = np.array([count for _, count in measured])
 assert (largest <= 5 * cutoffs).all()
 assert (np.diff(largest) < 0).all() and (np.diff(visits) > 0).all()
 inside = saved.visible
-predicted = [2 * np.pi * (np.sqrt(saved.projected.determinant) * np.log(o / cut))[inside].sum() for cut in cutoffs]
+predicted = [
+    2 * np.pi * (np.sqrt(saved.projected.determinant) * np.log(o / cut))[inside].sum()
+    for cut in cutoffs
+]
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
 axes[0].loglog(cutoffs, largest, "o-", color="#0072B2")
 axes[0].loglog(cutoffs, 5 * cutoffs, "--", color="0.5")
-axes[0].annotate("five times the cutoff", (cutoffs[4], 5 * cutoffs[4]), xytext=(-8, 8), ha="right", color="0.4",
-                 textcoords="offset points")  # fmt: skip
+label = {"textcoords": "offset points", "color": "0.4"}
+place = (cutoffs[4], 5 * cutoffs[4])
+axes[0].annotate("five times the cutoff", place, xytext=(-8, 8), ha="right", **label)
 axes[0].set(xlabel="cutoff", ylabel="largest error", title="The error follows the cutoff")
 axes[1].semilogx(cutoffs, visits, "o-", color="#0072B2")
 axes[1].semilogx(cutoffs, predicted, "--", color="0.5")
-axes[1].annotate("area of the ellipses, parts outside\nthe picture included", (cutoffs[6], predicted[6]), xytext=(8, 0),
-                 textcoords="offset points", color="0.4", va="bottom", fontsize=8)  # fmt: skip
+words, place = (
+    "area of the ellipses, parts outside\nthe picture included",
+    (cutoffs[6], predicted[6]),
+)
+axes[1].annotate(words, place, xytext=(8, 0), va="bottom", fontsize=8, **label)
 axes[1].set(xlabel="cutoff", ylabel="visits", title="The work follows its logarithm")
 plt.show()
 
@@ -152,7 +174,9 @@ plt.show()
 
 # %%
 sweep = {
-    (precision, cut, stop): Setting(precision, CLOSE._replace(alpha_cutoff=cut, transmittance_stop=stop))
+    (precision, cut, stop): Setting(
+        precision, CLOSE._replace(alpha_cutoff=cut, transmittance_stop=stop)
+    )
     for precision in ("float32", "float64")
     for cut in (1 / 64, 1 / 255, 1e-4, 1e-6, 1e-8)
     for stop in (1e-2, 1e-4, 1e-6)
@@ -162,20 +186,37 @@ for key, setting in sweep.items():
     ready = prepare(study, setting)
     found, _ = frame(ready)
     points.append(
-        Ranked(str(key), float(np.median([seconds(ready)[0] for _ in range(7)])), (errors(found, reference).max,))
+        Ranked(
+            str(key),
+            float(np.median([seconds(ready)[0] for _ in range(7)])),
+            (errors(found, reference).max,),
+        )
     )
 front = non_dominated(points)
 assert all(not (p.cost <= f.cost and p.errors < f.errors) for f in front for p in points)
 
 # %% tags=["hide-input"]
 figure, axis = plt.subplots(figsize=(7, 3.8), layout="constrained")
-axis.loglog([p.cost * 1e3 for p in points], [p.errors[0] * 255 for p in points], "o", color="0.75", ms=4)
-axis.loglog([p.cost * 1e3 for p in front], [p.errors[0] * 255 for p in front], "o-", color="#0072B2")
+axis.loglog(
+    [p.cost * 1e3 for p in points], [p.errors[0] * 255 for p in points], "o", color="0.75", ms=4
+)
+axis.loglog(
+    [p.cost * 1e3 for p in front], [p.errors[0] * 255 for p in front], "o-", color="#0072B2"
+)
 axis.axhline(0.5, color="0.5", ls="--", lw=1)
 axis.annotate(
-    "half a step of 8 bit", (1, 0.5), xycoords=("axes fraction", "data"), ha="right", va="bottom", color="0.4"
+    "half a step of 8 bit",
+    (1, 0.5),
+    xycoords=("axes fraction", "data"),
+    ha="right",
+    va="bottom",
+    color="0.4",
 )
-axis.set(xlabel="milliseconds a frame", ylabel="largest error, 1/255", title="Grey: dominated. Blue: the front")
+axis.set(
+    xlabel="milliseconds a frame",
+    ylabel="largest error, 1/255",
+    title="Grey: dominated. Blue: the front",
+)
 plt.show()
 
 # %% [markdown]
@@ -185,8 +226,9 @@ plt.show()
 # estimate slightly too large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The visits are a straight line in ln(1 / cutoff): as many more as between the first two. It is a little too large because an ellipse
-# that reaches the border of the picture grows outside of it, where there are no pixels.
+# Answer. The visits are a straight line in ln(1 / cutoff): as many more as between the first
+# two. It is a little too large because an ellipse that reaches the border of the picture
+# grows outside of it, where there are no pixels.
 at = {int(-np.log10(cut)): count for cut, count in zip(cutoffs, visits, strict=True)}
 expected = 2 * at[5] - at[3]
 assert at[7] <= expected

@@ -1,5 +1,6 @@
 """The notebooks run, stay text, print the displays of the specification and cover the paper's equations."""
 
+import ast
 import os
 import re
 import runpy
@@ -16,6 +17,7 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
 WITHOUT_DERIVATIVE = {"16_tradeoff"}  # measures what the others derive
+COLUMNS = 96  # of code on a page of the book
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
 
 
@@ -62,6 +64,24 @@ def test_notebook_is_one_for_jupyter(file):
     assert len(answers) == 1, "one exercise with a hidden answer"
     assert all(cell.metadata["jupyter"]["source_hidden"] for cell in answers)
     assert any("transcription" in cell.metadata.get("tags", []) for cell in book.cells)
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_notebook_opens_with_prose_and_folds_its_imports(file):
+    parts = re.split(r"^# %%(.*)$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    heads, bodies = parts[0::2], parts[1::2]
+    assert "[markdown]" in heads[0]
+    assert "hide-input" in heads[1] and '"code_prompt_show": "Imports"' in heads[1]
+    body = ast.parse(bodies[1]).body
+    assert body and all(isinstance(node, ast.Import | ast.ImportFrom) for node in body), "imports and nothing else"
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_code_stands_in_the_column_of_a_page(file):
+    parts = re.split(r"^# %%(.*)$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    code = [body for head, body in zip(parts[0::2], parts[1::2]) if "[markdown]" not in head]
+    wide = [line for body in code for line in body.splitlines() if len(line) > COLUMNS]
+    assert not wide, f"more than {COLUMNS} characters"
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)

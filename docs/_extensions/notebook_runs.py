@@ -2,10 +2,12 @@
 
 MyST-NB runs a notebook when it reads its page, one after the other. Here the runs come first, and its cache, which
 lives no longer than the build, hands them to the pages. A notebook that fails is not in the cache: its page runs it
-again and reports the error.
+again and reports the error. ENDOTSR_DOCS_CACHE=FOLDER keeps the runs for the next build, which is for work on the
+layout of the pages only: a kept run does not notice that the package has changed.
 """
 
 import logging
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -39,12 +41,14 @@ def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
 
 def forget_runs(app: Sphinx, error: Exception | None) -> None:
     """A run is as good as the kernels it called, and no longer: the next build runs what it reads."""
-    shutil.rmtree(app.config.nb_execution_cache_path, ignore_errors=True)
+    if not os.environ.get("ENDOTSR_DOCS_CACHE"):
+        shutil.rmtree(app.config.nb_execution_cache_path, ignore_errors=True)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Called by Sphinx."""
-    app.config.nb_execution_cache_path = tempfile.mkdtemp(prefix="endotsr-notebooks-")
+    kept = os.environ.get("ENDOTSR_DOCS_CACHE")
+    app.config.nb_execution_cache_path = kept or tempfile.mkdtemp(prefix="endotsr-notebooks-")
     app.connect("env-before-read-docs", run_notebooks)
     app.connect("build-finished", forget_runs)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -18,9 +18,14 @@ FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swifts
 VIRTUAL_MILLISECONDS = 30000  # of the page's own clock; the browser ends as soon as nothing is left to do
 
 
+def found_browser() -> str | None:
+    """The program, or None."""
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
 def browser() -> str:
     """The program, or the test is skipped."""
-    found = next((path for name in NAMES if (path := shutil.which(name))), None)
+    found = found_browser()
     if found is None:
         pytest.skip(f"no browser found: {', '.join(NAMES)}")
     return found

@@ -1,6 +1,7 @@
 """The viewer page: numbers that unpack to the scene, one file without a network, and the picture of the browser."""
 
 import base64
+import html
 import json
 import re
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import browser, dom, drawn
+from frame_rate import milliseconds_a_picture
 
 from endotsr.errors import InputError
 from endotsr.export.scene import open_scene
@@ -153,3 +155,37 @@ def test_a_held_out_frame_stands_beside_the_scene_with_its_error(tmp_path):
     bright = shown.astype(float).sum(axis=2)[sequence.masks[i]]
     assert np.corrcoef(np.minimum(error[sequence.masks[i]], 0.1), bright)[0, 1] > 0.9
     assert f"Held-out frame {sequence.names[i]}" in dom(tmp_path / "a.html", "held_out=0")
+
+
+def test_the_frame_rate_is_measured_in_the_browser(opened):
+    assert 0 < milliseconds_a_picture(opened[1]) < 60000
+
+
+PRESSED = """<script>const watch = setInterval(() => {
+  if (!document.getElementById("probe")) return;
+  clearInterval(watch);
+  const said = (id) => document.getElementById(id).textContent;
+  const answers = KEYS.map((key) => {
+    document.body.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true}));
+    return [said("time"), said("shown"), said("play")];
+  });
+  document.body.dataset.answers = JSON.stringify(answers);
+}, 50);</script></body>"""
+
+
+def keys_pressed(file, *keys):
+    """Time, description and label of the play button after each key."""
+    pressed = file.parent / "pressed.html"
+    script = PRESSED.replace("KEYS", json.dumps(keys))
+    pressed.write_text(file.read_text(encoding="utf-8").replace("</body>", script), encoding="utf-8")
+    return json.loads(html.unescape(re.search('data-answers="([^"]*)"', dom(pressed, "t=0&probe"))[1]))
+
+
+def test_keys_play_turn_and_change_the_frame(opened):
+    times = opened[0].record["times"]
+    said = keys_pressed(opened[1], ".", ",", ",", "ArrowLeft", "0", "+", "x", " ", " ")
+    assert [time for time, _, _ in said[:3]] == [f"t = {t:.3f}" for t in (times[1], times[0], times[-1])]
+    assert [view.split(",")[0] for _, view, _ in said[2:7]] == [
+        "View of the camera", "Turned view", "View of the camera", "Turned view", "Turned view"
+    ]  # fmt: skip
+    assert [label for _, _, label in said[6:]] == ["Play", "Stop", "Play"]

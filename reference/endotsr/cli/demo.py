@@ -6,6 +6,7 @@ from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import HELP_ALL, parse
+from endotsr.cli.parts.result import JsonFile
 from endotsr.errors import InputError
 from endotsr.runs.sources import SIMULATED
 
@@ -27,6 +28,8 @@ class DemoOptions:
     """seed of every random draw"""
     threads: int = 0
     """threads, 0 = all cores"""
+    json: JsonFile = None
+    """also write the metrics as JSON"""
 
 
 def run(words: list[str]) -> int:

@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable
 
 
 @dataclass
@@ -41,11 +43,14 @@ class DepthOptions:
     """median over three frames along the optical flow"""
     replace: bool = False
     """replace depth that exists"""
+    json: JsonFile = None
+    """also write the coverage of every frame as JSON"""
 
 
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(DepthOptions, words, "depth")
+    refuse_unwritable(options.json)
     for name in ("nearest", "farthest", "unit_scale", "agreement"):
         if not 0 < getattr(options, name) < float("inf"):
             key = name.replace("_", "-")
@@ -77,6 +82,14 @@ def run(words: list[str]) -> int:
         f" frame {lowest}; median {report.median:.4g} {report.file.depth.unit}, steps of {report.file.depth.scale:g}"
     )
     print(f"next: endotsr train {options.sequence} --out RUN")
+    write_result(
+        options.json,
+        sequence=options.sequence,
+        coverage=report.coverage,
+        median=report.median,
+        unit=report.file.depth.unit,
+        step=report.file.depth.scale,
+    )
     return 0
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class EvaluateOptions:
-    """Measure a run on its held-out frames; write metrics.json, renders/, curves.png and report.html in its folder.
+    """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
 
     With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
     of RUN or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display units),
@@ -40,6 +40,8 @@ class EvaluateOptions:
     """AlexNet LPIPS weights (.npz)"""
     paper_row: Literal["pulling"] | None = None
     """also show the published figures of this clip"""
+    view: bool = True
+    """write the viewer page that the report links to, view.html"""
     threads: int = 0
     """threads, 0 = all cores"""
     settings: Annotated[ShownSettings, Option(flat=True)] = SHOWN
@@ -76,7 +78,7 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
-    return evaluate_run(folder, sequence, options.lpips, published)
+    return evaluate_run(folder, sequence, options.lpips, published, options.view)
 
 
 def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
@@ -96,21 +98,30 @@ def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -
 
 
 def evaluate_run(
-    folder: RunFolder, sequence: "Sequence", lpips: Path | None = None, published: tuple[dict[str, Any], ...] = ()
+    folder: RunFolder,
+    sequence: "Sequence",
+    lpips: Path | None = None,
+    published: tuple[dict[str, Any], ...] = (),
+    view: bool = True,
 ) -> dict[str, Any]:
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.run import measure_run
+    from endotsr.export.scene import RECORD, MovingScene
     from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.model import load_model
     from endotsr.runs.records import REPORTED
     from endotsr.runs.sources import run_source, true_positions_of
+    from endotsr.views.page import RUN_PAGE, write_run_page
+    from endotsr.views.preview import preview
 
     weights = load_lpips_weights(lpips)
     model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
-    write_evaluation(folder, sequence, metrics, held_out)
+    scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
+    write_run_page(folder.path, scene, sequence if view else None)
+    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics

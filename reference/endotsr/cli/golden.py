@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 
@@ -58,6 +59,8 @@ class GenerateOptions:
     """folder of the golden cases"""
     within_tolerance: bool = False
     """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
+    json: JsonFile = None
+    """also write the differences as JSON"""
     write: bool = False
     """replace the vectors, print which expected values changed, and still end with exit code 1"""
 
@@ -69,6 +72,8 @@ class ReferenceOptions:
     outdir: Outdir
     precision: Literal["float32", "float64"] = "float32"
     """precision of the arithmetic; with --requests, the precision of the requests"""
+    json: JsonFile = None
+    """also write the number of cases as JSON"""
     requests: Annotated[Path | None, Option("DIR")] = None
     """answer this folder of requests"""
     golden: Annotated[Path | None, Option("DIR")] = None
@@ -83,6 +88,8 @@ class WrongPortOptions:
     outdir: Outdir = Path()
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases"""
+    json: JsonFile = None
+    """also write the mistake, or the list of them, as JSON"""
 
 
 DOORS = {
@@ -161,13 +168,16 @@ def _generate(words: list[str]) -> int:
     from endotsr.golden.vectors.generate import check, write
 
     options = parse(GenerateOptions, words, "golden generate")
+    refuse_unwritable(options.json)
     folder = golden_folder(options.golden)
     if options.write:
         lines = write(folder)
+        write_result(options.json, folder=folder, written=True, changes=lines)
         print("\n".join(lines) or "no expected value moved")
         print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
         return 1
     lines, summary = check(folder, bitwise=not options.within_tolerance)
+    write_result(options.json, folder=folder, written=False, changes=lines, summary=summary)
     print("\n".join([*lines, f"golden: {summary}, {len(lines)} differ"]))
     return 1 if lines else 0
 
@@ -177,11 +187,13 @@ def _reference(words: list[str]) -> int:
     from endotsr.golden.vectors.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
+    refuse_unwritable(options.json)
     if options.requests is not None:
         count = answer_requests(options.requests, options.outdir)
     else:
         count = answer_all(read_golden(golden_folder(options.golden)), options.outdir, options.precision)
     print(f"golden: {count} cases answered in {options.outdir}")
+    write_result(options.json, cases=count, folder=options.outdir)
     return 0
 
 
@@ -191,12 +203,15 @@ def _negative(words: list[str]) -> int:
     from endotsr.golden.vectors.registry import all_wrong_ports
 
     options = parse(WrongPortOptions, words, "golden negative")
+    refuse_unwritable(options.json)
     known = all_wrong_ports()
     if not options.name:
         print("\n".join(f"{w.flag}: {w.title} ({w.wrong})" for w in known.values()))
+        write_result(options.json, mistakes={w.flag: {"title": w.title, "wrong": w.wrong} for w in known.values()})
         return 0
     if options.name not in known or options.outdir == Path():
         raise InputError("golden negative: give the FLAG of a mistake (without arguments: a list) and OUTDIR")
     count = answer_wrongly(read_golden(golden_folder(options.golden)), options.outdir, known[options.name])
     print(f"golden: {count} cases answered wrongly in {options.outdir}")
+    write_result(options.json, mistake=options.name, cases=count, folder=options.outdir)
     return 0

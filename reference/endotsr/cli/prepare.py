@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable
 
 
 @dataclass
@@ -66,6 +68,8 @@ class PrepareOptions:
     """frames without mask or pose while others have one: drop leaves them out, fill interpolates"""
     pictures: Literal["png", "jpg"] = "png"
     """format of the written pictures"""
+    json: JsonFile = None
+    """also write what was found and done as JSON"""
 
 
 def run(words: list[str]) -> int:
@@ -106,11 +110,24 @@ def run(words: list[str]) -> int:
     )
     recording = open_recording(options.source, stated)
     print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
+    refuse_unwritable(options.json)
     found, notes = prepare(recording, options.out, settings)
     for note in notes:
         print(f"  {note}")
     print(f"written: {options.out}, {found.frames} frames of {found.camera.width}x{found.camera.height}")
     print(_next_step(options.out, found.depth is not None, found.camera.baseline > 0))
+    write_result(
+        options.json,
+        source=options.source,
+        layout=recording.layout,
+        folder=options.out,
+        frames=found.frames,
+        width=found.camera.width,
+        height=found.camera.height,
+        stereo=found.camera.baseline > 0,
+        depth=found.depth is not None,
+        notes=list(notes),
+    )
     return 0
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 
 
 @dataclass
@@ -49,6 +50,8 @@ class RenderOptions:
     """components to leave out of the picture"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """current location of the sequence of the run, for truth and error (default: the recorded one)"""
+    json: JsonFile = None
+    """also write what was written as JSON"""
     threads: int = 0
     """threads, 0 = all cores"""
 
@@ -58,6 +61,7 @@ def run(words: list[str]) -> int:
     from endotsr.export.scene import open_scene
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
+    from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
     from endotsr.views.plan import Request
@@ -66,6 +70,7 @@ def run(words: list[str]) -> int:
     times = Times(options.times, options.frames, options.count)
     request = Request(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate)
+    refuse_unwritable(options.json)
     use_threads(options.threads)
     scene = open_scene(options.scene)
     for path in filter(None, (options.out, options.film)):
@@ -88,4 +93,7 @@ def run(words: list[str]) -> int:
         print(f"{count} pictures in {options.out}: colour/, depth/, opacity/, render.json")
     else:
         film(made)
+    write_result(
+        options.json, folder=options.out, film=options.film, rate=options.rate, times=[view.time for view in views]
+    )
     return 0

@@ -4,11 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
+
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line, replacing_folder
+from endotsr.runs.files import os_error_line, refuse_unwritable, replacing_folder
 from endotsr.runs.folder import refuse_existing
 from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
 from endotsr.simulator.settings import SimulatorSettings
@@ -30,6 +33,8 @@ class SimulateOptions:
     """sequence folder to create (required)"""
     effects: Annotated[str | None, Option("NAME,..")] = None
     """exactly these effects, instead of those of a scene; empty for none"""
+    json: JsonFile = None
+    """also write what was simulated as JSON"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 
@@ -43,7 +48,15 @@ def run(words: list[str]) -> int:
     base = named_scene(options.scene) if options.scene else STILL
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings
+    refuse_unwritable(options.json)
     _write(options.out, settings, options.scene if options.effects is None else options.effects)
+    write_result(
+        options.json,
+        folder=options.out,
+        truth=options.out / "truth",
+        effects=effects_on(settings),
+        settings=msgspec.to_builtins(settings),
+    )
     print(f"truth in {options.out}/truth; train with: endotsr train {options.out} --out RUN")
     return 0
 

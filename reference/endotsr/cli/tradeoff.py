@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.cli.tradeoff_train import TRAINING
 from endotsr.cli.tradeoff_train import run as run_training
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_folder, write_json
+from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
 
 if TYPE_CHECKING:
-    from endotsr.tradeoff.budget import Budget
+    from endotsr.tradeoff.budget import Advice, Budget
     from endotsr.tradeoff.scenes import StudyScene
 
 RESULT = "tradeoff.json"  # in the folder of the measurement
@@ -39,6 +40,8 @@ class TradeoffOptions:
     budget: str | None = None
     """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
     ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
+    json: JsonFile = None
+    """also write the answer to --budget as JSON"""
     images: bool = False
     """also keep image and gradients of every setting in DIR/images"""
     repeats: int = LEAST_REPEATS
@@ -59,7 +62,7 @@ def run(words: list[str]) -> int:
 
         budget = parse_budget(options.budget)
         if budget.kind == "training":
-            return _say_training(options.out, budget)
+            return _say_training(options, budget)
     from endotsr.tradeoff.results import Measurement, read_result
 
     file = options.out / RESULT
@@ -69,13 +72,21 @@ def run(words: list[str]) -> int:
     if budget is not None:
         from endotsr.tradeoff.budget import frame_advice
 
-        print("\n".join(frame_advice(result, budget).lines))
+        _say(options, frame_advice(result, budget))
     return 0
+
+
+def _say(options: TradeoffOptions, advice: "Advice") -> None:
+    print("\n".join(advice.lines))
+    write_result(options.json, budget=options.budget, point=advice.point, lines=advice.lines)
 
 
 def _refuse(options: TradeoffOptions) -> None:
     if options.run is not None and options.splats is not None:
         raise InputError("tradeoff: give one of --run and --splats")
+    if options.json is not None and options.budget is None:
+        raise InputError(f"tradeoff: --json holds the answer to --budget; the measurement itself is DIR/{RESULT}")
+    refuse_unwritable(options.json)
     if options.repeats < LEAST_REPEATS:
         raise InputError(
             f"tradeoff: --repeats {options.repeats} is not allowed; allowed: an integer >= {LEAST_REPEATS}"
@@ -127,12 +138,13 @@ def chosen_scene(options: TradeoffOptions) -> "StudyScene":
         return scenes.simulated_scene(width=width, step=bar.step)
 
 
-def _say_training(out: Path, budget: "Budget") -> int:
+def _say_training(options: TradeoffOptions, budget: "Budget") -> int:
     from endotsr.tradeoff.budget import training_advice
     from endotsr.tradeoff.results import Trainings, read_result
 
+    out = options.out
     file = out / TRAINING
     if not file.exists():
         raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
-    print("\n".join(training_advice(read_result(file, Trainings), budget).lines))
+    _say(options, training_advice(read_result(file, Trainings), budget))
     return 0

@@ -14,8 +14,10 @@ from endotsr.cli.parts.options import (
 )
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.simulator.settings import SimulatorSettings
 
@@ -62,6 +64,8 @@ class TrainOptions:
     """measure, render and report when training is done"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights for the evaluation"""
+    json: JsonFile = None
+    """also write the metrics of the evaluation as JSON"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
     simulator: SimulatorSettings = DEMONSTRATION
     """contents of the `simulated` sequence"""
@@ -73,6 +77,9 @@ def run(words: list[str]) -> int:
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
         raise InputError("train: --out RUN is missing: the run folder to create")
+    if options.json and not options.evaluate:
+        raise InputError("train: --json holds the metrics, which --no-evaluate leaves out; allowed: one of them")
+    refuse_unwritable(options.json)
     if options.evaluate:
         check_lpips(options.lpips)
     if options.resume:
@@ -82,7 +89,7 @@ def run(words: list[str]) -> int:
     if options.evaluate:
         from endotsr.cli.evaluate import evaluate_run
 
-        evaluate_run(folder, sequence, lpips=options.lpips)
+        write_result(options.json, **evaluate_run(folder, sequence, lpips=options.lpips))
     return 0
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 
 
 @dataclass
@@ -29,6 +30,8 @@ class ViewOptions:
     """show the held-out frames and the error, if the sequence of the run is found"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """current location of the sequence of the run (default: the recorded one)"""
+    json: JsonFile = None
+    """also write the size of the page as JSON"""
     threads: int = 0
     """threads, 0 = all cores"""
 
@@ -43,7 +46,7 @@ def run(words: list[str]) -> int:
 
     options = parse(ViewOptions, words, "view")
     check_page(options.out, options.keys)
-    refuse_unwritable(options.out)
+    refuse_unwritable(options.out, options.json)
     use_threads(options.threads)
     scene = open_scene(options.scene)
     wanted = options.held_out and scene.folder is not None
@@ -51,4 +54,5 @@ def run(words: list[str]) -> int:
     title = options.title or options.scene.absolute().name
     size = write_page(options.out, scene, title, options.keys, sequence)
     print(f"{options.out}: {size / 1e6:.1f} MB, open it in a browser")
+    write_result(options.json, page=options.out, bytes=size, held_out=sequence is not None)
     return 0

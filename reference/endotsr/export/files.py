@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.export.mesh import surface
 from endotsr.export.model import save_slim_model
-from endotsr.export.ply import gaussian_vertices, point_vertices, write_ply
+from endotsr.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import Times, moments
 from endotsr.runs.files import refuse_unwritable, replacing_folder
@@ -18,9 +19,10 @@ FILE_ENDINGS = (*FILM_ENDINGS, ".png", ".jpg", ".jpeg", ".npy", ".npz", ".ply", 
 class Content(NamedTuple):
     """The content of a ply file."""
 
-    kind: Literal["gaussians", "points"] = "gaussians"
+    kind: Literal["gaussians", "points", "mesh"] = "gaussians"
     least_opacity: float = 0.1  # of a point
     taken_out: tuple[str, ...] = ()  # spectral components to leave out
+    voxel: float | None = None  # of a mesh: side of a voxel, scene units
 
 
 ALL_TIMES, GAUSSIANS = Times(), Content()
@@ -48,6 +50,8 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
     """
     if not 0.0 <= content.least_opacity <= 1.0:
         raise InputError(f"export: --opacity {content.least_opacity:g} is not allowed; allowed: 0 to 1")
+    if content.voxel is not None and content.kind != "mesh":
+        raise InputError("export: --voxel is the side of a voxel of a mesh; allowed: with --content mesh")
     ending = out.suffix.lower()
     if ending == ".npz":
         return _slim(scene, out, times, content)
@@ -78,7 +82,8 @@ def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> 
         raise InputError(f"{out}: one file holds one time, and {len(wanted)} are chosen; allowed: a folder, one time")
     refuse_unwritable(out)
     count = _write(scene, out, wanted[0][0], content)
-    return f"{out}: {count} {content.kind} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
+    name = "triangles" if content.kind == "mesh" else content.kind
+    return f"{out}: {count} {name} at time {wanted[0][0]:g}, {out.stat().st_size / 1e6:.2f} MB"
 
 
 def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
@@ -93,9 +98,14 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
 
 
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
-    """One ply file; returns the number of its vertices."""
+    """One ply file; returns the number of its Gaussians, points or triangles."""
+    unit = scene.record.get("unit", "scene units")
+    comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}")
+    if content.kind == "mesh":
+        found = surface(scene, time, content.voxel, content.taken_out)
+        write_ply(file, mesh_vertices(found.vertices, found.colours), comments, found.faces)
+        return len(found.faces)
     moment = scene.at(time, content.taken_out)
     vertices = point_vertices(moment, content.least_opacity) if content.kind == "points" else gaussian_vertices(moment)
-    unit = scene.record.get("unit", "scene units")
-    write_ply(file, vertices, (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}"))
+    write_ply(file, vertices, comments)
     return vertices.size

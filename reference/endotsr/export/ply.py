@@ -68,14 +68,30 @@ def _records(columns: dict[str, NDArray]) -> NDArray[np.void]:
     return records
 
 
-def write_ply(path: Path, vertices: NDArray[np.void], comments: Sequence[str] = ()) -> None:
-    """Write vertices; the file appears whole or not at all. `comments` are single lines of ASCII."""
+def mesh_vertices(position: FloatArray, colours: NDArray[np.uint8]) -> NDArray[np.void]:
+    """The vertices of a mesh: position (V, 3) and colour (V, 3)."""
+    return _records(dict(zip("xyz", position.T.astype("<f4"))) | dict(zip(("red", "green", "blue"), colours.T)))
+
+
+def write_ply(
+    path: Path, vertices: NDArray[np.void], comments: Sequence[str] = (), faces: NDArray[np.int32] | None = None
+) -> None:
+    """Write vertices and, if given, triangles (F, 3) of them; the file appears whole or not at all.
+
+    comments   single lines of ASCII
+    """
     names = vertices.dtype.names or ()
     head = ["ply", "format binary_little_endian 1.0", *(f"comment {line}" for line in comments)]
     head += [f"element vertex {vertices.size}"]
     head += [f"property {TYPE_NAMES[vertices.dtype[name]]} {name}" for name in names]
+    body = vertices.tobytes()
+    if faces is not None:
+        head += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+        triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+        triangles["count"], triangles["corners"] = 3, faces
+        body += triangles.tobytes()
     text = "\n".join([*head, "end_header", ""]).encode("ascii", "replace")
-    replace_file(path, lambda temporary: temporary.write_bytes(text + vertices.tobytes()))
+    replace_file(path, lambda temporary: temporary.write_bytes(text + body))
 
 
 def read_gaussians(path: Path) -> Gaussians:

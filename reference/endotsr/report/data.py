@@ -1,7 +1,7 @@
 """The input of a report: plain arrays, dictionaries and text. This module handles no file, picture or HTML."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,17 @@ COLUMNS = (
     ("lpips", "LPIPS [0,1]", 4, -1),
     ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
 )
+DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # shown without unfolding anything
+
+
+class Preview(NamedTuple):
+    """A small moving picture of the scene."""
+
+    moving: bytes  # animated WebP
+    still: bytes  # WebP, its first picture, for readers who asked for no motion
+    width: int  # pixels
+    height: int
+    words: str  # what it shows, one sentence
 
 
 @dataclass(frozen=True)
@@ -61,3 +72,5 @@ class ReportData:
     input_hashes: dict[str, str] = field(default_factory=dict)  # file -> SHA-256
     notes: tuple[str, ...] = ()  # sentences with the assumptions and findings of the reader
     depth_unit: str = "scene units"
+    preview: Preview | None = None
+    viewer: str = ""  # file name of the viewer page beside the report

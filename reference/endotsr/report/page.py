@@ -1,7 +1,8 @@
 """One self-contained HTML page about a run: numbers, baselines, pictures, curves, and how it was made.
 
 The page embeds every picture, needs no script and no other file, follows the reader's light or dark colour scheme and
-is readable on a phone. `write_report` takes plain data only, so that any program can write such a page.
+is readable on a phone. It links to the viewer page beside it, if there is one. `write_report` takes plain data only,
+so that any program can write such a page.
 """
 
 from pathlib import Path

@@ -1,6 +1,7 @@
 """Pieces of the report as HTML text: escaping, numbers, pictures, and the one style sheet.
 
-Everything that comes from a run passes through `text`, so that no name can break the page. No script, no link.
+Everything that comes from a run passes through `text`, so that no name can break the page. No script, and no link but
+that to the viewer page beside the report.
 """
 
 import html
@@ -71,6 +72,15 @@ def themed_image(light: bytes, dark: bytes, alternative: str) -> str:
     )
 
 
+def moving_image(moving: bytes, still: bytes, alternative: str, width: int, height: int) -> str:
+    """An animated WebP; readers whose system asks for little motion see its first picture."""
+    return (
+        f'<picture><source media="(prefers-reduced-motion: reduce)" srcset="{figures.data_uri(still, "webp")}">'
+        f'<img src="{figures.data_uri(moving, "webp")}" alt="{text(alternative)}" width="{width}" height="{height}">'
+        "</picture>"
+    )
+
+
 def colour_bar(name: str, low: str, high: str) -> str:
     """The colour map as a strip with its two end values."""
     colours = figures.colour_table(name)[::17]
@@ -125,6 +135,8 @@ tr.model>*{background:var(--tint)!important;font-weight:650}
 tr.reference>*{color:var(--soft);font-style:italic}
 td.best,td .best{color:var(--accent);font-weight:650}
 figure{margin:0}
+.preview img{width:auto;max-width:100%}.preview figcaption{margin-top:.35rem}
+a{color:var(--accent)}
 .charts{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:1rem}
 .charts figure,.panel{background:var(--panel);border:1px solid var(--line);border-radius:10px;padding:.7rem .8rem}
 .charts{align-items:start}.charts .scroll{margin:0}
@@ -153,6 +165,12 @@ footer{margin-top:3rem;border-top:1px solid var(--line);padding-top:1rem;color:v
 @media(max-width:640px){main{padding:1.3rem .9rem 3rem}.charts{grid-template-columns:1fr}
 .views{grid-auto-flow:row;grid-template-rows:none;grid-template-columns:1fr 1fr}
 .cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}dl{grid-template-columns:1fr}dd{margin-bottom:.4rem}
-tbody th{white-space:normal;min-width:8.5rem}}
+tbody th{white-space:normal;min-width:8.5rem}
+.few table,.few thead,.few tbody,.few caption{display:block}
+.few tr{display:grid;grid-template-columns:repeat(var(--cells),minmax(0,1fr));border-bottom:1px solid var(--line)}
+.few tbody tr:last-child{border-bottom:0}
+.few th:first-child{grid-column:1/-1;position:static;padding-bottom:0}
+.few th,.few td{padding:.35rem .5rem;border-bottom:0;white-space:normal;overflow-wrap:anywhere}
+.few thead th{font-size:.72rem}}
 @media print{section{break-inside:avoid}details>*{display:block}}
 """

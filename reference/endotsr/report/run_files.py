@@ -5,6 +5,7 @@ In: the metrics of a run and the renders of its held-out frames. Each file and f
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from endotsr.config import config_to_toml
 from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.report.curves import curves_png, read_log
-from endotsr.report.data import FramePictures, ReportData
+from endotsr.report.data import FramePictures, Preview, ReportData
 from endotsr.report.figures import triptych, triptych_picture
 from endotsr.report.page import write_report
 from endotsr.report.pictures import rgb_bytes
@@ -25,12 +26,19 @@ from endotsr.untrusted.names import file_name
 
 
 def write_evaluation(
-    folder: RunFolder, sequence: Sequence, metrics: dict[str, Any], held_out: dict[int, RenderOut]
+    folder: RunFolder,
+    sequence: Sequence,
+    metrics: dict[str, Any],
+    held_out: dict[int, RenderOut],
+    preview: Preview | None = None,
+    viewer: str = "",
 ) -> None:
-    """Write all files of `endotsr evaluate` in a run folder.
+    """Write the files of `endotsr evaluate` in a run folder.
 
     metrics     of `evaluation.run.measure_run`
     held_out    frame number -> render
+    preview     moving picture of the report
+    viewer      name of the viewer page in the folder, which the report links to; "" = there is none
     """
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
     write_json(folder.path / "metrics.json", metrics)
@@ -39,7 +47,8 @@ def write_evaluation(
     picture = curves_png(log, metrics)
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
-    write_report(folder.path / "report.html", _report_data(folder, sequence, metrics, held_out, log))
+    data = _report_data(folder, sequence, metrics, held_out, log)
+    write_report(folder.path / "report.html", replace(data, preview=preview, viewer=viewer))
 
 
 def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: dict[int, RenderOut]) -> None:

@@ -7,10 +7,11 @@ import numpy as np
 from endotsr.evaluation.evaluate import left_out
 from endotsr.report import curves, figures
 from endotsr.report import parts as parts
-from endotsr.report.data import COLUMNS, FramePictures, ReportData
+from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
 from endotsr.report.run_text import trajectory_sentence
 from endotsr.report.tables import html_table
 
+Column = tuple[str, str, int, int]  # of COLUMNS
 OPENED_FRAMES = 3  # the worst frames are shown unfolded
 
 
@@ -71,8 +72,21 @@ def _verdict(data: ReportData) -> str:
     )
 
 
+def moving(data: ReportData) -> str:
+    """The scene in motion, and the page on which it can be turned."""
+    blocks = []
+    if data.preview:
+        preview = data.preview
+        picture = parts.moving_image(preview.moving, preview.still, preview.words, preview.width, preview.height)
+        blocks.append(f'<figure class="preview">{picture}<figcaption>{parts.text(preview.words)}</figcaption></figure>')
+    if data.viewer:
+        link = f'<a href="{parts.text(data.viewer)}">Open the viewer</a>'
+        blocks.append(f"<p>{link}: play the scene, turn it, and lay its depth and its error over it.</p>")
+    return parts.section("The scene", *blocks)
+
+
 def held_out(data: ReportData) -> str:
-    """The table of held-out metrics: model, baselines, published rows."""
+    """The table of held-out metrics: model, baselines, published rows; values of 8 bits are folded."""
     rows: list[tuple[str, dict[str, Any], str]] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
@@ -83,23 +97,35 @@ def held_out(data: ReportData) -> str:
     columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
     if not columns:
         return ""
-    best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
-    cells = [
-        [
-            parts.text(label),
-            *(
-                _metric(row.get(key), digits, None if kind == "reference" else best[key])
-                for key, _, digits, _ in columns
-            ),
-        ]
-        for label, row, kind in rows
-    ]
     note = (
         "Mean over the held-out frames. Baselines use training frames only. Best measured value of a column in colour; "
         "published rows are quoted, not measured here."
     )
-    table = html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
-    return parts.section("Held-out frames against baselines without a model", table, _absent_reasons(data), note=note)
+    table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
+    title = "Held-out frames against baselines without a model"
+    return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
+
+
+def _held_out_table(rows: list[tuple[str, dict[str, Any], str]], columns: list[Column]) -> str:
+    best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
+    cells = [
+        [
+            parts.text(label),
+            *(_metric(row.get(key), n, None if kind == "reference" else best[key]) for key, _, n, _ in columns),
+        ]
+        for label, row, kind in rows
+    ]
+    return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
+
+
+def _eight_bit(rows: list[tuple[str, dict[str, Any], str]], columns: list[Column]) -> str:
+    """The columns of pictures rounded to 8 bits, folded; they differ from the others in the second decimal."""
+    rounded = [c for c in columns if c not in DECIDING]
+    if not rounded or len(rounded) == len(columns):
+        return ""
+    measured = [row for row in rows if any(row[1].get(c[0]) is not None for c in rounded)]
+    summary = "The same of pictures rounded to 8 bits<small>as programs that read PNG files measure</small>"
+    return parts.details(summary, _held_out_table(measured, rounded))
 
 
 def _best(rows: list[tuple[str, dict[str, Any], str]], key: str, sign: int) -> float | None:
@@ -129,7 +155,7 @@ def temporal_gap(data: ReportData) -> str:
     table = ""
     if held_out and training:
         rows = []
-        for key, label, digits, _ in COLUMNS:
+        for key, label, digits, _ in DECIDING:
             inside, outside = training.get(key), held_out.get(key)
             if inside is None or outside is None:
                 continue
@@ -274,4 +300,4 @@ def footer(data: ReportData) -> str:
     )
 
 
-SECTIONS = (headline, held_out, temporal_gap, pictures, training, components, the_run, footer)
+SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)

@@ -5,7 +5,10 @@ caller formats the numbers.
 """
 
 import html
+import re
 from collections.abc import Iterable, Sequence
+
+FEW = 6  # columns of numbers that stand side by side on a telephone
 
 
 def plain(columns: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = (0,), rule: bool = False) -> str:
@@ -32,22 +35,31 @@ def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([body[0], "|" + "---|" * len(columns), *body[1:]])
 
 
+def unbroken(name: str) -> str:
+    """The name of a quantity, whose unit stays on the line of the comma: `PSNR, dB`."""
+    return re.sub(r", (\S+)$", ",\u00a0\1", name)
+
+
 def html_table(
     columns: Iterable[str], rows: Iterable[Iterable[str]], classes: Iterable[str] = (), caption: str = ""
 ) -> str:
-    """A table that scrolls sideways on a narrow page; the first column stays visible (see `report.parts.STYLE`).
+    """A table whose every column is visible on a narrow page (see `report.parts.STYLE`).
+
+    Up to FEW columns after the first stand below the name of their row there. A table with more of them scrolls
+    sideways, and its first column stays visible.
 
     columns, caption   text, which is escaped
     rows               cells, which are HTML already
     classes            class of each row; "" or no entry = none
     """
-    head = "".join(f'<th scope="col">{html.escape(column)}</th>' for column in columns)
+    names = list(columns)
+    head = "".join(f'<th scope="col">{html.escape(unbroken(column))}</th>' for column in names)
     kinds = list(classes)
     body = []
     for position, (first, *rest) in enumerate(rows):
         kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
         body.append(f'<tr{kind}><th scope="row">{first}</th>' + "".join(f"<td>{c}</td>" for c in rest) + "</tr>")
     title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
-    return (
-        f'<div class="scroll"><table>{title}<thead><tr>{head}</tr></thead><tbody>{"".join(body)}</tbody></table></div>'
-    )
+    few = f' few" style="--cells:{len(names) - 1}' if 2 <= len(names) <= FEW + 1 else ""
+    table = f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+    return f'<div class="scroll{few}">{table}</div>'

@@ -26,6 +26,8 @@ from endotsr.views.panels import ERROR_SCALE, normalised_depth
 from endotsr.views.trajectories import header, key_times, packed, trajectories
 
 MOST_KEYS = 128
+KEYS = 32  # key times unless more or fewer are asked for
+RUN_PAGE = "view.html"  # in a run folder
 TEMPLATE, SCRIPT = "viewer.html", "viewer.js"
 
 
@@ -42,6 +44,14 @@ def write_page(file: Path, scene: MovingScene, title: str, keys: int, sequence: 
     content = page(scene, title, keys, sequence).encode()
     replace_file(file, lambda temporary: temporary.write_bytes(content))
     return len(content)
+
+
+def write_run_page(folder: Path, scene: MovingScene, sequence: Sequence | None) -> None:
+    """Write the page of a run into its folder, or remove that of an earlier evaluation if `sequence` is None."""
+    if sequence is None:
+        (folder / RUN_PAGE).unlink(missing_ok=True)
+    else:
+        write_page(folder / RUN_PAGE, scene, folder.absolute().name, KEYS, sequence)
 
 
 def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = None) -> str:

@@ -20,6 +20,7 @@ from endotsr.errors import InputError
 T = TypeVar("T")
 HELP_ALL = "--help-all"
 HELP = {"-h", "--help", HELP_ALL}
+THOUSANDS = {"k": 1e3, "K": 1e3, "M": 1e6}
 SWITCH_WORDS = {"true": True, "false": False}  # after a switch, as in a settings file
 
 
@@ -161,10 +162,16 @@ def converted(kind: Any, word: str) -> Any:
 
 
 def _refused(field: Field, word: str) -> InputError:
-    allowed = allowed_values(field.item)
+    allowed = allowed_values(field.item) + _written_out(word)
     if "." in field.name:
         return InputError(f"command line: {field.key} = {word!r} is not allowed; allowed: {allowed}")
     return InputError(f"{field.name} {word!r} is not allowed; allowed: {allowed}")
+
+
+def _written_out(word: str) -> str:
+    """Advice for a number with a letter, such as 1k or 1.5M; "" for other words."""
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word)
+    return f", written out ({float(found[1]) * THOUSANDS[found[2]]:.15g})" if found else ""
 
 
 def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:

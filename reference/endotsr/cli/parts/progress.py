@@ -1,13 +1,19 @@
 """Progress on the standard error: a bar on a terminal, single lines elsewhere."""
 
 import math
+import statistics
 import sys
 import time
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 from endotsr.report.words import duration
 
 QUIET_SECONDS = 30.0  # between lines if the standard error is not a terminal
+BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the time left is in the postfix
+LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # whose seconds give the time left
+SPIKE = 10.0  # medians: a longer iteration compiled code and is left out
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
 
 
@@ -15,19 +21,21 @@ class Progress:
     """Loss and PSNR (running means over views), Gaussian count and time left."""
 
     def __init__(self, total: int) -> None:
-        self._total, self._start = total, 0
-        self._began = self._said = time.monotonic()
+        self._total = total
+        self._said = self._ended = time.monotonic()
         self._means: dict[str, float] = {}
+        self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)
         self._bar: Any = None
 
     def begin(self, start: int) -> None:
         """The training begins after iteration `start`."""
-        self._start = start
-        self._began = self._said = time.monotonic()
+        self._said = self._ended = time.monotonic()
         if sys.stderr.isatty():
             from tqdm import tqdm
 
-            self._bar = tqdm(total=self._total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25)
+            self._bar = tqdm(
+                total=self._total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25, bar_format=BAR
+            )
 
     def update(self, entry: dict[str, Any]) -> None:
         """Show the log entry of one iteration."""
@@ -36,19 +44,16 @@ class Progress:
             if value is not None and math.isfinite(value):
                 mean = self._means.get(name)
                 self._means[name] = value if mean is None else memory * mean + (1 - memory) * value
+        now = time.monotonic()
+        self._seconds.append(now - self._ended)
+        self._ended = now
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
                 self._bar.set_postfix_str(self._state(entry), refresh=False)
-        elif time.monotonic() - self._said > QUIET_SECONDS:
-            self._said = time.monotonic()
-            done = entry["iteration"] - self._start
-            left = (self._said - self._began) / max(done, 1) * (self._total - entry["iteration"])
-            print(
-                f"iteration {entry['iteration']} of {self._total}: {self._state(entry)}, {duration(left)} left",
-                file=sys.stderr,
-                flush=True,
-            )
+        elif now - self._said > QUIET_SECONDS:
+            self._said = now
+            print(f"iteration {entry['iteration']} of {self._total}: {self._state(entry)}", file=sys.stderr, flush=True)
 
     def say(self, message: str) -> None:
         """A line that does not disturb the bar."""
@@ -64,7 +69,22 @@ class Progress:
 
     def _state(self, entry: dict[str, Any]) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
-        return f"{shown}, {entry.get('gaussians', 0)} Gaussians"
+        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left(self._seconds, self._remaining(entry))}"
+
+    def _remaining(self, entry: dict[str, Any]) -> int:
+        return self._total - entry["iteration"]
+
+
+def time_left(seconds: Sequence[float], remaining: int) -> str:
+    """The time that is left, from the seconds of the latest iterations, those that compiled code left out.
+
+    seconds     of the latest iterations, the last one last
+    remaining   iterations to come
+    """
+    if len(seconds) < LEAST_ITERATIONS:
+        return "time left not known yet"
+    limit = SPIKE * statistics.median(seconds)
+    return f"{duration(statistics.fmean(s for s in seconds if s <= limit) * remaining)} left"
 
 
 class StepBar:

@@ -1,0 +1,64 @@
+"""The moving preview of a report: the scene over all times, small enough to be embedded.
+
+In: a scene. Out: an animated WebP of at most PREVIEW_BYTES, on the left as the observed camera sees it, on the right
+from a camera that moves left and right. It is rendered at its own size, so it costs little beside an evaluation.
+"""
+
+import io
+from typing import Any
+
+import numpy as np
+
+from endotsr.export.scene import MovingScene
+from endotsr.report.data import Preview
+from endotsr.report.figures import ByteImage, bytes_image
+from endotsr.runs.sources import remembered_cameras
+from endotsr.views.cameras import fitted, path_cameras, pivot_depth_of
+from endotsr.views.panels import GAP
+
+PREVIEW_BYTES = 500_000  # at most; base64 makes a third more of it in the page
+PREVIEW_WIDTH = 240  # pixels of one of the two pictures, whatever the size of the frames
+PREVIEW_COUNT = 24  # pictures of a round, at most
+MILLISECONDS = 120  # between two of them
+ANGLE = 8.0  # largest turn of the moving camera, degrees
+QUALITIES = (80, 60, 40, 20)  # of WebP, tried in this order until the limit is kept
+WORDS = "The scene over all times: from the observed camera, and from a camera that moves left and right."
+
+
+def preview(scene: MovingScene) -> Preview | None:
+    """The preview of a scene; None if even the lowest quality is larger than PREVIEW_BYTES."""
+    from PIL import Image
+
+    pictures = [Image.fromarray(picture) for picture in preview_pictures(scene)]
+    for quality in QUALITIES:
+        content = _animated(pictures, quality)
+        if len(content) <= PREVIEW_BYTES:
+            return Preview(content, _animated(pictures[:1], quality), *pictures[0].size, WORDS)
+    return None
+
+
+def preview_pictures(scene: MovingScene) -> list[ByteImage]:
+    """The pictures of a round, (H, W, 3) uint8, two views of one time side by side."""
+    times, cameras = np.asarray(scene.record["times"], np.float64), remembered_cameras(scene.record)
+    count = min(PREVIEW_COUNT, max(len(times), 2))
+    wanted = np.linspace(0, float(times.max()), count)
+    near = [cameras[int(np.abs(times - time).argmin())] for time in wanted]
+    height = max(1, round(PREVIEW_WIDTH * near[0].height / near[0].width))
+    observed = [fitted(camera, PREVIEW_WIDTH, height) for camera in near]
+    first = scene.render(float(wanted[0]), observed[0])
+    moving = path_cameras("sway", observed, ANGLE, pivot_depth_of(first.depth, first.opacity))
+    return [_pair(scene, float(time), a, b) for time, a, b in zip(wanted, observed, moving)]
+
+
+def _pair(scene: MovingScene, time: float, observed: Any, moving: Any) -> ByteImage:
+    left, right = (bytes_image(scene.render(time, camera).colour) for camera in (observed, moving))
+    return np.concatenate([left, np.full((left.shape[0], GAP, 3), 255, np.uint8), right], axis=1)
+
+
+def _animated(pictures: list[Any], quality: int) -> bytes:
+    buffer = io.BytesIO()
+    options = {"format": "WEBP", "quality": quality, "method": 4}
+    if len(pictures) > 1:
+        options |= {"save_all": True, "append_images": pictures[1:], "duration": MILLISECONDS, "loop": 0}
+    pictures[0].save(buffer, **options)
+    return buffer.getvalue()

@@ -1,0 +1,77 @@
+"""`--json`: every command that prints a result has it, and the file holds the result."""
+
+import json
+
+import pytest
+from tiny import assert_refused, written_folder
+
+from endotsr.cli.bench import MEASURES
+from endotsr.cli.golden import DOORS
+from endotsr.cli.main import COMMANDS, main
+
+NOT_ALONE = {"golden", "bench"}  # only with a second word
+WITHOUT = {
+    "completion": "prints a script, not a result",
+    "bench all": "the folder it writes holds the JSON files of every measurement",
+    "tradeoff train": "the folder it writes holds training.json",
+}
+EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), "tradeoff train"]
+EVERY += [f"golden {door}" for door in DOORS] + [f"bench {what}" for what in MEASURES]
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_every_command_that_prints_a_result_writes_json(command, capsys):
+    assert main([*command.split(), "--help"]) == 0
+    assert ("--json FILE" in capsys.readouterr().out) == (command not in WITHOUT), WITHOUT.get(command, "")
+
+
+@pytest.mark.parametrize("command", [name for name in EVERY if name not in WITHOUT])
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, finished_run, capsys):
+    """Every command gets enough to begin its work; none of it is done."""
+    run, out = str(finished_run), str(tmp_path / "out")
+    needed = {
+        "demo": ["--out", out], "train": ["simulated", "--out", out], "prepare": [run, "--out", out],
+        "depth": [run], "check": [run], "simulate": ["still", "--out", out], "inspect": [run], "calibrate": [run],
+        "render": [run, "--out", out], "view": [run, "--out", f"{out}.html"], "export": [run, "--out", f"{out}.ply"],
+        "evaluate": [run], "compare": [run, run], "tradeoff": ["--out", out, "--budget", "10 ms"],
+        "golden judge": [run], "golden run": ["--port", "true {requests} {outputs}"], "golden reference": [out],
+    }  # fmt: skip
+    words = [*command.split(), *needed.get(command, []), "--json", str(tmp_path / "no" / "a.json")]
+    assert_refused(capsys, words, "a.json: cannot be written")
+    assert list(tmp_path.iterdir()) == []
+
+
+def result(tmp_path, *words):
+    """What the command wrote."""
+    assert main([*words, "--json", str(tmp_path / "result.json")]) == 0
+    return json.loads((tmp_path / "result.json").read_text())
+
+
+def test_results_of_pictures_pages_and_files(finished_run, tmp_path):
+    run = str(finished_run)
+    found = result(tmp_path, "render", run, "--out", str(tmp_path / "pictures"), "--times", "0.1", "0.6")
+    assert found["times"] == [0.1, 0.6] and found["folder"].endswith("pictures") and found["film"] is None
+    page = tmp_path / "page.html"
+    assert result(tmp_path, "view", run, "--out", str(page)) == {
+        "page": str(page), "bytes": page.stat().st_size, "held_out": True
+    }  # fmt: skip
+    found = result(tmp_path, "export", run, "--out", str(tmp_path / "files"), "--count", "2")
+    assert found["bytes"] == {p.name: p.stat().st_size for p in (tmp_path / "files").iterdir()}
+    assert found["content"] == "gaussians" and "2 files" in found["said"]
+
+
+def test_results_of_sequences(tmp_path):
+    folder = written_folder(tmp_path)
+    assert result(tmp_path, "check", str(folder))["findings"] is not None
+    found = result(tmp_path, "prepare", str(folder), "--out", str(tmp_path / "prepared"))
+    assert (found["frames"], found["width"], found["height"], found["layout"]) == (9, 48, 32, "endonerf")
+    assert found["depth"] is True and found["folder"] == str(tmp_path / "prepared")
+    small = ["--width", "48", "--height", "32", "--frames", "3"]
+    found = result(tmp_path, "simulate", "breathing", "--out", str(tmp_path / "simulated"), *small)
+    assert found["settings"]["frames"] == 3 and "breathing" in found["effects"]
+
+
+def test_mistakes_of_ports_are_listed(tmp_path, capsys):
+    found = result(tmp_path, "golden", "negative")["mistakes"]
+    said = capsys.readouterr().out
+    assert len(found) > 10 and all(f"{flag}: {entry['title']}" in said for flag, entry in found.items())
