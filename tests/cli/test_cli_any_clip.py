@@ -10,7 +10,7 @@ from endotsr.sequences.common import open_common
 from endotsr.sequences.endonerf import read_endonerf
 from endotsr.config import SequenceConfig
 from endotsr.simulator.truth import read_truth
-from film_reader import read_film
+from film_reader import read_video
 
 SCENE = ["moving-camera", "--instrument.on", "--width", "96", "--height", "80", "--frames", "9", "--noise.on", "false"]
 
@@ -74,7 +74,7 @@ def test_the_rest_of_the_way_takes_one_command_each(chain, capsys):
     said("evaluate", run)
     assert "Optical-flow" in capsys.readouterr().out
     said("render", run, "--film", chain / "film.mp4")
-    assert len(read_film(chain / "film.mp4")) == 9
+    assert len(read_video(chain / "film.mp4")) == 9
 
 
 @pytest.mark.parametrize(

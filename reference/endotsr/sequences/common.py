@@ -217,6 +217,7 @@ def open_common(folder: Path) -> Recording:
         names=[file.stem for file in contents.images],
         pictures=pictures,
         masks=mask if contents.masks else None,
+        proposed=bool(found.masks and found.masks.proposed and contents.masks),
         depth=depth if contents.depth else None,
         unit="arbitrary" if found.arbitrary else "mm",
         lens=found.camera.lens(folder),
