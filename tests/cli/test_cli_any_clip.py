@@ -5,10 +5,10 @@ import pytest
 from tiny import SETTINGS, assert_refused
 
 from endotsr.cli.main import main
+from endotsr.config import SequenceConfig
 from endotsr.opencv import read_png
 from endotsr.sequences.common import open_common
 from endotsr.sequences.endonerf import read_endonerf
-from endotsr.config import SequenceConfig
 from endotsr.simulator.truth import read_truth
 from film_reader import read_video
 

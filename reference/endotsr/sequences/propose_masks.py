@@ -1,9 +1,12 @@
 """Proposals of instrument masks without a network: grey metal on red tissue, and motion unlike the tissue's.
 
-Tissue is red, orange or mauve, and metal is grey. The redness of a pixel is s = (R - min(G, (G + B) / 2)) / (R + G + B +
-FLOOR). With m the usual redness of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m
-join them; gaps and holes are filled, and a margin is added, because a mask that is too large costs less than one that
-is too small. A region of that kind is an instrument if it is large and enters from the border of the picture, if it moves unlike the
+Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
+
+    s = (R - min(G, (G + B) / 2)) / (R + G + B + FLOOR),
+
+and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
+Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. A
+region of that kind is an instrument if it is large and enters from the border of the picture, if it moves unlike the
 tissue around it, or if it lies where the frame before or after has an instrument. Other regions, such as highlights,
 are left to the tissue. Instruments of the colour of tissue and blood-covered ones are not found.
 
