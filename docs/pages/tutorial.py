@@ -11,14 +11,15 @@ import numpy as np
 from matplotlib import colormaps
 
 from endotsr.cli.main import main as endotsr
-from endotsr.opencv import read_png, write_png
+from endotsr.opencv import read_png
+from endotsr.opencv.pictures import write_jpeg
 from endotsr.opencv.video import video_pictures
 from endotsr.sequences.common import open_common
 from endotsr.sequences.propose_masks import overlay
 
 RESULTS = Path(__file__).parents[1] / "results"
-SCENE = ["pulling", "--camera-motion.on", "--width", "240", "--height", "192", "--frames", "13"]
-TRAINING = ["--preset", "demo", "--iterations", "300"]
+SCENE = ["pulling", "--camera-motion.on", "--width", "240", "--height", "192", "--frames", "10"]
+TRAINING = ["--preset", "demo", "--iterations", "200"]
 DEPTH = ["--nearest", "25", "--farthest", "120"]
 SHOWN = (0, 5, 9)  # frames; 9 is held out
 Picture = np.ndarray
@@ -62,26 +63,27 @@ def reconstructed(clip: Path, renders: Path) -> Picture:
     return np.concatenate([truth, render[..., :3], error], axis=1)
 
 
+def drawn(name: str, picture: Picture) -> None:
+    """Write one picture of the page."""
+    write_jpeg(RESULTS / f"tutorial_{name}.jpg", picture, quality=90)
+
+
 def main() -> None:
     """The command."""
     with tempfile.TemporaryDirectory() as temporary:
         root = Path(temporary)
         raw, clip, run = root / "recording", root / "clip", root / "run"
         said("simulate", *SCENE, "--out", raw, "--layout", "stereomis")
+        drawn("recording", recorded(raw))
         said("prepare", raw, "--out", clip)
         said("masks", clip, "--out", root / "proposal")
+        drawn("proposal", read_png(root / "proposal" / "proposed_masks.png"))
         said("depth", clip, *DEPTH)
+        drawn("sequence", prepared(clip))
         said("check", clip)
         said("train", clip, "--out", run, *TRAINING)
         said("render", run, "--frames", "test", "--out", root / "renders")
-        pictures = {
-            "recording": recorded(raw),
-            "sequence": prepared(clip),
-            "proposal": read_png(root / "proposal" / "proposed_masks.png"),
-            "scene": reconstructed(clip, root / "renders"),
-        }
-    for name, picture in pictures.items():
-        write_png(RESULTS / f"tutorial_{name}.png", picture)
+        drawn("scene", reconstructed(clip, root / "renders"))
 
 
 if __name__ == "__main__":
