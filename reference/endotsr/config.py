@@ -49,6 +49,8 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     """frames in a held-out block; a block starts every max(24, 2 x length) frames"""
     depth_percentiles: tuple[float, float] = (3.0, 99.8)
     """per-frame clip of the non-zero prior depth, percent"""
+    memory: NonNegative = 0.0
+    """GB for frames and what is computed from them; more lies in a file; 0 = half of this machine's memory"""
 
 
 class ModelConfig(Section, frozen=True, kw_only=True):

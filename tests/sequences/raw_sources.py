@@ -125,7 +125,9 @@ def tum(folder: Path, frames: int = 5) -> None:
     pictures, planes = ["# time file"], []
     for i in range(frames):
         write_png(folder / "rgb" / f"{i}.png", scene_picture(i))
-        write_png(folder / "depth" / f"{i}.png", np.full((HEIGHT, WIDTH), 300 + i, np.uint16))
+        plane = np.full((HEIGHT, WIDTH), 300 + i, np.uint16)
+        plane[0] = 200 + 5 * np.arange(WIDTH)  # a wall alone would be refused
+        write_png(folder / "depth" / f"{i}.png", plane)
         pictures.append(f"{100 + i / 25:.6f} rgb/{i}.png")
         planes.append(f"{100.003 + i / 25:.6f} depth/{i}.png")
     (folder / "rgb.txt").write_text("\n".join(pictures))

@@ -1,7 +1,10 @@
 """`endotsr check`: each of the wrong inputs, made by a script, gives the finding it must give, and no wrong alarm."""
 
 import json
+import re
+from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 from common_folder import moving, written
@@ -9,11 +12,15 @@ from test_stereo_depth import slanted_pair, stereo_folder
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.config import PAPER
+from endotsr.config import PAPER, SequenceConfig
+from endotsr.errors import InputError
 from endotsr.opencv import read_png, write_png
 from endotsr.sequences.checks.check import check_sequence
-from endotsr.sequences.checks.cost import estimated_cost, refuse_too_large
+from endotsr.sequences.checks.cost import estimated_cost
+from endotsr.sequences.checks.guard import MOST, SAID_ALREADY
 from endotsr.sequences.endonerf import write_endonerf
+from endotsr.sequences.frame_store import FrameStore
+from endotsr.sequences.layouts import read_sequence
 from endotsr.sequences.sequence_file import FILE_NAME
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
@@ -127,12 +134,36 @@ WRONG = {
     "poses in metres": (lambda p: poses(p, lambda r: drift(r, 1e-4 / 8)), "pose-unit", "warning", None),
     "far away": (lambda p: poses(p, entry(0, 3, 1e9)), "far-from-origin", "note", None),
     "focal length in mm": (lambda p: poses(p, entry(2, 4, 4.0)), "field-of-view", "warning", None),
+    "grey image": (lambda p: each(p, "images", lambda x: x[:, :, 0], [3]), "picture", "refusal", 3),
+    "16-bit image": (lambda p: each(p, "images", lambda x: x.astype(np.uint16) * 257, [3]), "picture", "refusal", 3),
+    "coloured mask": (lambda p: each(p, "masks", coloured, [3]), "mask", "refusal", 3),
+    "empty file": (lambda p: (p / "images/000003.png").write_bytes(b""), "picture", "refusal", 3),
+    "two files of one number": (lambda p: copied_as(p / "images", "000003.png", "3.png"), "images-files", "refusal",
+                                None),
+    "a stray picture": (lambda p: copied_as(p / "images", "000003.png", "overview.png"), "images-files", "refusal",
+                        None),
+    "all grey": (lambda p: each(p, "images", lambda x: np.repeat(x[:, :, :1], 3, 2)), "grey-pictures", "note", None),
+    "centimetres": (lambda p: each(p, "depth", lambda x: (x // 10 + (x > 0)).astype(np.uint8)), "coarse-depth",
+                    "warning", None),
+    "mirrored pose": (lambda p: poses(p, mirrored), "cameras", "refusal", None),
     "two frames": (lambda p: keep(p, 2), "frames", "refusal", None),
 }  # fmt: skip
 
 
 def cut(file):
     file.write_bytes(file.read_bytes()[:-20])
+
+
+def coloured(mask):
+    return np.stack([mask, mask, mask // 2], axis=2)
+
+
+def copied_as(folder, name, other):
+    (folder / other).write_bytes((folder / name).read_bytes())
+
+
+def mirrored(rows):
+    rows[:, :15].reshape(-1, 3, 5)[:, :, 0] *= -1
 
 
 def half_white(image):
@@ -165,10 +196,34 @@ def test_a_wrong_input_gives_its_finding(case, sequence, tmp_path):
     assert all(f.what and f.why and f.remedy and str(tmp_path) in f.where for f in found)
 
 
+@pytest.mark.parametrize("case", WRONG)
+def test_train_and_check_judge_alike(case, sequence, tmp_path):
+    """What the check refuses is refused, and its warnings are in the notes of what is accepted."""
+    write_endonerf(sequence, tmp_path / "clip")
+    WRONG[case][0](tmp_path / "clip")
+    checked = check_sequence(tmp_path / "clip", PAPER)
+    if checked.refused:
+        with pytest.raises(InputError):
+            read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near)
+        return
+    notes = read_sequence(tmp_path / "clip", PAPER.sequence, PAPER.raster.near).notes
+    said = [found[1] for note in notes if (found := re.match(r"(?:warning|note): ([\w-]+): ", note))]
+    assert said == [f.code for f in checked.findings if f.code not in SAID_ALREADY]
+
+
+def test_many_findings_of_one_kind_are_counted(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "clip")
+    each(tmp_path / "clip", "images", lambda x: x * 0, range(7))
+    notes = read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).notes
+    black = [note for note in notes if "black-frame" in note]
+    assert len(black) == MOST and black[-1].endswith("(2 more of this kind)")
+
+
 def test_a_right_sequence_has_no_finding(sequence, tmp_path):
     write_endonerf(sequence, tmp_path / "clip")
     checked = check_sequence(tmp_path / "clip", PAPER)
     assert checked.findings == [] and not checked.refused
+    assert not any("warning" in note for note in read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).notes)
     assert checked.facts["frames"] == FRAMES and checked.facts["cost"]["minutes"] > 0
 
 
@@ -219,12 +274,35 @@ def test_an_inverted_picture_of_depth_is_found_by_the_stereo_pair(tmp_path):
     assert found and found[0].level == "refusal" and "disparity" in found[0].remedy
 
 
-def test_cost_grows_with_the_clip_and_too_much_is_refused_before_reading():
-    small, large = estimated_cost(60, 640, 512, 6000), estimated_cost(2000, 640, 512, 6000)
-    assert large.sequence_bytes == pytest.approx(small.sequence_bytes * 2000 / 60)
-    assert large.total_bytes < 8e9 < estimated_cost(2000, 1280, 1024, 6000).total_bytes
-    with pytest.raises(ValueError, match="10000000 frames of 640x512 need"):
-        refuse_too_large(10_000_000, 640, 512, "clip")
+def test_cost_grows_with_the_clip_up_to_the_limit():
+    small, large = (estimated_cost(n, 640, 512, 6000, memory=8.0) for n in (60, 120))
+    assert large.sequence_bytes == pytest.approx(2 * small.sequence_bytes) and not large.file_bytes
+    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 20.3))
+    long = estimated_cost(2000, 640, 512, 6000, memory=4.0, between=True)
+    assert long.file_bytes == long.sequence_bytes == 2000 * 640 * 512 * 9
+    assert long.total_bytes == pytest.approx(4e9 / 2 + 1.2e9)
+    assert estimated_cost(60, 640, 512, 6000, between=True).total_bytes > small.total_bytes
+
+
+def test_a_clip_that_fits_nowhere_is_refused_before_reading(sequence, tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"clip: 10000000 frames of 640x512 need 29491\.2 GB, more than half"):
+        FrameStore(10_000_000, 640, 512, 0.0, "clip")
+    write_endonerf(sequence, tmp_path / "clip")
+    few = msgspec.structs.replace(PAPER, sequence=SequenceConfig(memory=1e-4))
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", few).findings}
+    assert found["frames-in-file"].level == "note" and "disk" not in found
+    monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=10))
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", few).findings}
+    assert found["disk"].level == "refusal" and "allowed: fewer --frames" in found["disk"].what
+    with pytest.raises(InputError, match="allowed: fewer --frames"):
+        read_sequence(tmp_path / "clip", few.sequence, 0.2)
+
+
+def test_too_little_memory_is_a_warning(sequence, tmp_path, monkeypatch):
+    write_endonerf(sequence, tmp_path / "clip")
+    monkeypatch.setattr("endotsr.sequences.checks.check.memory_of_machine", lambda: 1e8)
+    found = {f.code: f for f in check_sequence(tmp_path / "clip", PAPER).findings}
+    assert found["memory"].level == "warning" and "this machine has 0.1 GB" in found["memory"].what
 
 
 def test_the_command_writes_json_and_a_page(sequence, tmp_path, capsys):

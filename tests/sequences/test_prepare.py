@@ -199,7 +199,7 @@ def test_tum(tmp_path):
     sequence = read_common(tmp_path / "out", WHOLE, 0.2)
     assert found.frame_rate == pytest.approx(25.0, rel=1e-4) and sequence.unit == "mm"
     for i in range(5):
-        np.testing.assert_allclose(sequence.depth[i], (300 + i) / 5, atol=0.02)  # 5000 steps a metre
+        np.testing.assert_allclose(sequence.depth[i, 1:], (300 + i) / 5, atol=0.02)  # 5000 steps a metre
         np.testing.assert_allclose(camera_centre(sequence.cameras[i]), [8.0 * i, 0, 0], atol=1e-6)
 
 
@@ -222,7 +222,9 @@ def test_depth_and_masks_of_other_programs(tmp_path):
         (tmp_path / name).mkdir()
     for i in range(3):
         write_png(tmp_path / f"clip/a{i}.png", scene_picture(i))
-        np.save(tmp_path / f"depth/a{i}.npy", np.full((HEIGHT, WIDTH), 0.05, np.float32))
+        plane = np.full((HEIGHT, WIDTH), 0.05, np.float32)
+        plane[0] += 1e-4 * np.arange(WIDTH, dtype=np.float32)  # a wall alone would be refused
+        np.save(tmp_path / f"depth/a{i}.npy", plane)
         write_png(
             tmp_path / f"masks/a{i}.png",
             np.where(np.arange(WIDTH) < 20 + i, 0, 7)[None].repeat(HEIGHT, 0).astype(np.uint8),
@@ -232,7 +234,7 @@ def test_depth_and_masks_of_other_programs(tmp_path):
         depth=tmp_path / "depth", depth_unit="m",
     )  # fmt: skip
     sequence = read_common(tmp_path / "out", WHOLE, 0.2)
-    np.testing.assert_allclose(sequence.depth, 50.0, atol=0.01)
+    np.testing.assert_allclose(sequence.depth[:, 1:], 50.0, atol=0.01)
     assert [int((~mask).sum()) for mask in sequence.masks] == [HEIGHT * (20 + i) for i in range(3)]
 
 

@@ -20,6 +20,7 @@ COMMANDS = {
     "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
     "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
     "depth": "make the depth of a sequence from its stereo pairs, or take that of another program",
+    "masks": "propose instrument masks for a clip that has none, with an overlay to look at",
     "check": "find everything that is wrong with a sequence, with remedies",
     "train": "train on a sequence folder, or on a simulated sequence",
     "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",

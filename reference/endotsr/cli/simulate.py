@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -17,14 +17,16 @@ from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
 from endotsr.simulator.settings import SimulatorSettings
 
 STILL = named_scene("still")
+PREPARE = "next: endotsr prepare {} --out FOLDER"
 
 
 @dataclass
 class SimulateOptions:
-    """Simulate a scene in which every effect is known, and write it as an EndoNeRF folder with the exact truth beside.
+    """Simulate a scene in which every effect is known, and write it as a folder with the exact truth beside.
 
     SCENE is still, breathing, pulling, cutting, smoke, moving-camera or everything; the options change its size, its
-    seed and its effects. `endotsr train OUT` reads the folder. OUT/truth holds depth, motion, light and masks.
+    seed and its effects. `endotsr train OUT` reads a folder in the layout endonerf; `endotsr prepare OUT` reads the
+    raw recording of the layout stereomis. OUT/truth holds depth, motion, light and masks.
     """
 
     scene: Annotated[str, Option("[SCENE]", positional=True)] = ""
@@ -35,6 +37,8 @@ class SimulateOptions:
     """exactly these effects, instead of those of a scene; empty for none"""
     json: JsonFile = None
     """also write what was simulated as JSON"""
+    layout: Literal["endonerf", "stereomis"] = "endonerf"
+    """endonerf: pictures, depth, masks and poses; stereomis: stacked film, calibration, trajectory and masks"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 
@@ -49,7 +53,7 @@ def run(words: list[str]) -> int:
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings
     refuse_unwritable(options.json)
-    _write(options.out, settings, options.scene if options.effects is None else options.effects)
+    _write(options, settings, options.scene if options.effects is None else options.effects)
     write_result(
         options.json,
         folder=options.out,
@@ -57,22 +61,28 @@ def run(words: list[str]) -> int:
         effects=effects_on(settings),
         settings=msgspec.to_builtins(settings),
     )
-    print(f"truth in {options.out}/truth; train with: endotsr train {options.out} --out RUN")
+    advice = "train with: endotsr train {} --out RUN" if options.layout == "endonerf" else PREPARE
+    print(f"truth in {options.out}/truth; {advice.format(options.out)}")
     return 0
 
 
-def _write(out: Path, settings: SimulatorSettings, name: str) -> None:
+def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> None:
     """Refuse what cannot be written before anything is, then write beside the folder's name and rename."""
-    from endotsr.simulator.folder import check_scene, write_sequence
+    from endotsr.simulator import folder, stereomis
 
+    out, raw = options.out, options.layout == "stereomis"
+    assert out is not None
+    check, write = (
+        (stereomis.check_recording, stereomis.write_recording) if raw else (folder.check_scene, folder.write_sequence)
+    )
     refuse_existing(out)
-    check_scene(settings)
+    check(settings)
     print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)
     print(f"effects: {', '.join(effects_on(settings))}", flush=True)
     try:
         out.absolute().parent.mkdir(parents=True, exist_ok=True)
-        with replacing_folder(out) as folder, StepBar("frames") as bar:
+        with replacing_folder(out) as place, StepBar("frames") as bar:
             bar.begin(settings.frames)
-            write_sequence(folder, settings, name, bar.step)
+            write(place, settings, name, bar.step)
     except OSError as error:
         raise InputError(os_error_line(error, out)) from None

@@ -11,6 +11,7 @@ import numpy as np
 
 from endotsr.fitting.sampling import Moment
 from endotsr.kernels.arrays import Array, BoolArray
+from endotsr.kernels.memory import Kept
 from endotsr.sequences.between import flows_between, frame_between
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
@@ -34,21 +35,22 @@ class Moments:
 
     sequence: Sequence
     method: str  # of the optical flow, see `opencv.dense_flow`
-    stored: dict[Moment, Stored] = field(default_factory=dict)
+    stored: Kept[tuple[int, int], dict[Moment, Stored]] = field(default_factory=Kept)  # by gap
 
     def frame(self, moment: Moment, dtype: np.dtype | str = "float32") -> Frame:
         """The frame at a moment, with image and depth in `dtype`."""
-        if moment not in self.stored:
-            self._make(moment)
-        image, mask, depth, time, camera = self.stored[moment]
+        gap = self.stored.get((moment.earlier, moment.later), lambda: self._made(moment))
+        image, mask, depth, time, camera = gap[moment]
         return Frame(np.divide(image, STEPS, dtype=dtype), mask, depth.astype(dtype), time, camera)
 
-    def _make(self, wanted: Moment) -> None:
+    def _made(self, wanted: Moment) -> dict[Moment, Stored]:
         """All moments of the gap in which `wanted` lies."""
         earlier, later, _ = wanted
+        found = {}
         flows, count = flows_between(self.sequence, earlier, later, self.method), 2 * (later - earlier)
         for place in range(1, count):
             made = frame_between(self.sequence, earlier, later, place / count, flows)
             image = np.rint(made.image * STEPS).astype(np.uint16)
             moment = Moment(earlier, later, place / count)
-            self.stored[moment] = Stored(image, made.mask, made.depth, made.time, made.camera)
+            found[moment] = Stored(image, made.mask, made.depth, made.time, made.camera)
+        return found

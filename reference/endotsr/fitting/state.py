@@ -18,7 +18,7 @@ from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.fitting.moments import Moments
 from endotsr.fitting.objective import Targets, frame_targets
 from endotsr.fitting.sampling import View
-from endotsr.kernels.memory import keep_freed_memory
+from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
@@ -51,7 +51,7 @@ class Workshop:
     config: Config
     spectral: Spectral
     extent: float
-    targets: dict[int, Targets]  # by frame, filled at first use
+    targets: Kept[int, Targets]  # by frame, filled at first use
     moments: Moments  # between the frames, filled at first use
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
@@ -62,18 +62,22 @@ class Workshop:
         return frame_targets(frame, self.config), frame.camera
 
     def targets_of(self, index: int) -> Targets:
-        """The loss targets of a frame, computed once."""
-        if index not in self.targets:
-            self.targets[index] = frame_targets(self.sequence.frame(index, self.config.training.precision), self.config)
-        return self.targets[index]
+        """The loss targets of a frame, computed once, or again where they were dropped."""
+        precision = self.config.training.precision
+        return self.targets.get(index, lambda: frame_targets(self.sequence.frame(index, precision), self.config))
 
 
 def workshop(sequence: Sequence, config: Config) -> Workshop:
-    """Spectral constants and scene extent of a sequence."""
+    """Spectral constants and scene extent of a sequence.
+
+    A quarter of `sequence.memory` each is for the targets of the frames and for the frames in between.
+    """
     keep_freed_memory()
+    limit = memory_limit(config.sequence.memory) / 4
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    return Workshop(sequence, config, spectral, extent, {}, Moments(sequence, config.training.bridge_flow))
+    moments = Moments(sequence, config.training.bridge_flow, Kept(limit))
+    return Workshop(sequence, config, spectral, extent, Kept(limit), moments)
 
 
 def new_training(sequence: Sequence, config: Config) -> TrainingState:

@@ -1,7 +1,14 @@
-"""Reuse of freed memory: every training iteration frees and allocates the same image-sized arrays."""
+"""Memory: reuse of what an iteration frees, the limit for what a clip may keep, and values kept up to a limit."""
 
 import ctypes
+import os
 import sys
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import numpy as np
+
+Key, Value = TypeVar("Key"), TypeVar("Value")
 
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # of mallopt(3)
 
@@ -20,3 +27,68 @@ def keep_freed_memory() -> bool:
     except (OSError, AttributeError):
         return False
     return bool(mallopt(_M_MMAP_MAX, 0) and mallopt(_M_TRIM_THRESHOLD, 2**31 - 1))
+
+
+def memory_of_machine() -> float | None:
+    """Bytes of memory of this machine; None where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def memory_limit(gigabytes: float) -> float:
+    """Bytes that the frames of a clip and what is computed from them may take: 0 = half of this machine's memory."""
+    if gigabytes > 0:
+        return gigabytes * 1e9
+    machine = memory_of_machine()
+    return np.inf if machine is None else machine / 2
+
+
+def bytes_of(value: object) -> int:
+    """Bytes of the arrays in nested tuples, lists and dictionaries; an array that occurs twice counts once."""
+    found: dict[int, int] = {}
+
+    def collect(part: object) -> None:
+        if isinstance(part, np.ndarray):
+            found[id(part)] = part.nbytes
+        elif isinstance(part, tuple | list | dict):
+            for inner in part.values() if isinstance(part, dict) else part:
+                collect(inner)
+
+    collect(value)
+    return sum(found.values())
+
+
+class Kept(Generic[Key, Value]):
+    """Values by key that were computed once and are kept; the oldest are dropped where they need more than `limit`.
+
+    A dropped value is computed again when it is asked for. It must therefore be a function of its key, and the limit
+    changes no result.
+    """
+
+    def __init__(self, limit: float = np.inf) -> None:
+        self.limit, self.bytes = limit, 0
+        self._values: dict[Key, Value] = {}
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._values
+
+    def __getitem__(self, key: Key) -> Value:
+        return self._values[key]
+
+    def put(self, key: Key, value: Value) -> None:
+        """Keep a value. The newest is kept whatever it needs."""
+        self._values[key] = value
+        self.bytes += bytes_of(value)
+        while self.bytes > self.limit and len(self._values) > 1:
+            self.bytes -= bytes_of(self._values.pop(next(iter(self._values))))
+
+    def get(self, key: Key, make: Callable[[], Value]) -> Value:
+        """The value of a key, made at first use."""
+        if key not in self._values:
+            self.put(key, make())
+        return self._values[key]

@@ -85,7 +85,11 @@ def _digests(sequence: Sequence) -> dict[str, str]:
 
 
 def _digest(array) -> str:
-    return hashlib.sha256(array.tobytes()).hexdigest()
+    """SHA-256 of the bytes of an array, frame by frame: a long clip is not copied whole."""
+    digest = hashlib.sha256()
+    for frame in array:
+        digest.update(frame.tobytes())
+    return digest.hexdigest()
 
 
 def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:

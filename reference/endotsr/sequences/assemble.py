@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize
+from endotsr.sequences.checks.depth import DepthFacts
+from endotsr.sequences.checks.frames import FrameFacts
+from endotsr.sequences.checks.guard import guarded, with_coverage
 from endotsr.sequences.files import shortened
+from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, sparse_step
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import split_frames, time_stamps
@@ -44,8 +48,10 @@ class Frames(NamedTuple):
     depth: NDArray[np.float32]  # (n, H, W) in `unit`, clipped; 0 = none
     cameras: list[Camera]
     static: bool
-    names: list[str]
+    image_files: list[Path]  # n
     depth_files: list[Path]  # n, for messages
+    facts: tuple[list[FrameFacts], list[DepthFacts]]  # n of each: what the checks need of pictures and stored depth
+    store: FrameStore  # of the arrays
     unit: str
     mask_source: MaskSource | None  # None: there are no masks
     arbitrary: bool = False  # the unit is unknown: the scale of the world is free
@@ -63,15 +69,19 @@ def assemble(frames: Frames, config: SequenceConfig, near: float, folder: Path, 
     world = fitting_world(np.array([camera_centre(camera) for camera in cameras]), depth, frames.arbitrary)
     if not world.unchanged:
         cameras = moved_cameras(cameras, world)
-        depth = depth * np.float32(world.scale) if world.scale != 1.0 else depth
+        if world.scale != 1.0:
+            np.multiply(depth, np.float32(world.scale), out=depth)
         notes.append(world_note(world, frames.unit))
     notes += _mask_notes(frames, config)
     notes.append(_depth_note(depth, near, frames.depth_files, "scene units" if frames.arbitrary else frames.unit))
+    notes += _guarded(frames, near)
+    if frames.store.note:
+        notes.append(frames.store.note)
     if frames.mask_source:
         notes += check_single_masks(masks, depth, images, frames.mask_source.names, config.allow_tissue_fraction)
     height, width = images.shape[2:]
     if config.scale != 1.0:
-        images, masks, depth = _scaled(images, masks, depth, config.scale, str(folder))
+        images, masks, depth = _scaled(images, masks, depth, config, str(folder))
         height, width = images.shape[2:]
         scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
         cameras = [scaled[id(camera)] for camera in cameras]
@@ -86,13 +96,21 @@ def assemble(frames: Frames, config: SequenceConfig, near: float, folder: Path, 
         depth=depth,
         times=time_stamps(len(images)),
         cameras=cameras,
-        names=frames.names,
+        names=[file.stem for file in frames.image_files],
         unit=frames.unit,
         static_camera=frames.static,
         train_index=train,
         test_index=test,
         notes=notes,
     )
+
+
+def _guarded(frames: Frames, near: float) -> list[str]:
+    """Notes of the checks that `endotsr check` makes too. Raises InputError for what it refuses."""
+    pictures, depth = frames.facts
+    facts = pictures, with_coverage(depth, frames.depth, frames.masks)
+    where = frames.depth_files[0].parent
+    return guarded(frames.image_files, facts, frames.cameras, where, frames.arbitrary, near)
 
 
 def check_percentiles(config: SequenceConfig) -> None:
@@ -156,28 +174,46 @@ def _check_scaled_fraction(source: MaskSource | None, masks: NDArray[np.bool_], 
 
 def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path], unit: str) -> str:
     """The note on the prior depth. Raises InputError for a sequence without any."""
-    valid = depth > 0
     where = files[0].parent
-    if not valid.any():
+    rows = [_extent(plane, near) for plane in depth]  # frame by frame: no array over all frames is made
+    known, before = sum(row.known for row in rows), sum(row.before for row in rows)
+    if not known:
         raise InputError(f"{where}: no pixel of the {len(depth)} frames has a depth")
-    values = depth[valid]
-    if values.max() <= near:
-        raise InputError(f"{where}: the largest depth is {values.max():g}, in front of the near plane at {near:g}")
-    empty = np.flatnonzero(~valid.any(axis=(1, 2)))
-    behind = float((values <= near).mean())
+    nearest, farthest = min(row.nearest for row in rows), max(row.farthest for row in rows)
+    if farthest <= near:
+        raise InputError(f"{where}: the largest depth is {farthest:g}, in front of the near plane at {near:g}")
+    empty = [i for i, row in enumerate(rows) if not row.known]
+    behind = before / known
     distant = [f"{files[i].name} ({ratio:.3g} times)" for i, ratio in far_off(depth, FAR_OFF)]
     return (
-        f"depth in {unit}, {values.min():g} to {values.max():g} after clipping;"
-        f" missing on {1 - valid.mean():.4f} of the pixels"
-        + (f"; frames without any: {', '.join(map(str, empty))}" if empty.size else "")
+        f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
+        f" missing on {1 - known / depth.size:.4f} of the pixels"
+        + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
         + (f"; {behind:.1%} of it lies in front of the near plane at {near:g}" if behind else "")
         + (f"; far from the usual median, perhaps in another unit: {shortened(distant)}" if distant else "")
     )
 
 
+class _Extent(NamedTuple):
+    """The prior depth of a frame in numbers."""
+
+    known: int  # pixels with depth
+    before: int  # of them, up to the near plane
+    nearest: np.floating
+    farthest: np.floating
+
+
+def _extent(plane: NDArray[np.float32], near: float) -> _Extent:
+    values = plane[plane > 0]
+    if not values.size:
+        return _Extent(0, 0, np.float32(np.inf), np.float32(0))
+    return _Extent(values.size, int(np.count_nonzero(values <= near)), values.min(), values.max())
+
+
 def _scaled(
-    images: NDArray[np.uint8], masks: NDArray[np.bool_], depth: NDArray[np.float32], scale: float, where: str
+    images: NDArray[np.uint8], masks: NDArray[np.bool_], depth: NDArray[np.float32], config: SequenceConfig, where: str
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
+    scale = config.scale
     if scale > 1:
         raise InputError(f"{where}: scale {scale:g}: images are only reduced; allowed: values in (0, 1]")
     n, _, old_height, old_width = images.shape
@@ -187,9 +223,9 @@ def _scaled(
             f"{where}: scale {scale:g} makes {width}x{height} pixels of {old_width}x{old_height};"
             f" allowed: at least {LEAST_SIDE} on each side"
         )
-    small = np.empty((n, 3, height, width), np.uint8)
-    tissue = np.empty((n, height, width), bool)
-    prior = np.zeros((n, height, width), np.float32)
+    store = FrameStore(n, width, height, config.memory, where)
+    small, tissue = store.array((n, 3, height, width), np.uint8), store.array((n, height, width), bool)
+    prior = store.array((n, height, width), np.float32)
     for i in range(n):
         small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
         tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0

@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_depth_scale, check_percentiles, clip_depth
-from endotsr.sequences.checks.cost import refuse_too_large
+from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_percentiles
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import tissue_masks
+from endotsr.sequences.read_frames import FrameFiles, ReadFrames, read_frames
 from endotsr.sequences.recording import Pair, Pose, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.sequences.splits import parse_frame_range, split_frames
 from endotsr.splatting.camera import Camera
-from endotsr.untrusted.files import in_threads
 
 
 class Contents(NamedTuple):
@@ -103,19 +102,21 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     notes = [f"source: {contents.file.source}"] if contents.file.source else []
     if contents.file.masks and contents.file.masks.proposed and contents.masks:
         notes.append("masks: proposed by a program, checked by nobody")
-    images, masks, depth = _read_frames(contents, config, notes)
+    read = _read_frames(contents, config, notes)
     cameras, static = cameras_of(contents)
     excluded = contents.file.masks.excluded_value if contents.file.masks else "white"
     names = [str(file) for file in contents.masks]
     unit = "arbitrary unit" if contents.file.arbitrary else "mm"
     frames = Frames(
-        images=images,
-        masks=masks,
-        depth=depth,
+        images=read.images,
+        masks=read.masks,
+        depth=read.depth,
         cameras=cameras,
         static=static,
-        names=[file.stem for file in contents.images],
+        image_files=contents.images,
         depth_files=contents.depth,
+        facts=read.facts,
+        store=read.store,
         unit=unit,
         mask_source=MaskSource(str(contents.masks[0].parent), names, excluded) if names else None,
         arbitrary=contents.file.arbitrary,
@@ -144,37 +145,23 @@ def cameras_of(contents: Contents) -> tuple[list[Camera], bool]:
     return [Camera(pose.rotation, pose.translation, *lens) for pose in poses], False
 
 
-def _read_frames(
-    contents: Contents, config: SequenceConfig, notes: list[str]
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
-    """All selected pictures: images (n, 3, H, W), tissue masks (n, H, W), clipped depth (n, H, W)."""
-    entry = contents.file.depth
+def _read_frames(contents: Contents, config: SequenceConfig, notes: list[str]) -> ReadFrames:
+    """All selected frames."""
+    entry, masks = contents.file.depth, contents.file.masks
     assert entry is not None
-    scale = entry.scale * contents.file.to_scene(entry.unit)
-    n, width, height = len(contents.images), contents.file.camera.width, contents.file.camera.height
-    refuse_too_large(n, width, height, contents.folder)
-    images = np.empty((n, 3, height, width), np.uint8)
-    depth = np.empty((n, height, width), np.float32)
-    masks: list[NDArray] = [depth] * n
-    types = [depth.dtype] * n
-
-    def read_frame(i: int) -> None:
-        images[i] = _colour(contents, contents.images[i]).transpose(2, 0, 1)
-        if contents.masks:
-            masks[i] = grey_plane(
-                _sized(contents, read_picture(contents.masks[i]), contents.masks[i]), contents.masks[i]
-            )
-        raw = _sized(contents, read_plane(contents.depth[i]), contents.depth[i])
-        types[i] = raw.dtype
-        depth[i] = clip_depth(depth_plane(raw, scale, contents.depth[i]), config.depth_percentiles)
-
-    in_threads(read_frame, n)
-    check_depth_scale(depth, contents.depth, types, entry.unit)
-    if not contents.masks:
-        return images, np.ones((n, height, width), bool), depth
-    assert contents.file.masks is not None
-    names = [str(file) for file in contents.masks]
-    return images, tissue_masks(masks, names, contents.file.masks.excluded_value, notes), depth
+    files = FrameFiles(
+        contents.images,
+        contents.masks,
+        contents.depth,
+        picture=lambda path: _colour(contents, path),
+        mask=lambda path: grey_plane(_sized(contents, read_picture(path), path), path),
+        plane=lambda path: _sized(contents, read_plane(path), path),
+        depth_scale=entry.scale * contents.file.to_scene(entry.unit),
+        unit=entry.unit,
+        excluded_value=masks.excluded_value if masks else "white",
+    )
+    size = contents.file.camera.width, contents.file.camera.height
+    return read_frames(files, size, config, contents.folder, notes)
 
 
 def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:
@@ -217,6 +204,7 @@ def open_common(folder: Path) -> Recording:
         names=[file.stem for file in contents.images],
         pictures=pictures,
         masks=mask if contents.masks else None,
+        proposed=bool(found.masks and found.masks.proposed and contents.masks),
         depth=depth if contents.depth else None,
         unit="arbitrary" if found.arbitrary else "mm",
         lens=found.camera.lens(folder),

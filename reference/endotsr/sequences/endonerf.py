@@ -19,23 +19,14 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.assemble import (
-    Frames,
-    MaskSource,
-    assemble,
-    check_depth_scale,
-    check_percentiles,
-    clip_depth,
-)
-from endotsr.sequences.checks.cost import refuse_too_large
-from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
+from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_percentiles
+from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
-from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
+from endotsr.sequences.read_frames import FrameFiles, ReadFrames, read_frames
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames
-from endotsr.untrusted.files import in_threads
 
 NEAR = 0.2  # near plane of every preset, scene units
 UNIT = "mm"
@@ -106,17 +97,19 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     files = select_files(folder, config)
     rows = read_pose_rows(files.poses, files.total)
     notes: list[str] = []
-    images, masks, depth = _read_pictures(files, config, notes)
-    height, width = images.shape[2:]
+    read = _read_pictures(files, config, notes)
+    height, width = read.images.shape[2:]
     cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
     frames = Frames(
-        images=images,
-        masks=masks,
-        depth=depth,
+        images=read.images,
+        masks=read.masks,
+        depth=read.depth,
         cameras=cameras,
         static=static,
-        names=[file.stem for file in files.images],
+        image_files=files.images,
         depth_files=files.depth,
+        facts=read.facts,
+        store=read.store,
         unit=UNIT,
         mask_source=_mask_source(files, Path(folder), config),
     )
@@ -158,41 +151,25 @@ def write_endonerf(sequence: Sequence, folder: Path) -> None:
         write_png(folder / "depth" / f"{i:06d}.png", millimetres)
 
 
-def _read_pictures(
-    files: Folder, config: SequenceConfig, notes: list[str]
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
-    """All selected pictures: images (n, 3, H, W), tissue masks (n, H, W), clipped depth (n, H, W)."""
-    first = read_picture(files.images[0])
-    height, width = first.shape[:2]
-    n = len(files.images)
-    refuse_too_large(n, width, height, files.images[0].parents[1])
-    images = np.empty((n, 3, height, width), np.uint8)
-    depth = np.empty((n, height, width), np.float32)
-    masks: list[NDArray] = [first] * n
-    depth_types = [first.dtype] * n
+def _read_pictures(files: Folder, config: SequenceConfig, notes: list[str]) -> ReadFrames:
+    """All selected frames; their size is that of the first image."""
+    height, width = read_picture(files.images[0]).shape[:2]
 
-    def read_frame(i: int) -> None:
-        pixels = _sized(read_picture(files.images[i]), files.images[i], width, height)
-        images[i] = colour_picture(pixels, files.images[i]).transpose(2, 0, 1)
-        if files.masks:
-            pixels = _sized(read_picture(files.masks[i]), files.masks[i], width, height)
-            masks[i] = grey_plane(pixels, files.masks[i])
-        raw = _sized(read_plane(files.depth[i]), files.depth[i], width, height)
-        depth_types[i] = raw.dtype
-        depth[i] = clip_depth(depth_plane(raw, 1.0, files.depth[i]), config.depth_percentiles)
+    def sized(pixels: NDArray, path: Path) -> NDArray:
+        return _sized(pixels, path, width, height)
 
-    in_threads(read_frame, n)
-    check_depth_scale(depth, files.depth, depth_types, UNIT)
-    return images, _tissue(files, masks, depth.shape, config, notes), depth
-
-
-def _tissue(
-    files: Folder, masks: list[NDArray], shape: tuple[int, ...], config: SequenceConfig, notes: list[str]
-) -> NDArray[np.bool_]:
-    """True = tissue, (n, H, W); everywhere without masks."""
-    if not files.masks:
-        return np.ones(shape, bool)
-    return tissue_masks(masks, [str(file) for file in files.masks], config.excluded_value, notes)
+    found = FrameFiles(
+        files.images,
+        files.masks,
+        files.depth,
+        picture=lambda path: colour_picture(sized(read_picture(path), path), path),
+        mask=lambda path: grey_plane(sized(read_picture(path), path), path),
+        plane=lambda path: sized(read_plane(path), path),
+        depth_scale=1.0,
+        unit=UNIT,
+        excluded_value=config.excluded_value,
+    )
+    return read_frames(found, (width, height), config, files.images[0].parents[1], notes)
 
 
 def _sized(pixels: NDArray, path: Path, width: int, height: int) -> NDArray:

@@ -32,10 +32,13 @@ OPPOSITE_FRACTION = 0.75  # of a frame; right masks differ by 0.04 from the next
 ALLOW = "--sequence.allow-tissue-fraction (TOML: [sequence] allow_tissue_fraction = true)"
 
 
-def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> NDArray[np.bool_]:
+def threshold_masks(
+    raw: list[NDArray], names: list[str], notes: list[str], out: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """White pixels of mask pictures.
 
     raw      n pictures (H, W) of integers; {0, 1} when no value of any picture exceeds 1, else {0, 255} (or {0, 65535})
+    out      (n, H, W) that is filled and returned; None = a new array
     returns  (n, H, W) bool, True = white: at least half of full white
 
     In-between values are counted in `notes`. Raises InputError naming a picture with more than 5 % of them, or an
@@ -46,7 +49,7 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
     if white == 65535:
         _check_one_bit_depth(names, [picture.dtype for picture in raw])
     soft_total = 0
-    result = np.empty((len(raw), *raw[0].shape), bool)
+    result = np.empty((len(raw), *raw[0].shape), bool) if out is None else out
     for i, picture in enumerate(raw):
         np.greater_equal(picture, (white + 1) // 2, out=result[i])
         soft = picture.size - np.count_nonzero(picture == 0) - np.count_nonzero(picture == white)
@@ -64,14 +67,18 @@ def threshold_masks(raw: list[NDArray], names: list[str], notes: list[str]) -> N
 
 
 def tissue_masks(
-    raw: list[NDArray], names: list[str], excluded_value: str, notes: list[str] | None = None
+    raw: list[NDArray],
+    names: list[str],
+    excluded_value: str,
+    notes: list[str] | None = None,
+    out: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Tissue masks (n, H, W), True = tissue, from mask pictures as `threshold_masks` takes them.
 
     excluded_value   `white` or `black`: the value of the pixels that are no tissue
     """
-    white = threshold_masks(raw, names, [] if notes is None else notes)
-    return ~white if excluded_value == "white" else white
+    white = threshold_masks(raw, names, [] if notes is None else notes, out)
+    return np.logical_not(white, out=white) if excluded_value == "white" else white
 
 
 def check_tissue_fraction(masks: NDArray[np.bool_], where: str, excluded_value: str, allow: bool) -> float:
@@ -110,14 +117,13 @@ def check_polarity(
     """
     if masks.all() or not masks.any():
         return "polarity not checked: all pixels are on one side of the mask"
-    missing = depth == 0
-    on_tissue, on_excluded = float(missing[masks].mean()), float(missing[~masks].mean())
+    on_tissue, on_excluded, missing = _missing_fractions(masks, depth)
     other = "black" if excluded_value == "white" else "white"
     advice = (
         f"the masks seem to have the other polarity: set --sequence.excluded-value {other}"
         f' (TOML: [sequence] excluded_value = "{other}"); to go on with these masks, set {ALLOW}'
     )
-    if missing.mean() >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > MISSING_MARGIN:
+    if missing >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:
             raise InputError(f"{where}: with {excluded_value} = excluded, {found}; {advice}")
@@ -236,10 +242,25 @@ def _verdict(mask: NDArray[np.bool_], missing: NDArray[np.bool_], image: NDArray
     return (-1 if on_tissue < on_excluded else 1), found
 
 
+def _missing_fractions(masks: NDArray[np.bool_], depth: NDArray[np.floating]) -> tuple[float, float, float]:
+    """Fraction without depth of the tissue, of the excluded pixels and of all; both kinds of pixels exist."""
+    tissue = missing_tissue = missing = 0  # frame by frame: no array over all frames is made
+    for mask, plane in zip(masks, depth):
+        without = plane == 0
+        tissue += np.count_nonzero(mask)
+        missing_tissue += np.count_nonzero(without & mask)
+        missing += np.count_nonzero(without)
+    return missing_tissue / tissue, (missing - missing_tissue) / (masks.size - tissue), missing / masks.size
+
+
 def _redness(images: NDArray[np.uint8], masks: NDArray[np.bool_]) -> tuple[float, float]:
     """Mean of R - B over tissue and over excluded pixels, on every fourth row and column, grey levels."""
-    sparse, mask = images[:, :, ::4, ::4].astype(np.int32), masks[:, ::4, ::4]
-    redness = sparse[:, 0] - sparse[:, 2]
-    if mask.all() or not mask.any():
+    total, tissue_total, count, tissue = 0, 0, 0, 0
+    for image, whole in zip(images, masks):
+        mask = whole[::4, ::4]
+        redness = image[0, ::4, ::4].astype(np.int32) - image[2, ::4, ::4]
+        total, tissue_total = total + int(redness.sum()), tissue_total + int(redness[mask].sum())
+        count, tissue = count + mask.size, tissue + np.count_nonzero(mask)
+    if tissue in (0, count):
         return 0.0, 0.0
-    return float(redness[mask].mean()), float(redness[~mask].mean())
+    return tissue_total / tissue, (total - tissue_total) / (count - tissue)

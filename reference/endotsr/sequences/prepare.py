@@ -242,7 +242,7 @@ def _file_of(
         source=f"{recording.where.name} ({recording.layout})",
         unit=unit,
         frame_rate=float(settings.rate or recording.rate or 0.0),
-        masks=MaskEntry() if recording.masks is not None else None,
+        masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
         depth=DepthEntry(unit=unit, scale=depth_scale, method=method) if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )

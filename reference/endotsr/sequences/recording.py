@@ -72,6 +72,7 @@ class Recording:
     names: list[str]
     pictures: Callable[[list[int]], Iterator[Pair]]  # of ascending frame numbers
     masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
+    proposed: bool = False  # a program made the masks, and nobody has checked them
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions that a frame sees, in `unit`
     unit: str = "mm"

@@ -26,6 +26,7 @@ from endotsr.sequences.recording import (
 )
 from endotsr.sequences.source_options import SourceOptions
 
+PROPOSAL = "proposal.json"  # beside a folder of masks: a program proposed them
 MOST_SOFT = 0.05  # of a mask: more pixels between black and white are no mask
 
 
@@ -165,6 +166,11 @@ def stated_masks(
     files = files_of(options.masks, PICTURE_ENDINGS)
     paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
     return mask_reader(paired, options.excluded_value, width, height)
+
+
+def masks_are_proposed(options: SourceOptions) -> bool:
+    """Whether the masks of `--masks` are those of `endotsr masks`, which nobody has checked."""
+    return options.masks is not None and (options.masks.parent / PROPOSAL).is_file()
 
 
 def stated_depth(

@@ -9,7 +9,7 @@ In: settings. Out: files, one frame at a time. A sequence that is read back equa
 for bit, prior depth included, if the reader's clip of the depth (`sequence.depth_percentiles`) is 0 to 100.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -58,21 +58,31 @@ def write_sequence(
     """
     check_scene(settings)
     pictures = PICTURES if settings.stereo.on else tuple(n for n in PICTURES if n != "images_right")
-    for inner in (*pictures, f"{TRUTH}/frames", f"{TRUTH}/instrument"):
+    for inner in pictures:
         (folder / inner).mkdir(parents=True)
     scene = make_scene(settings)
-    tracks = empty_tracks(tracked_points(scene), settings.frames)
-    light = np.empty_like(tracks.position)
     far = np.empty(settings.frames)
-    for i, frame in enumerate(simulated_frames(scene)):
+    for i, frame in enumerate(frames_with_truth(folder, scene, name)):
         _write_pictures(folder, i, frame)
-        write_frame(folder / TRUTH, i, frame)
-        t = float(scene.times[i])
-        follow(tracks, i, scene.surface, scene.cameras[i], t, frame.covered)
-        light[i] = tissue_light(scene, tracks.material, i)
         far[i] = frame.prior.max()
         on_frame()
     np.save(folder / POSE_FILES[0], pose_rows(scene, far))
+
+
+def frames_with_truth(folder: Path, scene: Scene, name: str) -> Iterator[SimulatedFrame]:
+    """The frames in order; the truth of each is written into `folder` before it is handed out, the rest at the end.
+
+    Raises:  InputError where the settings fold the tissue over itself.
+    """
+    for inner in ("frames", "instrument"):
+        (folder / TRUTH / inner).mkdir(parents=True)
+    tracks = empty_tracks(tracked_points(scene), scene.settings.frames)
+    light = np.empty_like(tracks.position)
+    for i, frame in enumerate(simulated_frames(scene)):
+        write_frame(folder / TRUTH, i, frame)
+        follow(tracks, i, scene.surface, scene.cameras[i], float(scene.times[i]), frame.covered)
+        light[i] = tissue_light(scene, tracks.material, i)
+        yield frame
     write_scene(folder / TRUTH, scene, name, tracks, light)
 
 

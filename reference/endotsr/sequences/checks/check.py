@@ -13,15 +13,17 @@ from numpy.typing import NDArray
 
 from endotsr.config import Config
 from endotsr.errors import InputError
+from endotsr.kernels.memory import memory_of_machine
 from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.cameras import camera_findings
-from endotsr.sequences.checks.cost import Cost, estimated_cost, memory_of_machine
+from endotsr.sequences.checks.cost import Cost, estimated_cost
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts, depth_findings, inverted_finding
 from endotsr.sequences.checks.findings import Finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.files import check_pairing
+from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, tissue_masks
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sources import beside
@@ -212,13 +214,21 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
 
 
 def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
-    cost = estimated_cost(len(parts.images), size[1], size[0], config.training.iterations, config.sequence.scale)
+    """Memory, disk and time of a training, and a finding where they are short."""
+    height, width, count, wanted = *size[:2], len(parts.images), config.sequence
+    between = config.training.bridge_target == "flow"
+    cost = estimated_cost(count, width, height, config.training.iterations, wanted.scale, wanted.memory, between)
+    where, remedy = str(parts.folder), "endotsr prepare --scale 0.5, or fewer --frames"
+    run.tried(lambda: FrameStore(count, width, height, wanted.memory, where), "disk", where, remedy)
+    if cost.file_bytes:
+        what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and lie in a file while a training runs"
+        why = "they are more than half of sequence.memory"
+        run.findings.append(Finding("note", "frames-in-file", where, None, what, why, "none needed"))
     memory = memory_of_machine()
     if memory is not None and cost.total_bytes > memory:
-        level = "refusal" if cost.sequence_bytes > memory else "warning"
         what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, this machine has {memory / 1e9:.1f} GB"
-        remedy = "endotsr prepare --scale 0.5, or fewer --frames"
-        run.findings.append(Finding(level, "memory", str(parts.folder), None, what, "it would be stopped", remedy))
+        remedy = "endotsr prepare --scale 0.5, or a smaller --sequence.memory"
+        run.findings.append(Finding("warning", "memory", where, None, what, "it would be stopped", remedy))
     return cost
 
 

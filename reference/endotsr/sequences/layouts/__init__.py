@@ -5,6 +5,7 @@ A file of this folder holds one value `LAYOUT`; putting it here registers it. `d
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +17,7 @@ from endotsr.errors import InputError
 from endotsr.sequences.recording import Recording
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import masks_are_proposed
 
 
 class Layout(NamedTuple):
@@ -62,7 +64,8 @@ def open_recording(path: Path, options: SourceOptions) -> Recording:
     layout = layout_of(path, options.layout)
     if options.layout != "auto" and not Path(path).exists():
         raise InputError(f"{path}: not found")
-    return layout.open(Path(path), options)
+    recording = layout.open(Path(path), options)
+    return replace(recording, proposed=True) if masks_are_proposed(options) else recording
 
 
 def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:

@@ -16,6 +16,7 @@ from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import POSE_FILES, cameras_from_rows, read_pose_rows
 from endotsr.sequences.recording import Lens, Pair, Pose, Recording, colour_picture, grey_plane
 from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import stated_depth, stated_masks
 
 RIGHT = "images_right"
 
@@ -51,8 +52,9 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         where=folder,
         names=[file.stem for file in files.images],
         pictures=pictures,
-        masks=mask if files.masks else None,
-        depth=lambda i: depth_plane(read_plane(files.depth[i]), 1.0, files.depth[i]),
+        masks=stated_masks(options, files.images, width, height) or (mask if files.masks else None),
+        depth=stated_depth(options, files.images)
+        or (lambda i: depth_plane(read_plane(files.depth[i]), 1.0, files.depth[i])),
         unit=UNIT,
         lens=Lens(first.fx, first.fy, first.cx, first.cy, width, height),
         baseline=options.baseline,

@@ -1,0 +1,133 @@
+"""Measure the memory of a training on a long clip, which repeats the frames of a short one.
+
+    python docs/results/long_clip.py --frames 2000 --memory 4     the memory of an 8 GB machine: half of it is the limit
+    python docs/results/long_clip.py --frames 300 --memory 0.6    the same proportions, in a few minutes
+    python docs/results/long_clip.py --table                      write the table of the measured clips again
+
+The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked again and again into a folder
+of temporary files. The training has as many iterations as training frames, so that every frame is used about once, and
+then makes the whole evaluation. While it runs, /proc says how much of its memory is its own (RssAnon) and how much is
+pages of files that the system can drop at any time (RssFile). Results are added to docs/results/long_clip.json; the
+table stands in docs/guides/prepare.md.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endotsr.opencv import read_png
+from endotsr.report.tables import markdown
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine
+from endotsr.sequences.checks.cost import estimated_cost
+
+FOLDER = Path(__file__).parent
+sys.path.insert(0, str(FOLDER.parent / "pages"))
+from marks import write_marked  # noqa: E402
+
+FILE, PAGE = FOLDER / "long_clip.json", FOLDER.parent / "guides" / "prepare.md"
+NAMES = ("images", "masks", "depth")
+
+
+def repeated(source: Path, clip: Path, frames: int) -> tuple[int, int]:
+    """A folder of links in the layout of EndoNeRF; returns width and height."""
+    files = {name: sorted((source / name).iterdir()) for name in NAMES}
+    for name, known in files.items():
+        (clip / name).mkdir(parents=True)
+        for i in range(frames):
+            os.symlink(known[i % len(known)].resolve(), clip / name / f"{i:06d}.png")
+    rows = np.load(source / "poses_bounds.npy")
+    np.save(clip / "poses_bounds.npy", rows[np.arange(frames) % len(rows)])
+    height, width = read_png(files["images"][0]).shape[:2]
+    return width, height
+
+
+def peaks(command: list[str]) -> dict[str, float]:
+    """Run a command to its end; the largest values of RssAnon, RssFile and their sum, in bytes."""
+    found = {"own": 0.0, "file": 0.0, "both": 0.0}
+    process = subprocess.Popen(command)
+    while process.poll() is None:
+        try:
+            lines = Path(f"/proc/{process.pid}/status").read_text(encoding="ascii").splitlines()
+        except (OSError, UnicodeDecodeError):
+            lines = []
+        values = {line.split(":")[0]: float(line.split()[1]) * 1024 for line in lines if line.startswith("Rss")}
+        own, file = values.get("RssAnon", 0.0), values.get("RssFile", 0.0) + values.get("RssShmem", 0.0)
+        for key, value in (("own", own), ("file", file), ("both", own + file)):
+            found[key] = max(found[key], value)
+        time.sleep(0.2)
+    if process.returncode:
+        raise SystemExit(f"failed: {' '.join(command)}")
+    return found
+
+
+def measured(options: argparse.Namespace) -> dict[str, Any]:
+    """One training."""
+    with tempfile.TemporaryDirectory() as root:
+        clip, run = Path(root) / "clip", Path(root) / "run"
+        width, height = repeated(options.source, clip, options.frames)
+        iterations = options.frames - (options.frames + 6) // 8
+        words = ["train", str(clip), "--out", str(run), "--preset", options.preset, "--iterations", str(iterations)]
+        limit = ["--sequence.memory", f"{options.memory:g}"]
+        begun = time.monotonic()
+        found = peaks([sys.executable, "-m", "endotsr", *words, *limit])
+        metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    between = options.preset != "paper"
+    cost = estimated_cost(options.frames, width, height, iterations, 1.0, options.memory, between)
+    about = {"frames": options.frames, "width": width, "height": height, "preset": options.preset}
+    return about | {
+        "memory": options.memory,
+        "iterations": iterations,
+        "gaussians": metrics["run"]["gaussians"],
+        "seconds": time.monotonic() - begun,
+        "own_bytes": found["own"],
+        "file_bytes": found["file"],
+        "both_bytes": found["both"],
+        "estimated_bytes": cost.total_bytes,
+        "estimated_file_bytes": cost.file_bytes,
+        "date": date.today().isoformat(),
+        "machine": machine(),
+    }
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """One measured training a row."""
+    headings = ["Frames", "Size", "Preset", "`sequence.memory`, GB", "estimated, GB", "own memory, GB",
+                "file of the frames, GB"]  # fmt: skip
+    cells = [
+        [f"{row['frames']}", f"{row['width']}x{row['height']}", f"`{row['preset']}`", f"{row['memory']:g}",
+         f"{row['estimated_bytes'] / 1e9:.2f}", f"{row['own_bytes'] / 1e9:.2f}",
+         f"{row['estimated_file_bytes'] / 1e9:.2f}"]
+        for row in rows
+    ]  # fmt: skip
+    return markdown(headings, cells)
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--source", type=Path, default=FOLDER.parents[2] / "shared" / "data" / "endonerf_pulling")
+    parser.add_argument("--frames", type=int, default=300)
+    parser.add_argument("--memory", type=float, default=0.6)
+    parser.add_argument("--preset", default="paper")
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args()
+    rows = json.loads(FILE.read_text(encoding="utf-8"))["rows"] if FILE.exists() else []
+    if not options.table:
+        key = (options.frames, options.memory, options.preset)
+        rows = [row for row in rows if (row["frames"], row["memory"], row["preset"]) != key] + [measured(options)]
+        write_json(FILE, {"rows": sorted(rows, key=lambda row: row["frames"])})
+    write_marked(PAGE, {"memory": table(rows)}, "long_clip")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""`endotsr masks`: proposes instrument masks for a clip that has none."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+
+
+@dataclass
+class MasksOptions:
+    """Propose masks of the instruments, from the grey of metal and from motion unlike the tissue's.
+
+    Without --out, SEQUENCE is a folder that `endotsr prepare` wrote, and the masks are entered into it. With --out,
+    SEQUENCE is any source that `prepare` reads, and FOLDER gets masks/, the overlay and the mark of a proposal. Look at
+    proposed_masks.png before a training. Exit code 1: nothing was found, and nothing was written.
+    """
+
+    sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
+    """folder with sequence.toml, or with --out any source"""
+    out: Annotated[Path | None, Option("FOLDER")] = None
+    """folder to create, instead of entering the masks into the sequence"""
+    layout: Annotated[str, Option("NAME")] = "auto"
+    """layout of the source instead of the detected one"""
+    replace: bool = False
+    """replace masks that exist"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    options = parse(MasksOptions, words, "masks")
+    from endotsr.sequences.layouts import open_recording
+    from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal
+    from endotsr.sequences.source_options import SourceOptions
+    from endotsr.sequences.writing import refuse_existing
+
+    if options.out is None:
+        proposal, place = enter_masks(options.sequence, options.replace), options.sequence
+    else:
+        refuse_existing(options.out)
+        recording = open_recording(options.sequence, SourceOptions(layout=options.layout))
+        proposal, place = write_proposal(recording, options.out), options.out
+    if not proposal.found:
+        print(f"{options.sequence}: no masks proposed: {proposal.reason}; nothing was written")
+        return 1
+    fraction = sum(float(plane.mean()) for plane in proposal.excluded) / len(proposal.excluded)
+    print(f"{options.sequence}: {proposal.reason}; {fraction:.1%} of the pixels are excluded")
+    print(f"these masks are proposals: look at {place / OVERLAY} before a training")
+    return 0

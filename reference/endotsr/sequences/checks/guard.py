@@ -1,0 +1,71 @@
+"""The checks of `endotsr check` on frames that a training reads: refusals stop it, warnings become notes.
+
+Comes in: the facts that a reader collected of every frame, masks, depth and cameras; goes out: sentences for the notes
+of the sequence, or an `InputError` in the words of the finding.
+"""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.sequences.checks.cameras import camera_findings
+from endotsr.sequences.checks.depth import DepthFacts, depth_findings
+from endotsr.sequences.checks.findings import Finding, worst_first
+from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings
+from endotsr.splatting.camera import Camera
+
+SAID_ALREADY = ("far-from-origin", "frame-without-depth")  # in the notes on the world and on the depth
+MOST = 5  # notes of one kind
+
+
+def guarded(
+    images: list[Path],
+    facts: tuple[list[FrameFacts], list[DepthFacts]],
+    cameras: list[Camera],
+    depth_folder: Path,
+    arbitrary: bool,
+    near: float,
+) -> list[str]:
+    """Notes on what the checks of pictures, depth and cameras find.
+
+    images   the files of the frames, in time order
+    facts    of pictures and of depth, one a frame
+
+    Raises:  InputError for the first refusal.
+    """
+    pictures, depth = facts
+    found = gap_findings(images) + frame_findings(pictures, str(images[0].parent))
+    found += depth_findings(depth, str(depth_folder), arbitrary, near)
+    usual = float(np.median([fact.median for fact in depth if fact.median] or [0.0]))
+    found += camera_findings(cameras, usual, str(images[0].parents[1]))
+    found = worst_first(found)
+    for finding in found:
+        if finding.level == "refusal":
+            raise InputError(finding.line)
+    return _notes([finding for finding in found if finding.code not in SAID_ALREADY])
+
+
+def _notes(findings: list[Finding]) -> list[str]:
+    """One sentence a finding, at most `MOST` of a kind."""
+    totals, said, notes = Counter(finding.code for finding in findings), Counter[str](), []
+    for finding in findings:
+        said[finding.code] += 1
+        if said[finding.code] <= MOST:
+            place = "" if finding.frame is None else f"frame {finding.frame}: "
+            rest = totals[finding.code] - MOST
+            more = f" ({rest} more of this kind)" if said[finding.code] == MOST and rest > 0 else ""
+            notes.append(f"{finding.level}: {finding.code}: {place}{finding.what}; {finding.why}{more}")
+    return notes
+
+
+def with_coverage(facts: list[DepthFacts], depth: NDArray[np.float32], masks: NDArray[np.bool_]) -> list[DepthFacts]:
+    """The facts of the depth with the fraction of the tissue that has depth. depth, masks: (n, H, W)."""
+    found = []
+    for fact, plane, mask in zip(facts, depth, masks):
+        tissue = np.count_nonzero(mask)
+        covered = np.count_nonzero((plane > 0) & mask) / tissue if tissue else 1.0
+        found.append(fact._replace(tissue_coverage=covered))
+    return found

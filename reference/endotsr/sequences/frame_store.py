@@ -1,0 +1,65 @@
+"""Arrays over all frames of a clip: in memory, or in a file where they do not fit.
+
+A clip that needs more than half of `sequence.memory` is kept in one file without a name, in the folder for temporary
+files (TMPDIR, by default /tmp). Its pages come and go with the memory that is free. The system removes it when the
+process ends, however it ends. The numbers are the same in both cases.
+
+Comes in: the limit and what the clip needs; goes out: arrays of zeros, and a note if they lie in a file.
+"""
+
+import os
+import shutil
+import tempfile
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from endotsr.errors import InputError
+from endotsr.kernels.memory import memory_limit
+
+PIXEL_BYTES = 3 + 1 + 4 + 1  # image, mask, depth, and the stored mask while it is read
+
+
+class FrameStore:
+    """The arrays of one clip."""
+
+    def __init__(self, count: int, width: int, height: int, memory: float, where: object) -> None:
+        """Decide where the arrays lie.
+
+        memory  `sequence.memory`, GB; 0 = half of this machine's
+
+        Raises:  InputError if neither the memory nor the disk holds the clip; nothing was read then.
+        """
+        self.needed = count * width * height * PIXEL_BYTES
+        self.in_file = self.needed > memory_limit(memory) / 2
+        self._what = f"{where}: {count} frames of {width}x{height} need {self.needed / 1e9:.1f} GB"
+        free = shutil.disk_usage(tempfile.gettempdir()).free
+        if self.in_file and self.needed > free:
+            raise InputError(
+                f"{self._what}, more than half of the allowed memory, and {tempfile.gettempdir()} has"
+                f" {free / 1e9:.1f} GB; allowed: fewer --frames, smaller pictures (endotsr prepare --scale), or a"
+                " larger disk (TMPDIR)"
+            )
+
+    @property
+    def note(self) -> str:
+        """Where the arrays are; "" if they are in memory."""
+        if not self.in_file:
+            return ""
+        return (
+            f"frames: {self.needed / 1e9:.2g} GB, more than half of sequence.memory, lie in a file without a name in"
+            f" {tempfile.gettempdir()}; it goes with this process"
+        )
+
+    def array(self, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray:
+        """An array of zeros. Raises InputError if the disk is full."""
+        if not self.in_file:
+            return np.zeros(shape, dtype)
+        size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+        try:
+            with tempfile.TemporaryFile(prefix="endotsr-frames-") as file:
+                if hasattr(os, "posix_fallocate"):  # a full disk is an error here and not a signal later
+                    os.posix_fallocate(file.fileno(), 0, size)
+                return np.asarray(np.memmap(file, np.dtype(dtype), "w+", shape=shape))
+        except OSError as error:
+            raise InputError(f"{self._what}: no file for them in {tempfile.gettempdir()}: {error.strerror}") from None

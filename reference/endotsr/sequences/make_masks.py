@@ -1,0 +1,97 @@
+"""`endotsr masks`: proposed masks of a clip, entered into a sequence or written into a folder of their own.
+
+Comes in: a recording; goes out: mask pictures (white = excluded), an overlay for the eye, and the mark that they are
+proposals: `proposed = true` in `sequence.toml`, or the file `proposal.json` beside the masks.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.opencv import area_resize, write_png
+from endotsr.sequences.common import list_contents, open_common
+from endotsr.sequences.propose_masks import Proposal, overlay, propose_masks
+from endotsr.sequences.recording import Picture, Recording
+from endotsr.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
+from endotsr.sequences.sources import PROPOSAL
+from endotsr.sequences.writing import new_folder, replace_text
+
+OVERLAY = "proposed_masks.png"
+SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, in a row, and the largest width of one
+
+
+def left_pictures(recording: Recording) -> Iterator[Picture]:
+    """The left pictures of all frames, one at a time."""
+    return (pair.left for pair in recording.pictures(list(range(recording.count))))
+
+
+def enter_masks(folder: Path, replace: bool = False) -> Proposal:
+    """Propose masks for a folder in the common format and enter them; without a proposal nothing changes.
+
+    replace   whether masks that exist may be replaced
+
+    Raises:  InputError; the folder is as before then.
+    """
+    contents = list_contents(folder)
+    if (contents.file.masks or (folder / MASKS).exists()) and not replace:
+        raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
+    recording = open_common(folder)
+    proposal = propose_masks(left_pictures(recording))
+    if not proposal.found:
+        return proposal
+    staged = folder / f".new-{MASKS}"
+    shutil.rmtree(staged, ignore_errors=True)
+    with new_folder(staged) as place:
+        _write_masks(place, [file.stem for file in contents.images], proposal)
+    found = msgspec.structs.replace(contents.file, masks=MaskEntry(proposed=True))
+    old = folder / f".old-{os.getpid()}-{MASKS}"
+    if (folder / MASKS).exists():
+        os.rename(folder / MASKS, old)
+    os.rename(staged, folder / MASKS)
+    replace_text(folder / FILE_NAME, sequence_text(found))
+    shutil.rmtree(old, ignore_errors=True)
+    write_png(folder / OVERLAY, overlays(recording, proposal))
+    return proposal
+
+
+def write_proposal(recording: Recording, out: Path) -> Proposal:
+    """Write masks, overlay and mark into the new folder `out`; without a proposal nothing is written.
+
+    Raises:  InputError; nothing is left behind then.
+    """
+    proposal = propose_masks(left_pictures(recording))
+    if not proposal.found:
+        return proposal
+    with new_folder(out) as place:
+        (place / MASKS).mkdir()
+        _write_masks(place / MASKS, recording.names, proposal)
+        write_png(place / OVERLAY, overlays(recording, proposal))
+        about = {"source": recording.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
+        (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    return proposal
+
+
+def _write_masks(folder: Path, names: list[str], proposal: Proposal) -> None:
+    for name, plane in zip(names, proposal.excluded):
+        write_png(folder / f"{name}.png", np.where(plane, 255, 0).astype(np.uint8))
+
+
+def overlays(recording: Recording, proposal: Proposal) -> Picture:
+    """A dozen frames of the clip in rows, proposed pixels in green, (H, W, 3) uint8."""
+    chosen = np.unique(np.linspace(0, recording.count - 1, min(SHOWN, recording.count)).astype(int)).tolist()
+    shown = []
+    for i, pair in zip(chosen, recording.pictures(chosen)):
+        picture = overlay(pair.left, proposal.excluded[i])
+        factor = min(1.0, SHOWN_WIDTH / picture.shape[1])
+        shown.append(area_resize(picture, round(picture.shape[1] * factor), round(picture.shape[0] * factor)))
+    height, width = shown[0].shape[:2]
+    shown = [picture for picture in shown if picture.shape == (height, width, 3)]
+    rows = -(-len(shown) // ACROSS)
+    shown += [np.zeros((height, width, 3), np.uint8)] * (rows * ACROSS - len(shown))
+    return np.concatenate([np.concatenate(shown[k * ACROSS : (k + 1) * ACROSS], axis=1) for k in range(rows)])

@@ -1,0 +1,173 @@
+"""Proposals of instrument masks without a network: grey metal on red tissue, and motion unlike the tissue's.
+
+Tissue is red, orange or mauve, and metal is grey. With the redness of a pixel,
+
+    s = (R - min(G, (G + B) / 2)) / (R + G + B + FLOOR),
+
+and the usual redness m of the clip, pixels with s < SEED m are seeds, and connected pixels with s < GROW m join them.
+Gaps and holes are filled, and a margin is added: a mask that is too large costs less than one that is too small. A
+region of that kind is an instrument if it is large and enters from the border of the picture, if it moves unlike the
+tissue around it, or if it lies where the frame before or after has an instrument. Other regions, such as highlights,
+are left to the tissue. Instruments of the colour of tissue and blood-covered ones are not found.
+
+Comes in: the pictures of a clip; goes out: a `Proposal`, or the reason why there is none. A person has to look at it.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.opencv import area_resize, dense_flow
+from endotsr.sequences.recording import Picture
+
+WORKING = 320  # px, the longer side of the pictures that are searched
+FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
+SEED, GROW = 0.12, 0.4  # of the usual redness
+LEAST_REDNESS = 0.05  # usual redness of a clip, below which metal does not stand out
+LEAST_AREA = 0.003  # of the picture
+ENTERING_AREA = 0.008  # of the picture, for a region that is known by the border alone
+CLOSING, MARGIN = 0.012, 0.02  # of the longer side: gaps that are closed, and the border added around a region
+RING = 0.05  # of the longer side: tissue around a region, whose motion is that of the tissue there
+UNLIKE = 1.5  # px at the working size: motion relative to the tissue
+OVERLAP = 0.5  # of a region, with the instruments of a neighbouring frame
+
+
+class Proposal(NamedTuple):
+    """Proposed masks."""
+
+    excluded: list[BoolArray]  # (H, W) a frame, True = instrument; empty if nothing was found
+    reason: str  # how many frames have an instrument, or why there is no proposal
+
+    @property
+    def found(self) -> bool:
+        """Whether there is anything to look at."""
+        return bool(self.excluded)
+
+
+class _Region(NamedTuple):
+    """A connected grey region of one frame."""
+
+    pixels: BoolArray  # (h, w)
+    enters: bool  # large, and at the border of the picture
+
+
+def propose_masks(pictures: Iterable[Picture]) -> Proposal:
+    """Masks of the instruments in the pictures (H, W, 3) of a clip, in time order.
+
+    Edges:  one picture alone: motion says nothing. A clip without colour: no proposal.
+    """
+    small, sizes = [], []
+    for picture in pictures:
+        sizes.append(picture.shape[:2])
+        small.append(_reduced(picture))
+    if not small:
+        return Proposal([], "there are no pictures")
+    redness = [_redness(picture) for picture in small]
+    usual = float(np.median(np.concatenate([plane[::4, ::4].ravel() for plane in redness])))
+    if usual < LEAST_REDNESS:
+        return Proposal([], f"the usual redness is {usual:.3f}: grey metal does not stand out from such pictures")
+    regions = [_regions(plane, usual) for plane in redness]
+    chosen = _chosen(small, regions)
+    frames = sum(plane.any() for plane in chosen)
+    if not frames:
+        return Proposal([], "no grey region enters from the border or moves unlike the tissue")
+    excluded = [_enlarged(_widened(plane), size) for plane, size in zip(chosen, sizes)]
+    return Proposal(excluded, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}")
+
+
+def _reduced(picture: Picture) -> Picture:
+    height, width = picture.shape[:2]
+    factor = min(1.0, WORKING / max(height, width))
+    return area_resize(picture, max(1, round(width * factor)), max(1, round(height * factor)))
+
+
+def _redness(picture: Picture) -> FloatArray:
+    """(h, w) in [-0.5, 1], smoothed over a pixel or two."""
+    from scipy.ndimage import gaussian_filter
+
+    red, green, blue = (gaussian_filter(picture[..., k].astype(np.float32), 1.0) for k in range(3))
+    return (red - np.minimum(green, (green + blue) / 2)) / (red + green + blue + FLOOR)
+
+
+def _regions(redness: FloatArray, usual: float) -> list[_Region]:
+    """Connected grey regions, without the smallest."""
+    from scipy import ndimage
+
+    reach = max(1, round(CLOSING * max(redness.shape)))
+    grown = ndimage.binary_propagation(redness < SEED * usual, mask=redness < GROW * usual)
+    padded = np.pad(ndimage.binary_opening(grown), reach, "edge")  # closing must not retreat from the border
+    closed = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
+    labels, count = ndimage.label(ndimage.binary_fill_holes(closed))
+    found = []
+    for label in range(1, count + 1):
+        pixels = labels == label
+        if pixels.mean() >= LEAST_AREA:
+            edge = pixels[[0, -1]].any() or pixels[:, [0, -1]].any()
+            found.append(_Region(pixels, bool(edge) and pixels.mean() >= ENTERING_AREA))
+    return found
+
+
+def _chosen(pictures: list[Picture], regions: list[list[_Region]]) -> list[BoolArray]:
+    """The union of the instruments of every frame."""
+    chosen, left = [], []
+    for i, found in enumerate(regions):
+        flow = _flow(pictures, i) if any(not region.enters for region in found) else None
+        plane, rest = np.zeros(pictures[i].shape[:2], bool), []
+        for region in found:
+            if region.enters or (flow is not None and _moves_alone(region.pixels, flow)):
+                plane |= region.pixels
+            else:
+                rest.append(region.pixels)
+        chosen.append(plane)
+        left.append(rest)
+    sure = list(chosen)
+    for i, rest in enumerate(left):
+        beside = [sure[k] for k in (i - 1, i + 1) if 0 <= k < len(sure) and sure[k].shape == chosen[i].shape]
+        for pixels in rest:
+            if any((pixels & other).sum() >= OVERLAP * pixels.sum() for other in beside):
+                chosen[i] = chosen[i] | pixels
+    return chosen
+
+
+def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
+    """(2, h, w) px to the next picture, of the last one to the picture before; None without another of its size."""
+    other = i + 1 if i + 1 < len(pictures) else i - 1
+    if other < 0 or pictures[other].shape != pictures[i].shape:
+        return None
+    return dense_flow(*(np.ascontiguousarray(pictures[k].transpose(2, 0, 1)) for k in (i, other)))
+
+
+def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
+    """Whether the median motion of a region differs from that of the tissue around it."""
+    from scipy.ndimage import binary_dilation
+
+    reach = max(2, round(RING * max(pixels.shape)))
+    ring = binary_dilation(pixels, iterations=reach) & ~binary_dilation(pixels, iterations=2)
+    if not ring.any():
+        return False
+    inside, around = (np.median(flow[:, part], axis=1) for part in (pixels, ring))
+    return float(np.hypot(*(inside - around))) > UNLIKE
+
+
+def _widened(plane: BoolArray) -> BoolArray:
+    from scipy.ndimage import binary_dilation
+
+    return binary_dilation(plane, iterations=max(1, round(MARGIN * max(plane.shape)))) if plane.any() else plane
+
+
+def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
+    """The mask at the size of its picture, nearest pixel."""
+    height, width = size
+    row = ((np.arange(height) + 0.5) * plane.shape[0] / height).astype(np.intp)
+    column = ((np.arange(width) + 0.5) * plane.shape[1] / width).astype(np.intp)
+    return plane[row][:, column]
+
+
+def overlay(picture: Picture, excluded: BoolArray) -> Picture:
+    """The picture with the excluded pixels in green, (H, W, 3) uint8."""
+    shown = picture.copy()
+    shown[excluded] = (0.5 * picture[excluded] + np.array([0.0, 127.0, 0.0])).astype(np.uint8)
+    return shown

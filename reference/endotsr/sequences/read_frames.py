@@ -1,0 +1,94 @@
+"""All frames of a clip read into arrays, in several threads, with the facts that the checks need.
+
+Comes in: functions that read one picture, mask or depth file, and the settings; goes out: the arrays, in memory or in a
+file (see `frame_store`). What a layout knows of names, sizes and units stays with the layout.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import SequenceConfig
+from endotsr.sequences.assemble import check_depth_scale, clip_depth
+from endotsr.sequences.checks.depth import DepthFacts, depth_facts
+from endotsr.sequences.checks.frames import FrameFacts, frame_facts
+from endotsr.sequences.depth_files import depth_plane
+from endotsr.sequences.frame_store import FrameStore
+from endotsr.sequences.masks import tissue_masks
+from endotsr.sequences.recording import Picture
+from endotsr.untrusted.files import in_threads
+
+
+class FrameFiles(NamedTuple):
+    """The files of the selected frames, and how one of them is read."""
+
+    images: list[Path]
+    masks: list[Path]  # empty: none are read
+    depth: list[Path]
+    picture: Callable[[Path], Picture]  # (H, W, 3), of the right size
+    mask: Callable[[Path], NDArray]  # (H, W) as stored
+    plane: Callable[[Path], NDArray]  # (H, W) numbers of a depth file as stored
+    depth_scale: float  # of these numbers, to the unit of the sequence
+    unit: str  # of the depth, for messages
+    excluded_value: str  # white or black
+
+
+class ReadFrames(NamedTuple):
+    """The arrays of n frames."""
+
+    images: NDArray[np.uint8]  # (n, 3, H, W)
+    masks: NDArray[np.bool_]  # (n, H, W) True = tissue; everywhere without masks
+    depth: NDArray[np.float32]  # (n, H, W) clipped; 0 = none
+    facts: tuple[list[FrameFacts], list[DepthFacts]]
+    store: FrameStore
+
+
+def read_frames(
+    files: FrameFiles, size: tuple[int, int], config: SequenceConfig, where: object, notes: list[str]
+) -> ReadFrames:
+    """Read everything; notes on the masks are appended.
+
+    size  width and height of every file
+
+    Raises:  InputError naming the file of the first frame that cannot be used, or for a clip that fits nowhere.
+    """
+    (width, height), n = size, len(files.images)
+    store = FrameStore(n, width, height, config.memory, where)
+    images = store.array((n, 3, height, width), np.uint8)
+    depth = store.array((n, height, width), np.float32)
+    stored_masks = store.array((n, height, width), np.uint8) if store.in_file and files.masks else None
+    masks, types = [depth] * n, [depth.dtype] * n
+    facts: list[tuple[FrameFacts, DepthFacts] | None] = [None] * n
+
+    def read_frame(i: int) -> None:
+        picture = files.picture(files.images[i])
+        images[i] = picture.transpose(2, 0, 1)
+        if files.masks:
+            masks[i] = _kept(files.mask(files.masks[i]), stored_masks, i)
+        raw = files.plane(files.depth[i])
+        types[i] = raw.dtype
+        plane = depth_plane(raw, files.depth_scale, files.depth[i])
+        name, other = files.images[i].name, files.depth[i].name
+        facts[i] = frame_facts(name, picture), depth_facts(other, plane, raw, None)
+        depth[i] = clip_depth(plane, config.depth_percentiles)
+
+    in_threads(read_frame, n)
+    check_depth_scale(depth, files.depth, types, files.unit)
+    tissue = store.array((n, height, width), bool)
+    if files.masks:
+        tissue_masks(masks, [str(file) for file in files.masks], files.excluded_value, notes, tissue)
+    else:
+        tissue[...] = True
+    both = [fact for fact in facts if fact is not None]
+    return ReadFrames(images, tissue, depth, ([fact[0] for fact in both], [fact[1] for fact in both]), store)
+
+
+def _kept(plane: NDArray, stored: NDArray[np.uint8] | None, i: int) -> NDArray:
+    """The mask, or its copy in the array of the store where there is one and it fits."""
+    if stored is None or plane.dtype != np.uint8:
+        return plane
+    stored[i] = plane
+    return stored[i]

@@ -1,0 +1,98 @@
+"""A simulated scene as a raw recording in the layout of StereoMIS, with the truth beside it.
+
+    simulated.mp4             left picture over right, one pair a frame
+    StereoCalibration.ini     both cameras, OpenCV's convention; R and T of x_right = R x_left + T, millimetres
+    groundtruth.txt           frame tx ty tz qx qy qz qw: camera-to-world, metres
+    masks/000123l.png         of the left picture, any value above 0 = tissue; only where there are instruments
+    truth/                    see truth.py
+
+In: settings. Out: files, one frame at a time. The cameras are an ideal pair: without distortion, rectified already. The
+film is compressed as real recordings are, so that the pictures differ from those of `write_sequence`.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import Array
+from endotsr.sequences.splits import split_frames
+from endotsr.simulator.field_of_view import check_field_of_view
+from endotsr.simulator.folder import frames_with_truth
+from endotsr.simulator.frames import Scene, make_scene
+from endotsr.simulator.instrument import graspers
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.splatting.camera import camera_centre
+
+FILM, CALIBRATION, TRAJECTORY, MASKS = "simulated.mp4", "StereoCalibration.ini", "groundtruth.txt", "masks"
+RATE = 25.0  # frames a second
+METRE = 1000.0  # millimetres
+
+
+def check_recording(settings: SimulatorSettings) -> None:
+    """Raises InputError for settings that cannot become such a recording; nothing is rendered."""
+    if not settings.stereo.on:
+        raise InputError("simulator: stereo.on = False does not fit the layout stereomis; allowed: True")
+    if settings.width % 2:
+        raise InputError(f"simulator: width = {settings.width} does not fit a film; allowed: even numbers")
+    split_frames(settings.frames, "every_eighth", 0)
+    check_field_of_view(settings)
+
+
+def write_recording(
+    folder: Path, settings: SimulatorSettings, name: str = "", on_frame: Callable[[], object] = lambda: None
+) -> None:
+    """Write a recording and its truth into an existing, empty folder. `on_frame` is called after every frame.
+
+    Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
+    """
+    from endotsr.opencv.video import write_video
+
+    check_recording(settings)
+    scene = make_scene(settings)
+    (folder / CALIBRATION).write_text(calibration_text(scene), encoding="utf-8")
+    (folder / TRAJECTORY).write_text(trajectory_text(scene), encoding="utf-8")
+    write_video(folder / FILM, _stacked(folder, scene, name, on_frame), RATE)
+
+
+def _stacked(folder: Path, scene: Scene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
+    """The pictures of the film, (2H, W, 3) uint8; masks and truth are written on the way."""
+    from endotsr.opencv import write_png
+
+    masked = bool(graspers(scene.settings))
+    if masked:
+        (folder / MASKS).mkdir()
+    for i, frame in enumerate(frames_with_truth(folder, scene, name)):
+        assert frame.image_right is not None
+        if masked:
+            write_png(folder / MASKS / f"{i:06d}l.png", np.where(frame.excluded, 0, 255).astype(np.uint8))
+        yield np.concatenate([frame.image, frame.image_right], axis=1).transpose(1, 2, 0)
+        on_frame()
+
+
+def calibration_text(scene: Scene) -> str:
+    """The ini file. Its principal point counts from the centre of the first pixel, as OpenCV's does."""
+    camera = scene.cameras[0]
+    numbers = {
+        "res_x": camera.width, "res_y": camera.height, "fc_x": camera.fx, "fc_y": camera.fy,
+        "cc_x": camera.cx - 0.5, "cc_y": camera.cy - 0.5, **{f"kc_{k}": 0.0 for k in range(8)},
+    }  # fmt: skip
+    pose = {f"R_{k}": float(value) for k, value in enumerate(np.eye(3).ravel())}
+    pose |= {"T_0": -scene.settings.stereo.baseline, "T_1": 0.0, "T_2": 0.0}
+    lines = []
+    for section, entries in (("StereoLeft", numbers), ("StereoRight", numbers | pose)):
+        lines += [f"[{section}]", *(f"{key} = {value!r}" for key, value in entries.items()), ""]
+    return "\n".join(lines)
+
+
+def trajectory_text(scene: Scene) -> str:
+    """One line a frame, with all digits."""
+    from scipy.spatial.transform import Rotation
+
+    lines = []
+    for i, camera in enumerate(scene.cameras):
+        place = camera_centre(camera) / METRE
+        turn = Rotation.from_matrix(camera.rotation.T).as_quat()
+        lines.append(" ".join([str(i), *(repr(float(value)) for value in (*place, *turn))]))
+    return "\n".join(lines) + "\n"

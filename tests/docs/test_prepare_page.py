@@ -1,0 +1,40 @@
+"""docs/guides/prepare.md: its tables are what the committed results say, and every layout has its section."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from endotsr.sequences.layouts import layouts
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "guides" / "prepare.md"
+TABLES = ("any_clip", "masks", "sinus", "long_clip")
+SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
+            "video": "Film", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
+
+
+def script(name: str):
+    """The module docs/results/NAME.py."""
+    spec = importlib.util.spec_from_file_location(f"results_{name}", ROOT / "docs" / "results" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_what_its_result_says(name):
+    made = script(name)
+    if not made.FILE.exists():
+        pytest.skip(f"not measured yet: python docs/results/{name}.py")
+    found = json.loads(made.FILE.read_text(encoding="utf-8"))
+    assert made.table(found["rows"] if name == "long_clip" else found) in PAGE.read_text(encoding="utf-8")
+
+
+def test_every_layout_has_its_section():
+    text = PAGE.read_text(encoding="utf-8")
+    assert {layout.name for layout in layouts()} == set(SECTIONS)
+    for title in SECTIONS.values():
+        assert f"\n## {title}\n" in text

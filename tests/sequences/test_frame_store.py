@@ -1,0 +1,96 @@
+"""Frames in a file instead of the memory: the same numbers, the same training, and nothing left behind."""
+
+import tempfile
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from endotsr.config import DEMO, SequenceConfig
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.kernels.memory import Kept, bytes_of, memory_limit
+from endotsr.scene.gaussians import arrays
+from endotsr.sequences.endonerf import read_endonerf, write_endonerf
+from endotsr.sequences.frame_store import FrameStore
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.simulate import simulate
+
+FRAMES = 9
+TINY = 1e-4  # GB: less than the clip needs, and less than a quarter of its targets
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("clip") / "clip"
+    write_endonerf(simulate(SimulatorSettings(width=64, height=48, frames=FRAMES)).sequence, place)
+    return place
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.5])
+@pytest.mark.parametrize("masks", ["masks", "none"])
+def test_a_clip_in_a_file_is_the_clip_in_memory(folder, scale, masks, monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    here = read_endonerf(folder, SequenceConfig(scale=scale, masks=masks))
+    there = read_endonerf(folder, SequenceConfig(scale=scale, masks=masks, memory=TINY))
+    for name in ("images", "masks", "depth"):
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+    assert isinstance(there.images.base, np.memmap) and not isinstance(here.images.base, np.memmap)
+    extra = set(there.notes) - set(here.notes)
+    assert len(extra) == 1 and "lie in a file without a name" in extra.pop()
+    assert list(tmp_path.iterdir()) == []
+
+
+def trained(folder, memory, steps=24):
+    training = msgspec.structs.replace(DEMO.training, iterations=steps)
+    config = msgspec.structs.replace(DEMO, sequence=SequenceConfig(memory=memory), training=training)
+    sequence = read_endonerf(folder, config.sequence)
+    state, shop = new_training(sequence, config), workshop(sequence, config)
+    log = [training_step(state, shop) for _ in range(steps)]
+    return arrays(state.gaussians), log, shop
+
+
+def test_a_lowered_limit_changes_no_number_of_a_training(folder):
+    """The presets with targets along optical flow use frames and moments between them; few of either are kept."""
+    here, log, shop = trained(folder, 0.0)
+    there, same, short = trained(folder, TINY)
+    assert log == same
+    for name, array in here.items():
+        np.testing.assert_array_equal(array, there[name])
+    assert len(short.targets) + len(short.moments.stored) < len(shop.targets) + len(shop.moments.stored)
+    assert len(short.targets) <= 1 and len(short.moments.stored) <= 1
+
+
+def test_values_are_dropped_oldest_first_and_made_again():
+    made: list[int] = []
+
+    def make(key):
+        made.append(key)
+        return (np.full(10, key, np.uint8), (np.zeros(10, np.uint8),))
+
+    kept = Kept[int, tuple](limit=50)
+    for key in (1, 2, 3, 1):
+        assert kept.get(key, lambda key=key: make(key))[0][0] == key
+    assert made == [1, 2, 3, 1] and len(kept) == 2 and 2 not in kept and kept.bytes == 40
+    shared = np.zeros(8)
+    assert bytes_of((shared, [shared], {"a": np.zeros(2, np.int16)}, None)) == 68
+
+
+def test_the_limit_is_half_of_the_machine_unless_it_is_stated(monkeypatch):
+    assert memory_limit(2.5) == 2.5e9
+    monkeypatch.setattr("endotsr.kernels.memory.memory_of_machine", lambda: 8e9)
+    assert memory_limit(0.0) == 4e9 and FrameStore(2000, 640, 512, 0.0, "clip").in_file
+    assert not FrameStore(500, 640, 512, 0.0, "clip").in_file
+    monkeypatch.setattr("endotsr.kernels.memory.memory_of_machine", lambda: None)
+    assert memory_limit(0.0) == np.inf
+
+
+def test_a_full_disk_is_an_error_of_one_line(monkeypatch):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    store = FrameStore(4, 64, 48, 1e-6, Path("clip"))
+    monkeypatch.setattr("os.posix_fallocate", full)
+    with pytest.raises(ValueError, match=r"clip: 4 frames of 64x48 need 0\.0 GB: no file for them in .*No space left"):
+        store.array((4, 48, 64), bool)
