@@ -38,6 +38,8 @@ class EvaluateOptions:
     """also write the metrics of every held-out frame as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
+    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    """measure more of a run, each with rows to compare: depth, flicker, right_view"""
     paper_row: Literal["pulling"] | None = None
     """also show the published figures of this clip"""
     threads: int = 0
@@ -76,7 +78,7 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
-    return evaluate_run(folder, sequence, options.lpips, published)
+    return evaluate_run(folder, sequence, options.lpips, published, options.measures, options.sequence)
 
 
 def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
@@ -96,9 +98,19 @@ def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -
 
 
 def evaluate_run(
-    folder: RunFolder, sequence: "Sequence", lpips: Path | None = None, published: tuple[dict[str, Any], ...] = ()
+    folder: RunFolder,
+    sequence: "Sequence",
+    lpips: Path | None = None,
+    published: tuple[dict[str, Any], ...] = (),
+    measures: tuple[str, ...] = (),
+    source: str | None = None,
 ) -> dict[str, Any]:
-    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json."""
+    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
+
+    measures   names of `evaluation.measures.MEASURES`
+    source     current place of the sequence; default: the recorded one
+    """
+    from endotsr.evaluation.measures import MEASURES, measure_lines, measured
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.run import measure_run
     from endotsr.report.run_files import write_evaluation
@@ -107,10 +119,17 @@ def evaluate_run(
     from endotsr.runs.records import REPORTED
     from endotsr.runs.sources import run_source, true_positions_of
 
+    for name in measures:
+        if name not in MEASURES:
+            raise InputError(f"--measures {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
     weights = load_lpips_weights(lpips)
     model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
+    if measures:
+        metrics["measures"] = measured(measures, model, sequence, source or run_source(folder)[0])
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))
+    for line in measure_lines(metrics.get("measures", {})):
+        print(line)
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
