@@ -56,6 +56,8 @@ def run(words: list[str]) -> int:
     options = parse(EvaluateOptions, words, "evaluate")
     refuse_unwritable(options.json, options.csv)
     use_threads(options.threads)
+    if options.pictures and options.measures:
+        raise InputError("evaluate: --measures beside --pictures is not allowed: they render views of a run")
     published = (PUBLISHED[options.paper_row],) if options.paper_row else ()
     metrics = _pictures(options, published) if options.pictures else _run(options, published)
     if options.json:
@@ -110,8 +112,8 @@ def evaluate_run(
     measures   names of `evaluation.measures.MEASURES`
     source     current place of the sequence; default: the recorded one
     """
-    from endotsr.evaluation.measures import MEASURES, measure_lines, measured
     from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.evaluation.measures import MEASURES, measure_lines, measured
     from endotsr.evaluation.run import measure_run
     from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table

@@ -1,4 +1,4 @@
-"""The view of the right camera of a rectified pair, against the real right picture: a view that no frame was taken from.
+"""The view of the right camera of a rectified pair, against the real right picture, which no training frame shows.
 
 The baseline B of the pair follows from disparity d and prior depth z of the left pictures, B = d z / f, as the median
 over tissue pixels. A pair whose quartiles of B lie far apart is not calibrated, and is not measured. The right camera

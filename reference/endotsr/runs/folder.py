@@ -73,7 +73,8 @@ class RunFolder:
     def locked(self) -> Iterator[None]:
         """Hold the lock of the run for the block; the system releases the lock of a process that was killed.
 
-        Raises: RunBusy, an InputError, if another process holds it. Without effect where the system or the disk supports no locks.
+        Raises: RunBusy, an InputError, if another process holds it. Without effect where the system or the disk
+                supports no locks.
         """
         refuse_link(self.log)
         with self.log.open("ab") as file:

@@ -54,7 +54,9 @@ class Silent:
         """As `runs.training.Observer`."""
 
 
-def execute(job: Job, threads: int, sequence: Sequence | None = None, stop: Callable[[], bool] | None = None) -> Outcome:
+def execute(
+    job: Job, threads: int, sequence: Sequence | None = None, stop: Callable[[], bool] | None = None
+) -> Outcome:
     """Make a run, or what is missing of it.
 
     threads   of compiled kernels; they change no result

@@ -87,9 +87,7 @@ def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> lis
     return jobs
 
 
-def _job(
-    spec: Spec, configuration: Configuration, name: str, source: str, split: str, seed: int, out: Path
-) -> Job:
+def _job(spec: Spec, configuration: Configuration, name: str, source: str, split: str, seed: int, out: Path) -> Job:
     config = _of_run(configuration.config, split, seed)
     shown = split_name(config.sequence)
     run = file_word(f"{name}-{shown}-{configuration.name}-seed{seed}")

@@ -23,8 +23,8 @@ ABOUT = ("sequence", "split", "configuration", "seed")
 COSTS = ("iterations", "gaussians", "seconds", "peak_memory_bytes")
 BESIDE = ("training_psnr_full", "training_psnr_tissue", "cross_fade_psnr_full", "cross_fade_psnr_tissue")
 SHOWN = (
-    ("psnr_full", "PSNR full", "{:.2f}"), ("psnr_tissue", "PSNR tissue", "{:.2f}"), ("ssim_full", "SSIM full", "{:.4f}"),
-    ("ssim_tissue", "SSIM tissue", "{:.4f}"), ("lpips", "LPIPS", "{:.4f}"),
+    ("psnr_full", "PSNR full", "{:.2f}"), ("psnr_tissue", "PSNR tissue", "{:.2f}"),
+    ("ssim_full", "SSIM full", "{:.4f}"), ("ssim_tissue", "SSIM tissue", "{:.4f}"), ("lpips", "LPIPS", "{:.4f}"),
     ("training_psnr_tissue", "training PSNR tissue", "{:.2f}"), ("cross_fade_psnr_tissue", "cross-fade", "{:.2f}"),
     ("gaussians", "Gaussians", "{}"), ("seconds", "seconds", "{:.0f}"),
 )  # fmt: skip
@@ -54,9 +54,7 @@ def finished_row(job: Job) -> dict[str, Any]:
         "arrays_sha256": run["input"]["arrays_sha256"],
         "settings": run["settings"],
         "per_frame": held_out["per_frame"],
-        "baselines": {
-            name: {"label": row["label"], "mean": row["mean"]} for name, row in metrics["baselines"].items()
-        },
+        "baselines": {name: {"label": row["label"], "mean": row["mean"]} for name, row in metrics["baselines"].items()},
         "measures": metrics.get("measures", {}),
         "versions": run.get("versions"),
         "machine": run.get("machine"),

@@ -17,7 +17,7 @@ The runs are all combinations. Order of the settings: preset < iterations < sett
 
 import re
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 
@@ -42,7 +42,7 @@ KEYS = (
     "sequences", "seeds", "splits", "measures", "preset", "iterations", "lpips", "keep_checkpoints", "settings",
     "simulator", "configurations",
 )  # fmt: skip
-SPLITS = tuple(f.type for f in msgspec.structs.fields(SequenceConfig) if f.name == "split")[0].__args__
+SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
 LONGEST_BLOCK = 1 << 20  # frames
 
 
@@ -140,7 +140,9 @@ def _configurations(data: dict[str, Any], where: str) -> tuple[Configuration, ..
     starts = {configuration.name: configuration.start for configuration in made}
     for name, start in starts.items():
         if start and starts[start[0]]:
-            raise InputError(f"{where}: configurations.{name}.start: {start[0]} has a start itself; allowed: one without")
+            raise InputError(
+                f"{where}: configurations.{name}.start: {start[0]} has a start itself; allowed: one without"
+            )
     return tuple(made)
 
 

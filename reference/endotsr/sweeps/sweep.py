@@ -87,7 +87,9 @@ def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> Plan:
     """
     jobs, before = jobs_of(spec, out, inputs.training_frames), failures(out)
     rows = {job.name: finished_row(job) if finished_folder(job) else open_row(job) for job in jobs}
-    failed = {} if retry else {name: before[name] for name in rows if name in before and rows[name]["status"] != FINISHED}
+    failed = (
+        {} if retry else {name: before[name] for name in rows if name in before and rows[name]["status"] != FINISHED}
+    )
     for job in jobs:
         if job.name in failed:
             rows[job.name] = open_row(job, Outcome(job.name, FAILED, failed[job.name]))
