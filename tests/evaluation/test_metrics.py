@@ -51,7 +51,7 @@ def test_ssim_equals_the_oracle():
 
 
 def test_ssim_equals_skimage():
-    """With Gaussian windows and a dark rim skimage's definition is ours: mirrored and zero padding see the same zeros."""
+    """With Gaussian windows and a dark rim skimage's definition is ours: both ways of padding see zeros."""
     rng = np.random.default_rng(8)
     render, truth = (rng.uniform(0.1, 0.9, (3, 48, 56)) for _ in range(2))
     mask = np.zeros((48, 56), bool)

@@ -201,7 +201,7 @@ def test_the_lock_of_a_run_is_waited_for_as_long_as_its_log_grows(whole):
 
 
 def test_a_plan_lists_what_is_left(whole, capsys):
-    spec, out, rows, _ = whole
+    spec, out, _, _ = whole
     plan = planned(read_spec(spec), out, Inputs(keep=False), retry=False)
     assert plan.left == [] and len(plan.jobs) == 3
     assert main(["sweep", str(spec), "--out", str(out), "--dry-run"]) == 0
@@ -210,7 +210,8 @@ def test_a_plan_lists_what_is_left(whole, capsys):
 
 @pytest.mark.parametrize(
     "words, said",
-    [(["--out"], "--out: missing value"), ([], "--out DIR is missing"), (["--out", "x", "--workers", "0"], "--workers 0"),
+    [(["--out"], "--out: missing value"), ([], "--out DIR is missing"),
+     (["--out", "x", "--workers", "0"], "--workers 0"),
      (["--out", "x", "--workers", "2", "--scheduler", "tcp://a:1"], "--workers beside --scheduler")],
 )  # fmt: skip
 def test_options_that_are_wrong_are_one_line(tmp_path, capsys, words, said):

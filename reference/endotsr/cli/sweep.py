@@ -1,6 +1,6 @@
 """`endotsr sweep`: many runs from one file, on this machine or on a Dask cluster."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -83,7 +83,7 @@ def run_spec(spec: "Spec", out: Path, place: Place, retry: bool, on_rows=lambda 
     load_lpips_weights(spec.lpips)  # weights that cannot be used are refused before the first run
     with StepBar("iterations") as bar:
 
-        def outcomes(jobs: list["Job"], inputs: "Inputs") -> Iterator["Outcome | None"]:
+        def outcomes(jobs: list["Job"], inputs: "Inputs") -> Generator["Outcome | None", None, None]:
             if place.scheduler is not None:
                 from endotsr.sweeps.cluster import cluster_outcomes
 
@@ -94,7 +94,7 @@ def run_spec(spec: "Spec", out: Path, place: Place, retry: bool, on_rows=lambda 
         return run_sweep(spec, out, outcomes, bar, inputs=inputs, retry=retry, on_rows=on_rows)
 
 
-def _local(jobs: list["Job"], inputs: "Inputs", place: Place) -> Iterator["Outcome | None"]:
+def _local(jobs: list["Job"], inputs: "Inputs", place: Place) -> Generator["Outcome | None", None, None]:
     from endotsr.sweeps.capacity import capacity
     from endotsr.sweeps.local import local_outcomes
 

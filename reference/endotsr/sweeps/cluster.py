@@ -12,7 +12,7 @@ import logging
 import secrets
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +34,7 @@ STOP, TOKEN = "sweep.stop", "sweep.token"  # files in the folder of the sweep
 
 def cluster_outcomes(
     address: str, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
-) -> Iterator[Outcome | None]:
+) -> Generator[Outcome | None, None, None]:
     """Make the runs on the workers of a scheduler; after KeyboardInterrupt all of them stop.
 
     threads   of each run; default: the cores of a worker's machine divided by its workers
@@ -54,7 +54,7 @@ def cluster_outcomes(
 
 def _outcomes(
     client: "Client", jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
-) -> Iterator[Outcome | None]:
+) -> Generator[Outcome | None, None, None]:
     sent, losses = _Sent(client, sequence_of), Counter[str]()
     running = {_submitted(client, job, sent, out, threads): job for job in jobs}
     while running:

@@ -12,7 +12,7 @@ import signal
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection, process
@@ -26,7 +26,7 @@ LAST_SECONDS = 20.0  # in which workers write their checkpoints after a signal
 LOST = "its process was ended from outside, three times; was it short of memory (fewer --workers need less)?"
 
 
-def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Iterator[Outcome | None]:
+def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Generator[Outcome | None, None, None]:
     """Make the runs, `workers` at a time with `threads` threads each; after KeyboardInterrupt all of them stop."""
     waiting, losses = deque(jobs), Counter[str]()
     while waiting:
@@ -36,7 +36,7 @@ def local_outcomes(jobs: list[Job], workers: int, threads: int) -> Iterator[Outc
 
 def _until_broken(
     pool: ProcessPoolExecutor, waiting: deque[Job], losses: Counter[str], workers: int, threads: int
-) -> Iterator[Outcome | None]:
+) -> Generator[Outcome | None, None, None]:
     """Outcomes until all jobs are done, or until the pool has lost a process; `waiting` then holds what is left."""
     running: dict[Future[Outcome], Job] = {}
     while waiting or running:

@@ -7,7 +7,8 @@ machine or of a cluster. Out: the rows of the table, in the order of the spec.
     DIR/shared/        checkpoints that several runs begin with                    DIR/sweep.lock
 """
 
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -70,6 +71,9 @@ class Inputs:
         return self._sizes[job.input_key]
 
 
+Outcomes = Callable[[list[Job], Inputs], Generator[Outcome | None, None, None]]
+
+
 class Plan(NamedTuple):
     """The runs of a sweep and what is left of them."""
 
@@ -100,7 +104,7 @@ def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> Plan:
 def run_sweep(
     spec: Spec,
     out: Path,
-    outcomes: Callable[[list[Job], Inputs], Iterator[Outcome | None]],
+    outcomes: Outcomes,
     reporter: Reporter,
     *,
     inputs: Inputs,
@@ -125,29 +129,33 @@ def run_sweep(
         for name, reason in plan.failed.items():
             reporter.say(f"failed before: {name}: {reason}")
         try:
-            for job in _made(plan, outcomes(plan.left, inputs) if plan.left else iter(()), reporter):
-                write_results(out, list(rows.values()))
-                on_rows(list(rows.values()))
-                reporter.say(_line(rows, job))
+            with contextlib.closing(_made(plan, outcomes, inputs, reporter)) as made:
+                for job in made:
+                    write_results(out, list(rows.values()))
+                    on_rows(list(rows.values()))
+                    reporter.say(_line(rows, job))
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"{_count(rows)} runs are finished; the same command continues") from None
         return list(rows.values())
 
 
-def _made(plan: Plan, outcomes: Iterator[Outcome | None], reporter: Reporter) -> Iterator[Job]:
-    """The jobs as they end, with their rows replaced and the progress shown."""
+def _made(plan: Plan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter) -> Generator[Job, None, None]:
+    """The jobs as they end, with their rows replaced and the progress shown; closed, it ends what still runs."""
+    if not plan.left:
+        return
     jobs, watch = {job.name: job for job in plan.left}, Watch(plan.left)
     reporter.begin(watch.total)
-    for outcome in outcomes:
-        reporter.step(watch.progress())
-        if outcome is None:
-            continue
-        if outcome.ends_sweep:
-            raise InputError(f"{outcome.reason}; {_count(plan.rows)} runs are finished; the same command continues")
-        job = jobs[outcome.name]
-        finished = outcome.status == FINISHED
-        plan.rows[job.name] = finished_row(job) if finished else open_row(job, outcome)
-        yield job
+    with contextlib.closing(outcomes(plan.left, inputs)) as found:
+        for outcome in found:
+            reporter.step(watch.progress())
+            if outcome is None:
+                continue
+            if outcome.ends_sweep:
+                raise InputError(f"{outcome.reason}; {_count(plan.rows)} runs are finished; the same command continues")
+            job = jobs[outcome.name]
+            finished = outcome.status == FINISHED
+            plan.rows[job.name] = finished_row(job) if finished else open_row(job, outcome)
+            yield job
     reporter.step(watch.progress())
 
 
