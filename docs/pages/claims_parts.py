@@ -41,9 +41,8 @@ def verdicts(found: Record | None, runs: list[Record]) -> str:
     rows.append(_largest_row(found))
     rows += [_increment_row(found, claim, words) for claim, words in INCREMENTS]
     rows.append(_motion_row(found))
-    rows.append(
-        ["The other sequences of the paper", "not testable", "-", "-", "their pictures are not at hand; the same"]
-    )
+    other = "not testable: their pictures are not at hand"
+    rows.append(["The other sequences of the paper", other, "-", "-", "`endotsr ablate SEQUENCE --out DIR`"])
     return markdown(("claim of the paper, EndoNeRF pulling", "verdict", "measured", "95 % interval", "command"), rows)
 
 

@@ -88,8 +88,11 @@ def run(words: list[str]) -> int:
             write_json(options.json, record)
 
     if options.collect:
+        from endotsr.runs.files import refuse_folder
         from endotsr.sweeps.sweep import Inputs, planned
 
+        refuse_folder(options.out)
+        options.out.mkdir(parents=True, exist_ok=True)
         plan = planned(spec, options.out, Inputs(keep=False), retry=False)
         on_rows(list(plan.rows.values()))
         print(ablation_markdown(record))

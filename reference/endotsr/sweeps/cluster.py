@@ -92,8 +92,7 @@ class _Sent:
 
 
 def _submitted(client: "Client", job: Job, sent: _Sent, out: Path, threads: int | None) -> "Future":
-    addresses = client.scheduler_info(n_workers=-1)["workers"]
-    on_host = Counter(worker["host"] for worker in addresses.values())
+    on_host = Counter(_host(worker) for worker in client.nthreads())
     key = f"{job.name}-{secrets.token_hex(4)}"
     return client.submit(
         _work, job, sent.of(job), str(out), _fingerprint(), dict(on_host), threads, key=key, pure=False
@@ -109,9 +108,13 @@ def _work(
     worker = get_worker()
     if wrong := _difference(_fingerprint(), expected):
         return Outcome(job.name, FAILED, f"worker {worker.address}: {wrong}", ends_sweep=True)
-    host = worker.address.split("://")[-1].rsplit(":", 1)[0]
-    stop = Path(out) / STOP
-    return execute(job, threads or max(1, usable_cores() // on_host.get(host, 1)), sequence, _Asked(stop))
+    chosen = threads or max(1, usable_cores() // on_host.get(_host(worker.address), 1))
+    return execute(job, chosen, sequence, _Asked(Path(out) / STOP))
+
+
+def _host(address: str) -> str:
+    """The machine of `tcp://machine:port`."""
+    return address.split("://")[-1].rsplit(":", 1)[0]
 
 
 class _Asked:
@@ -164,9 +167,9 @@ def _refuse_workers(client: "Client", out: Path) -> None:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
         raise InputError("--scheduler: it has no workers; start some with `dask worker ADDRESS --nthreads 1`") from None
-    for worker, about in client.scheduler_info(n_workers=-1)["workers"].items():
-        if about["nthreads"] != 1:
-            raise InputError(f"worker {worker}: takes {about['nthreads']} runs at a time; allowed: --nthreads 1")
+    for worker, count in client.nthreads().items():
+        if count != 1:
+            raise InputError(f"worker {worker}: takes {count} runs at a time; allowed: --nthreads 1")
     token, expected = secrets.token_hex(8), _fingerprint()
     (out / TOKEN).write_text(token, encoding="ascii")
     for worker, found in client.run(_seen, str(out / TOKEN), on_error="return").items():
