@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene",
     "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views", "stages", "gradcheck",
-    "golden", "bench", "tradeoff", "api", "cli", "__main__",
+    "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
 )  # fmt: skip
 METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")
 LONGEST_FUNCTION = 40  # lines

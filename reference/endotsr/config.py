@@ -43,10 +43,10 @@ class SequenceConfig(Section, frozen=True, kw_only=True):
     """frame range start:stop[:step] in Python slice notation; empty = all"""
     scale: Positive = 1.0
     """image scale, area-averaged; 0.5 halves width and height"""
-    split: Literal["every_eighth", "blocks"] = "every_eighth"
-    """held-out frames: (i - 1) % 8 == 0, or contiguous blocks"""
+    split: Literal["every_eighth", "every_second", "blocks", "end"] = "every_eighth"
+    """held-out frames: (i - 1) % 8 == 0, every second frame, contiguous blocks, or the end of the clip"""
     block_length: PositiveCount = 8
-    """frames in a held-out block; a block starts every max(24, 2 x length) frames"""
+    """frames in a held-out block, which starts every max(24, 2 x length) frames, or in the held-out end"""
     depth_percentiles: tuple[float, float] = (3.0, 99.8)
     """per-frame clip of the non-zero prior depth, percent"""
     memory: NonNegative = 0.0

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from skimage.metrics import peak_signal_noise_ratio
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from endotsr.evaluation.metrics import (
     image_metrics,
@@ -48,6 +48,20 @@ def test_ssim_equals_the_oracle():
     assert ssim_full(render, truth, mask) == pytest.approx(found.mean(), abs=1e-13)
     assert ssim_tissue(render, truth, mask) == pytest.approx(found[:, mask].mean(), abs=1e-13)
     assert ssim_full(render, truth, mask) > ssim_tissue(render, truth, mask)
+
+
+def test_ssim_equals_skimage():
+    """With Gaussian windows and a dark rim skimage's definition is ours: both ways of padding see zeros."""
+    rng = np.random.default_rng(8)
+    render, truth = (rng.uniform(0.1, 0.9, (3, 48, 56)) for _ in range(2))
+    mask = np.zeros((48, 56), bool)
+    mask[12:-12, 12:-12] = True
+    mask[20:25, 30:36] = False  # an instrument
+    zeroed = [np.where(mask, picture, 0.0) for picture in (render, truth)]
+    how = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False, "data_range": 1.0}
+    _, found = structural_similarity(*zeroed, channel_axis=0, full=True, **how)
+    assert ssim_full(render, truth, mask) == pytest.approx(found.mean(), abs=1e-10)
+    assert ssim_tissue(render, truth, mask) == pytest.approx(found[:, mask].mean(), abs=1e-10)
 
 
 def test_float32_input_is_measured_in_float64():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.sequences.splits import blocks, every_eighth, parse_frame_range, split_frames, time_stamps
+from endotsr.sequences.splits import blocks, end_of_clip, every_eighth, parse_frame_range, split_frames, time_stamps
 
 
 @pytest.mark.parametrize(("count", "train", "test"), [(63, 55, 8), (156, 136, 20), (100, 87, 13), (200, 175, 25)])
@@ -29,6 +29,19 @@ def test_blocks_of_eight_in_63_frames():
     blocks(17, 8)
     with pytest.raises(InputError, match="at least 17 frames"):
         blocks(16, 8)
+
+
+def test_every_second_frame_halves_the_frame_rate():
+    training, held_out = split_frames(9, "every_second", 8)
+    assert list(training) == [0, 2, 4, 6, 8] and list(held_out) == [1, 3, 5, 7]
+
+
+def test_the_end_is_held_out_whole():
+    training, held_out = split_frames(20, "end", 8)
+    assert list(training) == list(range(12)) and list(held_out) == list(range(12, 20))
+    assert list(end_of_clip(10, 8)[0]) == [0, 1]
+    with pytest.raises(InputError, match="8 held-out frames of 9; at least 2 are needed for training"):
+        split_frames(9, "end", 8)
 
 
 def test_too_few_frames_are_refused():

@@ -38,6 +38,8 @@ class EvaluateOptions:
     """also write the metrics of every held-out frame as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
+    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    """measure more of a run, each with rows to compare: depth, flicker, right_view"""
     paper_row: Literal["pulling"] | None = None
     """also show the published figures of this clip"""
     view: bool = True
@@ -56,6 +58,8 @@ def run(words: list[str]) -> int:
     options = parse(EvaluateOptions, words, "evaluate")
     refuse_unwritable(options.json, options.csv)
     use_threads(options.threads)
+    if options.pictures and options.measures:
+        raise InputError("evaluate: --measures beside --pictures is not allowed: they render views of a run")
     published = (PUBLISHED[options.paper_row],) if options.paper_row else ()
     metrics = _pictures(options, published) if options.pictures else _run(options, published)
     if options.json:
@@ -78,7 +82,15 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
-    return evaluate_run(folder, sequence, options.lpips, published, options.view)
+    return evaluate_run(
+        folder,
+        sequence,
+        options.lpips,
+        published,
+        view=options.view,
+        measures=options.measures,
+        source=options.sequence,
+    )
 
 
 def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
@@ -102,10 +114,18 @@ def evaluate_run(
     sequence: "Sequence",
     lpips: Path | None = None,
     published: tuple[dict[str, Any], ...] = (),
+    *,
     view: bool = True,
+    measures: tuple[str, ...] = (),
+    source: str | None = None,
 ) -> dict[str, Any]:
-    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json."""
+    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
+
+    measures   names of `evaluation.measures.MEASURES`
+    source     current place of the sequence; default: the recorded one
+    """
     from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.evaluation.measures import MEASURES, measure_lines, measured
     from endotsr.evaluation.run import measure_run
     from endotsr.export.scene import RECORD, MovingScene
     from endotsr.report.run_files import write_evaluation
@@ -116,12 +136,19 @@ def evaluate_run(
     from endotsr.views.page import RUN_PAGE, write_run_page
     from endotsr.views.preview import preview
 
+    for name in measures:
+        if name not in MEASURES:
+            raise InputError(f"--measures {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
     weights = load_lpips_weights(lpips)
     model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
+    if measures:
+        metrics["measures"] = measured(measures, model, sequence, source or run_source(folder)[0])
     scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
     write_run_page(folder.path, scene, sequence if view else None)
     write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
+    for line in measure_lines(metrics.get("measures", {})):
+        print(line)
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics

@@ -31,6 +31,8 @@ COMMANDS = {
     "export": "write .ply files, a point cloud, or a slim model",
     "evaluate": "measure held-out frames of a run, or any pictures, beside baselines, with renders and a report",
     "compare": "compare runs and folders of pictures frame by frame, with intervals",
+    "sweep": "make many runs from one file, on this machine or on a cluster, with a table of their results",
+    "ablate": "test the paper's claims: components on and off, over seeds, with paired differences",
     "gradcheck": "check every reverse pass against finite differences",
     "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
     "tradeoff": "measure error against time, and find the best setting within a budget",

@@ -26,6 +26,10 @@ from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_l
 from endotsr.runs.records import check_run_record, check_sequence_record
 
 
+class RunBusy(InputError):
+    """Another process holds the lock of a run."""
+
+
 @dataclass(frozen=True)
 class RunFolder:
     """A run folder that exists; see the module docstring for its files."""
@@ -69,7 +73,8 @@ class RunFolder:
     def locked(self) -> Iterator[None]:
         """Hold the lock of the run for the block; the system releases the lock of a process that was killed.
 
-        Raises: InputError if another process holds it. Without effect where the system or the disk supports no locks.
+        Raises: RunBusy, an InputError, if another process holds it. Without effect where the system or the disk
+                supports no locks.
         """
         refuse_link(self.log)
         with self.log.open("ab") as file:
@@ -96,7 +101,7 @@ def _lock(file: IO[bytes], path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(f"{path}: another process trains this run; wait until it ends, or stop it") from None
+        raise RunBusy(f"{path}: another process trains this run; wait until it ends, or stop it") from None
     except OSError:
         return
 

@@ -11,6 +11,7 @@ from endotsr.runs.files import finite, refuse_link
 from endotsr.untrusted.json import integer, number, parsed
 
 LONGEST_LINE = 1 << 20  # bytes
+LONGEST_TAIL = 1 << 13  # bytes that hold the last line of a log, and more
 
 
 class RunLog:
@@ -51,6 +52,17 @@ class RunLog:
         """Close the file; lines that could not be written are dropped."""
         with contextlib.suppress(OSError):
             self._file.close()
+
+
+def last_iteration(path: Path) -> int:
+    """The iteration of the last whole line of a log; 0 without one. Only the end of the file is read."""
+    try:
+        with path.open("rb") as file:
+            file.seek(max(file.seek(0, os.SEEK_END) - LONGEST_TAIL, 0))
+            lines = file.read(LONGEST_TAIL).splitlines(keepends=True)
+    except OSError:
+        return 0
+    return next((entry["iteration"] for line in reversed(lines) if (entry := _entry(line)) is not None), 0)
 
 
 def _entry(line: bytes) -> dict[str, Any] | None:

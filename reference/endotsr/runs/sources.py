@@ -1,5 +1,6 @@
 """The source of a sequence, a folder or `simulated`, and its record in a run folder."""
 
+import dataclasses
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_inside
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
 
@@ -31,12 +33,21 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
     if source == SIMULATED:
         from endotsr.simulator.simulate import simulate
 
-        return simulate(simulated_settings(simulator, config)).sequence
+        return _split(simulate(simulated_settings(simulator, config)).sequence, config)
     if source == IN_MEMORY:
         raise InputError("the run was trained on arrays in memory; allowed: the folder that holds the same frames")
     from endotsr.sequences.layouts import read_sequence
 
     return read_sequence(Path(source), config.sequence, config.raster.near)
+
+
+def _split(sequence: Sequence, config: Config) -> Sequence:
+    """A simulated sequence with the split of the settings, where the simulator has no setting for it."""
+    wanted = config.sequence
+    if wanted.split not in ("every_second", "end"):
+        return sequence
+    train, test = split_frames(sequence.count, wanted.split, wanted.block_length)
+    return dataclasses.replace(sequence, train_index=train, test_index=test)
 
 
 def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:

@@ -54,6 +54,30 @@ def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
     return index[~held_out], index[held_out]
 
 
+def every_second(count: int) -> tuple[IndexArray, IndexArray]:
+    """Frames 1, 3, 5, ... are held out: a clip at half its frame rate.
+
+    returns  (train (n_train,), test (n_test,)), ascending
+    """
+    index = np.arange(count)
+    return index[::2], index[1::2]
+
+
+def end_of_clip(count: int, length: int) -> tuple[IndexArray, IndexArray]:
+    """The last `length` frames are held out: the model has to extrapolate, with no training frame after them.
+
+    returns  (train (n_train,), test (n_test,)), ascending
+    Raises:  InputError if fewer than 2 training frames remain.
+    """
+    first = count - length
+    if first < LEAST_TRAINING_FRAMES:
+        raise InputError(
+            f"split end: {length} held-out frames of {count}; at least {LEAST_TRAINING_FRAMES} are needed for training"
+        )
+    index = np.arange(count)
+    return index[:first], index[first:]
+
+
 def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray, IndexArray]:
     """The split named in the configuration.
 
@@ -61,7 +85,12 @@ def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray,
     """
     if count < LEAST_FRAMES:
         raise InputError(f"{count} frames are too few: at least {LEAST_FRAMES} are needed")
-    train, test = blocks(count, block_length) if split == "blocks" else every_eighth(count)
+    if split == "blocks":
+        train, test = blocks(count, block_length)
+    elif split == "end":
+        train, test = end_of_clip(count, block_length)
+    else:
+        train, test = every_second(count) if split == "every_second" else every_eighth(count)
     if len(train) < LEAST_TRAINING_FRAMES:
         raise InputError(
             f"the split {split} leaves {len(train)} training frames: at least {LEAST_TRAINING_FRAMES} are needed"

@@ -1,0 +1,66 @@
+"""Write the generated parts of docs/claims.md and docs/guides/sweep.md from the results that are there.
+
+    python docs/pages/claims.py            from docs/results
+    python docs/pages/claims.py FOLDER     from the files of another folder
+
+To measure, on a machine that has nothing else to do (each command continues where it was interrupted):
+
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
+        --json docs/results/ablation_pulling.json
+    endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
+
+A result that is not there is called "not measured yet"; a result of some seeds is shown with their number.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import claims_parts
+from marks import read_json, write_marked
+
+from endotsr.errors import InputError
+
+DOCS = Path(__file__).parents[1]
+PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
+FILES = {"pulling": "ablation_pulling.json", "simulated": "ablation_simulated.json"}
+RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
+
+
+def read(folder: Path) -> dict[str, dict[str, Any] | None]:
+    """The ablations by name; None where there is no result yet. Raises: InputError for a file that cannot be read."""
+    found = {name: folder / file for name, file in FILES.items()}
+    return {name: read_json(path, "endotsr ablate") if path.exists() else None for name, path in found.items()}
+
+
+def read_runs(folder: Path) -> list[dict[str, Any]]:
+    """The records of single runs in the same folder."""
+    return [read_json(path, "docs/results/record.py") for path in sorted(folder.glob(RUNS))]
+
+
+def parts(folder: Path = RESULTS) -> dict[str, str]:
+    """Every generated part of both pages by name."""
+    found, runs = read(folder), read_runs(folder)
+    return {
+        "verdicts": claims_parts.verdicts(found["pulling"], runs),
+        "pulling": claims_parts.tables(found["pulling"]),
+        "simulated": claims_parts.tables(found["simulated"]),
+        "protocols": claims_parts.protocols(found["pulling"], runs),
+        "cost": claims_parts.cost(found["pulling"], runs),
+    }
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    if len(words) > 1:
+        sys.exit(__doc__)
+    try:
+        made = parts(Path(words[0]) if words else RESULTS)
+        for page in (PAGE, GUIDE):
+            write_marked(page, made, "claims")
+    except InputError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,235 @@
+"""The generated parts of docs/claims.md: verdicts, tables, protocols, cost.
+
+A verdict is decided by numbers alone. For a difference with the published value p and the 95 % interval I of its mean:
+I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: the direction alone, or its
+opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from endotsr.evaluation.run import PUBLISHED
+from endotsr.report.tables import markdown
+from endotsr.sweeps.ablation_page import increment_table, interval_text, level_table
+from endotsr.sweeps.cost import planned_hours
+
+NOT_YET = "Not measured yet."
+HUNDREDTH = 0.01  # dB
+LEAST_PAIRS = 3  # below, nothing is decided
+FULL, SPLIT = "A+S+L", "every_eighth"
+COMMAND = "`endotsr ablate endonerf_pulling --out DIR`"
+LEVELS = (("psnr_full", "PSNR full", "{:.2f} dB", True), ("ssim_full", "SSIM full", "{:.4f}", True),
+          ("lpips", "LPIPS", "{:.4f}", False))  # fmt: skip
+INCREMENTS = (
+    ("A, temporal appearance", "Temporal appearance (A) gains 0.29 dB"),
+    ("S, spectral motion", "Spectral motion (S) gains 0.04 dB"),
+    ("L, Laplacian detail", "Laplacian detail (L) gains 0.12 dB"),
+    ("all three, fixed count", "At a fixed number of Gaussians all three together gain 0.25 dB"),
+    ("Matérn prior", "The Matérn prior changes PSNR by less than 0.01 dB"),
+    ("Matérn prior, fixed representation", "The same at a fixed representation"),
+)
+PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)
+Record = dict[str, Any]
+
+
+def verdicts(found: Record | None, runs: list[Record]) -> str:
+    """Claim by claim: verdict, number, interval, command."""
+    rows = [_level_row(found, runs, *level) for level in LEVELS]
+    rows.append(_largest_row(found))
+    rows += [_increment_row(found, claim, words) for claim, words in INCREMENTS]
+    rows.append(_motion_row(found))
+    other = "not testable: their pictures are not at hand"
+    rows.append(["The other sequences of the paper", other, "-", "-", "`endotsr ablate SEQUENCE --out DIR`"])
+    return markdown(("claim of the paper, EndoNeRF pulling", "verdict", "measured", "95 % interval", "command"), rows)
+
+
+def increment_verdict(published: float, low: float | None, high: float | None, pairs: int) -> str:
+    """The verdict on a difference; see the module docstring."""
+    if low is None or high is None or pairs < LEAST_PAIRS:
+        return f"not decided: {pairs} of {LEAST_PAIRS} seeds"
+    if published == 0.0:
+        if -HUNDREDTH <= low and high <= HUNDREDTH:
+            return "reproduced"
+        return "not decided: the interval is wider" if low < HUNDREDTH and high > -HUNDREDTH else "not reproduced"
+    holds, nothing = low <= published <= high, low <= 0.0 <= high
+    if holds:
+        return "not decided: the interval holds 0 too" if nothing else "reproduced"
+    if nothing:
+        return "not reproduced"
+    return "direction reproduced, size not" if (low > 0) == (published > 0) else "not reproduced: the opposite"
+
+
+def level_verdict(published: float, low: float | None, high: float | None, larger_is_better: bool) -> str:
+    """The verdict on a mean: reproduced if its interval reaches the published value, or is better than it."""
+    if low is None or high is None:
+        return "not decided: one seed"
+    reached = high >= published if larger_is_better else low <= published
+    return "reproduced" if reached else "not reproduced"
+
+
+def student(values: list[float]) -> tuple[float, float | None, float | None]:
+    """Mean and 95 % interval (Student) of values of several seeds; no interval for one."""
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return mean, None, None
+    half = float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / math.sqrt(len(values)))
+    return mean, mean - half, mean + half
+
+
+def full_runs(found: Record | None, runs: list[Record], key: str) -> list[float]:
+    """A metric of the runs of the whole method with the preset `paper`: of the ablation, else of recorded runs."""
+    if found is not None:
+        chosen = [r for r in found["rows"] if (r["configuration"], r["split"], r["preset"]) == (FULL, SPLIT, "paper")]
+        if values := [row[key] for row in chosen if row.get(key) is not None]:
+            return values
+    settings = [(run["run"]["settings"], run["held_out"]["mean"].get(key)) for run in runs]
+    return [v for s, v in settings if v is not None and s["preset"] == "paper" and s["sequence"]["split"] == SPLIT]
+
+
+def _level_row(found: Record | None, runs: list[Record], key: str, label: str, form: str, larger: bool) -> list[str]:
+    published = PUBLISHED["pulling"][key]
+    claim = f"{label} {published:g}"
+    values = full_runs(found, runs, key)
+    if not values:
+        return [claim, NOT_YET, "-", "-", COMMAND]
+    mean, low, high = student(values)
+    shown = "-" if low is None or high is None else f"{form.format(low)} to {form.format(high)}"
+    measured = f"{form.format(mean)}, {len(values)} seed{'s' if len(values) > 1 else ''}"
+    return [claim, level_verdict(published, low, high, larger), measured, shown, COMMAND]
+
+
+def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record | None:
+    wanted = (claim, SPLIT, metric)
+    rows = found["increments"] if found is not None else []
+    return next((r for r in rows if (r["claim"], r["split"], r["metric"]) == wanted), None)
+
+
+def _increment_row(found: Record | None, claim: str, words: str) -> list[str]:
+    entry = _of(found, claim)
+    if entry is None:
+        return [words, NOT_YET, "-", "-", COMMAND]
+    verdict = increment_verdict(entry["published"], entry["mean_low"], entry["mean_high"], entry["pairs"])
+    return [words, verdict, f"{entry['mean']:+.3f} dB", interval_text(entry, "mean", 3) + _unit(entry), COMMAND]
+
+
+def _unit(entry: Record) -> str:
+    return "" if entry["mean_low"] is None else " dB"
+
+
+def _largest_row(found: Record | None) -> list[str]:
+    claim = "A is the largest single gain"
+    entries = [_of(found, name) for name, _ in INCREMENTS[:3]]
+    known = [entry for entry in entries if entry is not None]
+    if len(known) < 3:
+        return [claim, NOT_YET, "-", "-", COMMAND]
+    means = ", ".join(f"{e['with']} {e['mean']:+.3f}" for e in known) + " dB"
+    if min(e["pairs"] for e in known) < LEAST_PAIRS:
+        return [claim, f"not decided: {min(e['pairs'] for e in known)} of {LEAST_PAIRS} seeds", means, "-", COMMAND]
+    others = max(e["mean_high"] for e in known[1:])
+    if known[0]["mean_low"] > others:
+        return [claim, "reproduced", means, "-", COMMAND]
+    largest = max(known, key=lambda e: e["mean"]) is known[0]
+    return [claim, "not decided: the intervals overlap" if largest else "not reproduced", means, "-", COMMAND]
+
+
+def _motion_row(found: Record | None) -> list[str]:
+    """Not stated by the paper, but what its motion is for."""
+    claim = "The motion carries something between the frames: better than the cross-fade of the own renders"
+    rows = [] if found is None else [r for r in found["rows"] if (r["configuration"], r["split"]) == (FULL, SPLIT)]
+    values = [
+        r["psnr_tissue"] - r["cross_fade_psnr_tissue"] for r in rows
+        if r.get("psnr_tissue") is not None and r.get("cross_fade_psnr_tissue") is not None
+    ]  # fmt: skip
+    if not values:
+        return [claim, NOT_YET, "-", "-", COMMAND]
+    mean, low, high = student(values)
+    if low is None or high is None:
+        return [claim, "not decided: one seed", f"{mean:+.2f} dB tissue", "-", COMMAND]
+    verdict = "yes" if low > 0 else "no" if high < 0 else "not decided"
+    return [claim, verdict, f"{mean:+.2f} dB tissue", f"{low:+.2f} to {high:+.2f} dB", COMMAND]
+
+
+def tables(found: Record | None) -> str:
+    """Means and paired differences of an ablation, and how they were made."""
+    if found is None:
+        return NOT_YET
+    runs, machine = found["runs"], found["machine"]
+    made = (
+        f"{runs['finished']} of {runs['planned']} runs, {len(runs['failed'])} failed; {machine['processor']}, "
+        f"{machine['cores']} cores, {found['date'][:10]}."
+    )
+    parts = [made]
+    for split in dict.fromkeys(level["split"] for level in found["levels"]):
+        parts += [f"Held out: `{split}`", level_table(found, split), increment_table(found, split)]
+    return "\n\n".join(parts)
+
+
+def protocols(found: Record | None, runs: list[Record]) -> str:
+    """Held-out PSNR on tissue for every split: training frames, the model, its cross-fade and the baselines."""
+    rows = [_protocol_row(split, members) for split, members in _by_split(found, runs).items()]
+    if not rows:
+        return NOT_YET
+    heads = (
+        "held out, preset",
+        "runs",
+        "training frames",
+        "model",
+        "cross-fade",
+        "blend of neighbours",
+        "optical flow",
+    )
+    return markdown(heads, rows)
+
+
+def _by_split(found: Record | None, runs: list[Record]) -> dict[str, list[Record]]:
+    """Rows with the keys of a sweep, by split and preset."""
+    groups: dict[str, list[Record]] = {}
+    for row in found["rows"] if found is not None else []:
+        if row["configuration"] == FULL:
+            groups.setdefault(f"{row['split']}, {row['preset']}", []).append(row)
+    for run in runs:
+        sequence, preset = run["run"]["settings"]["sequence"], run["run"]["settings"]["preset"]
+        split = sequence["split"] + (f" {sequence['block_length']}" if sequence["split"] in ("blocks", "end") else "")
+        faded = (run.get("cross_fade") or {}).get("mean") or {}
+        row = {
+            "psnr_tissue": run["held_out"]["mean"]["psnr_tissue"],
+            "training_psnr_tissue": run["training"]["mean"]["psnr_tissue"],
+            "cross_fade_psnr_tissue": faded.get("psnr_tissue"),
+            "baselines": run["baselines"],
+        }
+        groups.setdefault(f"{split}, {preset}, recorded runs", []).append(row)
+    return groups
+
+
+def _protocol_row(split: str, rows: list[Record]) -> list[str]:
+    def mean(key: str) -> str:
+        values = [row[key] for row in rows if row.get(key) is not None]
+        return f"{np.mean(values):.2f}" if values else "-"
+
+    def baseline(name: str) -> str:
+        value = rows[0]["baselines"].get(name, {}).get("mean", {}).get("psnr_tissue")
+        return "-" if value is None else f"{value:.2f}"
+
+    model = [mean(key) for key in ("training_psnr_tissue", "psnr_tissue", "cross_fade_psnr_tissue")]
+    return [split, str(len(rows)), *model, baseline("two_neighbours"), baseline("flow_interpolation")]
+
+
+def cost(found: Record | None, runs: list[Record]) -> str:
+    """Hours of sweeps on several numbers of cores, from the measured seconds of one run."""
+    measured = [(row["seconds"], row["threads"]) for row in (found["rows"] if found is not None else [])
+                if row.get("seconds") and row.get("threads") and row["preset"] == "paper"]  # fmt: skip
+    measured = measured or [
+        (run["run"]["seconds"], run["run"]["threads"]) for run in runs if run["run"]["settings"]["preset"] == "paper"
+    ]
+    if not measured:
+        return NOT_YET
+    core_minutes = float(np.median([seconds * threads / 60 for seconds, threads in measured]))
+    rows = [
+        [str(count), *(f"{planned_hours(count, cores, core_minutes):.1f}" for cores in PLANNED_CORES)]
+        for count in PLANNED_RUNS
+    ]
+    about = f"One run takes {core_minutes:.0f} core minutes (median of {len(measured)} measured)."
+    return f"{about}\n\n" + markdown(("runs", *(f"{n} cores, hours" for n in PLANNED_CORES)), rows)

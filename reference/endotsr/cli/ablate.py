@@ -1,0 +1,131 @@
+"""`endotsr ablate`: the components of the method on and off, over seeds, with paired differences."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.parser import parse
+from endotsr.cli.sweep import Place, check_place, ended, run_spec
+from endotsr.config import PRESETS, with_iterations
+from endotsr.errors import InputError
+from endotsr.simulator.settings import SimulatorSettings
+
+DEMONSTRATION = SimulatorSettings()
+
+
+@dataclass
+class AblateOptions:
+    """Train the configurations base, A, S, L, A+S, A+S+L and S without its prior on every SEQUENCE, over seeds.
+
+    Each difference between two configurations is paired by sequence and seed, with mean, median and bootstrap interval.
+    With --fixed-count all are also trained from one checkpoint of the base without density control, so that the numbers
+    of Gaussians are equal. The command continues where it was interrupted, as `endotsr sweep` does.
+    """
+
+    sequences: Annotated[tuple[str, ...], Option("SEQUENCE", positional=True)]
+    """sequence folders, or `simulated`"""
+    out: Annotated[Path | None, Option("DIR")] = None
+    """folder of the sweep (required)"""
+    seeds: Annotated[int, Option("N")] = 3
+    """number of seeds, from 0"""
+    preset: Literal["paper", "sharp", "demo"] = "paper"
+    """settings of every run"""
+    iterations: Annotated[int | None, Option("N")] = None
+    """length of every run; stretches the schedule"""
+    scale: float = 1.0
+    """image scale"""
+    splits: Annotated[tuple[str, ...], Option("SPLIT")] = ("every_eighth",)
+    """held-out frames: every_eighth, every_second, "blocks N", "end N"; several are measured beside each other"""
+    configurations: Annotated[tuple[str, ...], Option("NAME")] = ()
+    """only these configurations (default: all seven)"""
+    fixed_count: bool = True
+    """also the refinement at a fixed number of Gaussians"""
+    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    """measure more: depth, flicker, right_view"""
+    lpips: Annotated[Path | None, Option("FILE")] = None
+    """AlexNet LPIPS weights"""
+    keep_checkpoints: bool = False
+    """keep the model of every run (hundreds of megabytes each at full size)"""
+    collect: bool = False
+    """train nothing: only write the results of the runs that are finished"""
+    json: Annotated[Path | None, Option("FILE")] = None
+    """also write the results there"""
+    workers: Annotated[int | None, Option("N")] = None
+    """runs at a time (default: as many as cores and free memory allow)"""
+    threads: Annotated[int | None, Option("N")] = None
+    """threads of each run (default: the cores divided by the runs)"""
+    scheduler: Annotated[str | None, Option("ADDRESS")] = None
+    """send the runs to the workers of this Dask scheduler"""
+    retry: bool = False
+    """also make the runs again that failed before"""
+    simulator: SimulatorSettings = DEMONSTRATION
+    """contents of the `simulated` sequence"""
+
+
+def run(words: list[str]) -> int:
+    """The command."""
+    from endotsr.runs.files import refuse_unwritable, write_json
+    from endotsr.sweeps.ablation_page import ablation_markdown, write_ablation
+    from endotsr.sweeps.spec import spec_of
+
+    options = parse(AblateOptions, words, "ablate")
+    place = Place(options.workers, options.threads, options.scheduler)
+    check_place("ablate", place)
+    refuse_unwritable(options.json)
+    if options.out is None:
+        raise InputError("ablate: --out DIR is missing: the folder of the sweep")
+    spec, record = spec_of(spec_data(options), "ablate", Path.cwd()), {}
+    command = ["endotsr", "ablate", *words]
+
+    def on_rows(rows: list[dict[str, Any]]) -> None:
+        nonlocal record
+        assert options.out is not None
+        record = write_ablation(options.out, rows, command)
+        if options.json is not None:
+            write_json(options.json, record)
+
+    if options.collect:
+        from endotsr.runs.files import refuse_folder
+        from endotsr.sweeps.sweep import Inputs, planned
+
+        refuse_folder(options.out)
+        options.out.mkdir(parents=True, exist_ok=True)
+        plan = planned(spec, options.out, Inputs(keep=False), retry=False)
+        on_rows(list(plan.rows.values()))
+        print(ablation_markdown(record))
+        return 0
+    rows = run_spec(spec, options.out, place, options.retry, on_rows)
+    print(ablation_markdown(record))
+    return ended(rows, options.out)
+
+
+def spec_data(options: AblateOptions) -> dict[str, Any]:
+    """The sweep of the options, as a SPEC.toml would hold it. Raises InputError for what is not allowed."""
+    from endotsr.sweeps.ablation import CONFIGURATIONS, ablation_spec
+
+    if options.seeds < 1:
+        raise InputError(f"ablate: --seeds {options.seeds} is not allowed; allowed: an integer >= 1")
+    for name in options.configurations:
+        if name not in CONFIGURATIONS:
+            raise InputError(f"ablate: --configurations {name!r} is not allowed; allowed: {', '.join(CONFIGURATIONS)}")
+    length = PRESETS[options.preset].training.iterations if options.iterations is None else options.iterations
+    if length < 2:
+        raise InputError(f"ablate: --iterations {length} is not allowed; allowed: an integer >= 2")
+    activation = with_iterations(PRESETS[options.preset], length).training.residual_activation
+    keys: dict[str, Any] = {"preset": options.preset, "iterations": length, "splits": list(options.splits)}
+    if options.lpips is not None:
+        keys["lpips"] = str(options.lpips)
+    return ablation_spec(
+        options.sequences,
+        options.seeds,
+        fixed_at=min(activation, length - 1) if options.fixed_count else None,
+        chosen=options.configurations or CONFIGURATIONS,
+        settings={"sequence": {"scale": options.scale}},
+        simulator=msgspec.to_builtins(options.simulator),
+        measures=list(options.measures),
+        keep_checkpoints=options.keep_checkpoints,
+        **keys,
+    )

@@ -1,0 +1,179 @@
+"""The view of the right camera of a rectified pair, against the real right picture, which no training frame shows.
+
+The baseline B of the pair follows from disparity d and prior depth z of the left pictures, B = d z / f, as the median
+over tissue pixels. A pair whose quartiles of B lie far apart is not calibrated, and is not measured. The right camera
+is the left one moved by B along its x axis.
+
+Which pixels count. The prior depth moves every left pixel to its place in the right picture, the nearest one in front.
+A right pixel counts if it shows tissue by this, with a margin, so that the choice depends on no model. Excluded pixels
+without depth are moved with the depth of the nearest pixel that has one.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.evaluation.baselines import unit_image
+from endotsr.evaluation.evaluate import training_sample
+from endotsr.evaluation.metrics import psnr_tissue, ssim_tissue
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderOut
+
+FOLDER = "images_right"
+MATCHED_FRAMES = 5  # from which the baseline is found
+SEARCHED = 4  # disparities up to a quarter of the width
+SPREAD = 0.15  # (third - first quartile) / median of the baseline, above which the pair is not calibrated
+MARGIN = 3  # px that are removed at the border of the counted region
+LEAST_PIXELS = 100  # of tissue with disparity and depth
+
+
+class Moved(NamedTuple):
+    """A left picture as the right camera sees it."""
+
+    picture: FloatArray  # (3, H, W) display units
+    counted: BoolArray  # (H, W) pixels that show tissue
+
+
+def right_view(
+    sequence: Sequence, source: str, settings: SequenceConfig, render: Callable[[int, Camera], RenderOut]
+) -> dict[str, Any]:
+    """PSNR (dB) and SSIM over the counted pixels, for held-out frames and for every sixth training frame.
+
+    source   sequence folder with images_right/
+    render   frame number and camera -> render
+    returns  {"baseline", "spread", "unit", "rows": [{"label", "held_out_psnr", "held_out_ssim", "training_psnr",
+             "training_ssim"}]}: the model, the left picture moved by the prior depth, the left picture as it is; or
+             {"reason"}
+    """
+    folder = Path(source) / FOLDER
+    if not folder.is_dir():
+        return {"reason": f"there is no {FOLDER}/ beside the left pictures"}
+    rights = _RightPictures(folder, sequence, settings)
+    found = stereo_baseline(sequence, rights.read)
+    if found is None:
+        return {"reason": "left and right pictures have too few common pixels with depth"}
+    baseline, spread = found
+    if not baseline > 0 or spread > SPREAD:
+        return {"reason": f"disparity and depth do not give one baseline ({baseline:.3g}, spread {spread:.0%})"}
+    rows: dict[str, dict[str, Any]] = {}
+    for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
+        values = [_frame(sequence, int(i), baseline, rights.read(int(i)), render) for i in frames]
+        for label in values[0] if values else ():
+            psnr, ssim = np.array([value[label] for value in values]).T
+            row = rows.setdefault(label, {"label": label})
+            row |= {f"{part}_psnr": _mean(psnr), f"{part}_ssim": _mean(ssim)}
+    return {"baseline": baseline, "spread": spread, "unit": sequence.unit, "rows": list(rows.values())}
+
+
+def right_camera(camera: Camera, baseline: float) -> Camera:
+    """The camera moved by the baseline along its own x axis."""
+    return camera._replace(translation=camera.translation - np.array([baseline, 0.0, 0.0]))
+
+
+def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]]) -> tuple[float, float] | None:
+    """Median of d z / f over tissue pixels of some frames, and its relative spread; None with too few pixels.
+
+    right   frame number -> right picture (3, H, W)
+    """
+    from endotsr.opencv.stereo import match_pair
+
+    count = max(16, sequence.width // SEARCHED // 16 * 16)
+    found = []
+    for i in np.unique(np.linspace(0, sequence.count - 1, MATCHED_FRAMES).astype(int)):
+        left, other = (np.ascontiguousarray(p.transpose(1, 2, 0)) for p in (sequence.images[i], right(int(i))))
+        match = match_pair(left, other, 0, count, smooth=False)
+        known = np.isfinite(match.raw) & (match.disagreement <= 1) & sequence.masks[i] & (sequence.depth[i] > 0)
+        found.append(match.raw[known] * sequence.depth[i][known] / sequence.cameras[i].fx)
+    values = np.concatenate(found)
+    if values.size < LEAST_PIXELS:
+        return None
+    low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
+    return float(middle), float((high - low) / middle) if middle > 0 else float("inf")
+
+
+def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
+    """The left picture moved by its prior depth; holes are 0 and do not count."""
+    from scipy.ndimage import binary_erosion, distance_transform_edt
+
+    from endotsr.opencv import sample_bilinear
+
+    depth, mask = sequence.depth[index], sequence.masks[index]
+    height, width = mask.shape
+    if not (depth > 0).any():
+        return Moved(np.zeros((3, height, width), np.float32), np.zeros(mask.shape, bool))
+    nearest = distance_transform_edt(depth <= 0, return_distances=False, return_indices=True)
+    filled = np.where(depth > 0, depth, depth[tuple(nearest)])
+    shift = sequence.cameras[index].fx * baseline / filled
+    rows, columns = np.indices(mask.shape)
+    there = np.rint(columns - shift).astype(int)
+    inside = there >= 0
+    front = np.full(mask.shape, np.inf, np.float32)
+    np.minimum.at(front, (rows[inside], there[inside]), filled[inside])
+    seen = np.isfinite(front)
+    x = columns + np.where(seen, sequence.cameras[index].fx * baseline / np.where(seen, front, 1), 0)
+    at = np.clip(np.rint(x).astype(int), 0, width - 1)
+    counted = seen & (x <= width - 1) & mask[rows, at] & (depth[rows, at] > 0)
+    counted = binary_erosion(counted, iterations=MARGIN)
+    picture = sample_bilinear(unit_image(sequence, index), x, rows.astype(float))
+    return Moved(np.where(seen, picture, 0).astype(np.float32), counted)
+
+
+def _frame(
+    sequence: Sequence,
+    index: int,
+    baseline: float,
+    right: NDArray[np.uint8],
+    render: Callable[[int, Camera], RenderOut],
+) -> dict[str, tuple[float, float]]:
+    """PSNR and SSIM of every row on one frame."""
+    truth = right.astype(np.float32) / np.float32(255)
+    moved = moved_left(sequence, index, baseline)
+    pictures = {
+        "this model": np.clip(render(index, right_camera(sequence.cameras[index], baseline)).colour, 0, 1),
+        "left picture moved by the prior depth": moved.picture,
+        "left picture as it is": unit_image(sequence, index),
+    }
+    return {
+        label: (psnr_tissue(picture, truth, moved.counted), ssim_tissue(picture, truth, moved.counted))
+        for label, picture in pictures.items()
+    }
+
+
+class _RightPictures:
+    """The right pictures of the frames of a sequence, in its size."""
+
+    def __init__(self, folder: Path, sequence: Sequence, settings: SequenceConfig) -> None:
+        from endotsr.opencv.pictures import PICTURE_ENDINGS
+        from endotsr.sequences.files import list_pictures
+        from endotsr.sequences.splits import parse_frame_range
+
+        files = list_pictures(folder, PICTURE_ENDINGS)
+        self._files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
+        self._size = sequence.width, sequence.height
+        if len(self._files) != sequence.count:
+            raise InputError(f"{folder}: {len(self._files)} pictures for {sequence.count} frames; allowed: one a frame")
+
+    def read(self, index: int) -> NDArray[np.uint8]:
+        """(3, H, W) RGB. Raises InputError for a picture that cannot be read or is too small."""
+        from endotsr.opencv import area_resize
+        from endotsr.opencv.pictures import read_picture
+        from endotsr.sequences.recording import colour_picture
+
+        file, (width, height) = self._files[index], self._size
+        pixels = colour_picture(read_picture(file), file)
+        if pixels.shape[0] < height or pixels.shape[1] < width:
+            raise InputError(f"{file}: {pixels.shape[1]}x{pixels.shape[0]} pixels; allowed: at least {width}x{height}")
+        return np.ascontiguousarray(area_resize(pixels, width, height).transpose(2, 0, 1))
+
+
+def _mean(values: NDArray[np.float64]) -> float | None:
+    """Mean of the finite values; None without one."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else None

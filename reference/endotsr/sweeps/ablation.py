@@ -1,0 +1,194 @@
+"""The claims of the paper as differences between configurations, paired by sequence, split and seed.
+
+In: rows of a sweep. Out: one `Increment` a comparison, split and metric: the configuration `with_` minus the
+configuration `without`, on the same frames, with the same seed and no other setting changed (matched input). Sequences
+have equal weights, whatever the number of their seeds. An interval is a bootstrap over the seeds within each sequence:
+it says how the difference would vary with other seeds on these sequences, and nothing about other sequences.
+"""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.evaluation.compare import CONFIDENCE, RESAMPLES
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sweeps.execute import FINISHED
+
+FIXED = " fixed"  # ends the names of configurations that begin with the shared checkpoint, without density control
+NO_PRIOR = "S without prior"
+METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric")
+COMPONENTS = {"A": "appearance", "S": "spectral_motion", "L": "laplacian"}
+MATCHED = ("iterations", "preset", "arrays_sha256")  # keys of a row that are equal in both runs of a pair
+
+
+def model_of(name: str) -> dict[str, dict[str, Any]]:
+    """Settings of a configuration of the ablation: "base", "A+S", "S without prior"."""
+    on = set(name.split(" ")[0].split("+")) if name != "base" else set()
+    changes: dict[str, dict[str, Any]] = {"model": {setting: key in on for key, setting in COMPONENTS.items()}}
+    return changes | ({"loss": {"lambda_msp": 0.0}} if name == NO_PRIOR else {})
+
+
+CONFIGURATIONS = ("base", "A", "S", "L", "A+S", "A+S+L", NO_PRIOR)
+
+
+def ablation_spec(
+    sequences: Iterable[str], seeds: int, *, fixed_at: int | None, chosen: Iterable[str] = CONFIGURATIONS, **keys: Any
+) -> dict[str, Any]:
+    """A sweep of the configurations, as `sweeps.spec.spec_of` takes it.
+
+    seeds     0 .. seeds - 1
+    fixed_at  iteration of the shared checkpoint of the base, from which every configuration is trained again without
+              density control, so that all have the same number of Gaussians; None = not made
+    chosen    names among CONFIGURATIONS
+    keys      other keys of the spec
+    """
+    made: dict[str, Any] = {name: model_of(name) for name in chosen}
+    if fixed_at is not None:
+        start = {"configuration": "base", "iteration": fixed_at}
+        made |= {f"{name}{FIXED}": model_of(name) | {"density": {"until": 0}, "start": start} for name in list(made)}
+        made.setdefault("base", model_of("base"))
+    return {"sequences": list(sequences), "seeds": list(range(seeds)), "configurations": made, **keys}
+
+
+class Comparison(NamedTuple):
+    """A claim: what `with_` gains over `without`."""
+
+    claim: str
+    with_: str
+    without: str
+    published: float | None = None  # PSNR full, dB, as the paper states it
+
+
+COMPARISONS = (
+    Comparison("A, temporal appearance", "A", "base", 0.29),
+    Comparison("S, spectral motion", "S", "base", 0.04),
+    Comparison("L, Laplacian detail", "L", "base", 0.12),
+    Comparison("S beside A", "A+S", "A"),
+    Comparison("A beside S", "A+S", "S"),
+    Comparison("A and S together", "A+S", "base"),
+    Comparison("L beside A and S", "A+S+L", "A+S"),
+    Comparison("all three", "A+S+L", "base"),
+    Comparison("Matérn prior", "S", NO_PRIOR, 0.0),
+    Comparison("A, fixed count", f"A{FIXED}", f"base{FIXED}"),
+    Comparison("S, fixed count", f"S{FIXED}", f"base{FIXED}"),
+    Comparison("L, fixed count", f"L{FIXED}", f"base{FIXED}"),
+    Comparison("all three, fixed count", f"A+S+L{FIXED}", f"base{FIXED}", 0.25),
+    Comparison("Matérn prior, fixed representation", f"S{FIXED}", f"{NO_PRIOR}{FIXED}", 0.0),
+)
+
+
+class Estimate(NamedTuple):
+    """Of a paired difference. Limits are None with fewer than two pairs in every sequence."""
+
+    mean: float
+    mean_low: float | None
+    mean_high: float | None
+    median: float
+    median_low: float | None
+    median_high: float | None
+    pairs: int
+    sequences: int
+
+
+class Increment(NamedTuple):
+    """A comparison on one split and metric."""
+
+    comparison: Comparison
+    split: str
+    metric: str
+    estimate: Estimate
+    pairs: list[dict[str, Any]]  # sequence, seed and difference of each
+
+
+def increments(rows: Iterable[dict[str, Any]], seed: int = 0) -> list[Increment]:
+    """Every comparison for which there are finished pairs.
+
+    rows     of results.json
+    seed     of the resampling
+    Raises:  InputError if the two runs of a pair do not have the same input.
+    """
+    finished = [row for row in rows if row["status"] == FINISHED]
+    found = []
+    for split in dict.fromkeys(row["split"] for row in finished):
+        for comparison in COMPARISONS:
+            for metric in METRICS:
+                pairs = paired(finished, comparison, split, metric)
+                if pairs:
+                    found.append(Increment(comparison, split, metric, estimate(pairs, seed), pairs))
+    return found
+
+
+def paired(rows: list[dict[str, Any]], comparison: Comparison, split: str, metric: str) -> list[dict[str, Any]]:
+    """The differences of the runs that have both a partner and a value."""
+    with_, without = (
+        {(row["sequence"], row["seed"]): row for row in rows if row["split"] == split and row["configuration"] == name}
+        for name in (comparison.with_, comparison.without)
+    )
+    pairs = []
+    for key in with_:
+        if key not in without:
+            continue
+        a, b = with_[key], without[key]
+        _refuse_other_input(a, b)
+        if a.get(metric) is not None and b.get(metric) is not None:
+            pairs.append({"sequence": key[0], "seed": key[1], "difference": a[metric] - b[metric]})
+    return pairs
+
+
+def _refuse_other_input(a: dict[str, Any], b: dict[str, Any]) -> None:
+    for key in MATCHED:
+        if a.get(key) != b.get(key):
+            raise InputError(f"{a['name']} and {b['name']}: differ in {key}; allowed: runs on the same input")
+
+
+def estimate(pairs: list[dict[str, Any]], seed: int = 0) -> Estimate:
+    """Mean and median over the seeds of each sequence, averaged over the sequences, with bootstrap intervals."""
+    groups: dict[str, list[float]] = {}
+    for pair in pairs:
+        groups.setdefault(pair["sequence"], []).append(pair["difference"])
+    samples = tuple(np.array(values) for values in groups.values())
+    numbers: list[float | None] = []
+    for middle in (np.mean, np.median):
+        value = float(np.mean([middle(sample) for sample in samples]))
+        numbers += [value, *_interval(samples, middle, seed)]
+    return Estimate(*numbers, len(pairs), len(samples))  # pyright: ignore[reportArgumentType]
+
+
+def _interval(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float | None, float | None]:
+    """Percentile bootstrap of the average over the samples of their means or medians."""
+    from scipy.stats import bootstrap
+
+    if min(map(len, samples)) < 2:
+        return None, None
+
+    def averaged(*drawn: FloatArray, axis: int = -1) -> FloatArray:
+        return np.mean([middle(sample, axis=axis) for sample in drawn], axis=0)
+
+    found = bootstrap(
+        samples, averaged, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile", vectorized=True,
+        rng=np.random.default_rng(seed),
+    ).confidence_interval  # fmt: skip
+    return float(found.low), float(found.high)
+
+
+def levels(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Mean of every configuration and split for each metric, sequences weighted equally, with its number of runs."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        if row["status"] == FINISHED:
+            groups.setdefault((row["split"], row["configuration"]), []).append(row)
+    found = []
+    for (split, configuration), members in groups.items():
+        values = {name: _equal_weights(members, name) for name in (*METRICS, "gaussians", "training_psnr_tissue")}
+        found.append({"split": split, "configuration": configuration, "runs": len(members), **values})
+    return found
+
+
+def _equal_weights(rows: list[dict[str, Any]], key: str) -> float | None:
+    groups: dict[str, list[float]] = {}
+    for row in rows:
+        if row.get(key) is not None:
+            groups.setdefault(row["sequence"], []).append(float(row[key]))
+    return float(np.mean([np.mean(values) for values in groups.values()])) if groups else None

@@ -1,0 +1,144 @@
+"""The result of an ablation as JSON, Markdown and a picture with intervals.
+
+In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, written anew after every run.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from endotsr.report import style
+from endotsr.report.tables import markdown
+from endotsr.runs.files import replace_file, write_json
+from endotsr.runs.machine import machine, now, versions
+from endotsr.sweeps.ablation import Increment, increments, levels
+from endotsr.sweeps.execute import FAILED, FINISHED
+
+FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
+FILES = ("ablation.json", "ablation.md", "ablation.png")
+ROW_KEYS = (
+    "name", "sequence", "split", "configuration", "seed", "iterations", "gaussians", "seconds", "psnr_full",
+    "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric", "training_psnr_full", "training_psnr_tissue",
+    "cross_fade_psnr_full", "cross_fade_psnr_tissue", "preset", "width", "height", "threads", "baselines", "measures",
+)  # fmt: skip
+SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
+
+
+def ablation_record(rows: list[dict[str, Any]], command: list[str]) -> dict[str, Any]:
+    """The content of ablation.json. Raises InputError if two runs of a pair do not have the same input."""
+    return {
+        "format": FORMAT,
+        "date": now(),
+        "command": command,
+        "machine": machine(),
+        "versions": versions(),
+        "runs": {
+            "planned": len(rows),
+            "finished": sum(row["status"] == FINISHED for row in rows),
+            "failed": [row["name"] for row in rows if row["status"] == FAILED],
+        },
+        "levels": levels(rows),
+        "increments": [_increment(found) for found in increments(rows)],
+        "rows": [{key: row[key] for key in ROW_KEYS if key in row} for row in rows if row["status"] == FINISHED],
+    }
+
+
+def _increment(found: Increment) -> dict[str, Any]:
+    c = found.comparison
+    about = {"claim": c.claim, "with": c.with_, "without": c.without, "published": c.published}
+    return about | {"split": found.split, "metric": found.metric, **found.estimate._asdict(), "of": found.pairs}
+
+
+def write_ablation(out: Path, rows: list[dict[str, Any]], command: list[str]) -> dict[str, Any]:
+    """Write the three files in the folder of the sweep; returns the content of ablation.json. Raises OSError."""
+    record = ablation_record(rows, command)
+    write_json(out / FILES[0], record)
+    text = ablation_markdown(record) + "\n"
+    replace_file(out / FILES[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    if record["increments"]:
+        draw(record, out / FILES[2])
+    return record
+
+
+def ablation_markdown(record: dict[str, Any]) -> str:
+    """Means of the configurations, and the differences with intervals, split by split."""
+    runs = record["runs"]
+    parts = [f"{runs['finished']} of {runs['planned']} runs finished, {len(runs['failed'])} failed."]
+    for split in dict.fromkeys(level["split"] for level in record["levels"]):
+        parts += [f"Held out: {split}", level_table(record, split)]
+        if any(found["split"] == split for found in record["increments"]):
+            parts.append(increment_table(record, split))
+    return "\n\n".join(parts)
+
+
+def level_table(record: dict[str, Any], split: str) -> str:
+    """Means of the configurations on a split, sequences weighted equally."""
+    chosen = [level for level in record["levels"] if level["split"] == split]
+    columns = [column for column in SHOWN if any(level[column[0]] is not None for level in chosen)]
+    rows = [
+        [level["configuration"], str(level["runs"]), *(_number(level[key], d) for key, _, d in columns),
+         _number(level["gaussians"], 0)]
+        for level in chosen
+    ]  # fmt: skip
+    return markdown(["configuration", "runs", *(head for _, head, _ in columns), "Gaussians"], rows)
+
+
+def increment_table(record: dict[str, Any], split: str) -> str:
+    """Paired differences on a split: mean, its interval, median, and what the paper states."""
+    rows = []
+    for found in record["increments"]:
+        digits = next((d for key, _, d in SHOWN if key == found["metric"]), None)
+        if found["split"] != split or digits is None:
+            continue
+        label = next(head for key, head, _ in SHOWN if key == found["metric"])
+        stated = found["published"] if found["metric"] == "psnr_full" else None
+        rows.append([
+            found["claim"], label, _signed(found["mean"], digits), interval_text(found, "mean", digits),
+            _signed(found["median"], digits), interval_text(found, "median", digits), _signed(stated, digits),
+            f"{found['pairs']} on {found['sequences']}",
+        ])  # fmt: skip
+    heads = ("difference", "metric", "mean", "95 % interval", "median", "95 % interval", "published", "pairs")
+    return markdown(heads, rows)
+
+
+def interval_text(found: dict[str, Any], of: str, digits: int) -> str:
+    """The interval of a mean or a median: "-0.02 to +0.11"; "-" where one pair has none."""
+    low, high = found[f"{of}_low"], found[f"{of}_high"]
+    return "-" if low is None or high is None else f"{_signed(low, digits)} to {_signed(high, digits)}"
+
+
+def draw(record: dict[str, Any], path: Path, metric: str = "psnr_full") -> None:
+    """Mean differences with their intervals, one line a comparison, one panel a split; crosses are the paper's."""
+    chosen = [found for found in record["increments"] if found["metric"] == metric]
+    splits = list(dict.fromkeys(found["split"] for found in chosen))
+    count = max(sum(found["split"] == split for found in chosen) for split in splits)
+    figure = style.new_figure(4.0 + 3.2 * len(splits), 1.2 + 0.32 * count)
+    panels = figure.subplots(1, len(splits), squeeze=False)[0]
+    for axes, split in zip(panels, splits, strict=True):
+        _panel(axes, [found for found in chosen if found["split"] == split])
+        style.name_axes(axes, x="difference of PSNR full, dB", title=f"held out: {split}")
+    style.legend(panels[0], loc="best")
+    style.save(figure, path)
+
+
+def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
+    style.plain_axes(axes, grid="x")
+    axes.axvline(0.0, color=style.GREY, linewidth=1.0)
+    places = range(len(chosen))
+    for place, found in zip(places, chosen):
+        low, high = found["mean_low"], found["mean_high"]
+        if low is not None:
+            axes.plot([low, high], [place, place], color=style.BLUE, linewidth=2.0)
+    axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="measured, 95 % interval")
+    stated = [(f["published"], place) for place, f in zip(places, chosen) if f["published"] is not None]
+    if stated:
+        axes.plot(*zip(*stated), "x", color=style.ORANGE, label="published")
+    axes.set_yticks(list(places), [found["claim"] for found in chosen])
+    axes.invert_yaxis()
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _signed(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:+.{digits}f}"

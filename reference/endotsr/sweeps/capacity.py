@@ -1,0 +1,86 @@
+"""How many runs a machine takes at a time, and the threads of each: no core and no memory is given out twice."""
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from endotsr.sequences.checks.cost import estimated_cost, memory_of_machine
+
+MARGIN = 1.4  # measured peaks of a training over the estimate, both presets
+USABLE = 0.9  # of the memory that is free
+CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+
+
+class Size(NamedTuple):
+    """The size of a sequence, as far as memory depends on it."""
+
+    frames: int
+    width: int
+    height: int
+
+
+class Capacity(NamedTuple):
+    """Runs at a time, threads of each, and what the number of runs follows from."""
+
+    workers: int
+    threads: int
+    reason: str
+
+
+def run_bytes(size: Size) -> float:
+    """Estimated memory of one run."""
+    return MARGIN * estimated_cost(size.frames, size.width, size.height, 1).total_bytes
+
+
+def capacity(
+    sizes: list[Size],
+    *,
+    cores: int | None = None,
+    free: float | None = None,
+    workers: int | None = None,
+    threads: int | None = None,
+) -> Capacity:
+    """Workers and threads for runs of these sizes, the largest of which sets the memory of each worker.
+
+    cores, free       of the machine; default: those that this process may use
+    workers, threads  asked for; default: as many runs as fit, with all cores divided among them
+
+    A training on two threads is less than twice as fast as on one, so many runs with few threads finish a sweep sooner
+    than few runs with many.
+    """
+    cores = cores or usable_cores()
+    free = free_memory() if free is None else free
+    needed = max(map(run_bytes, sizes), default=0.0)
+    by_memory = max(1, int(USABLE * free / needed)) if free and needed else cores
+    by_cores = max(1, cores // threads) if threads else cores
+    chosen = workers or max(1, min(len(sizes), by_memory, by_cores))
+    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run" + (f", {free / 1e9:.1f} GB free" if free else "")
+    return Capacity(chosen, threads or max(1, cores // chosen), reason)
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def free_memory() -> float | None:
+    """Bytes that programs can still take, within the limit of a container; None where the system does not say."""
+    found = [value for value in (_available(), _container_limit(), memory_of_machine()) if value is not None]
+    return min(found, default=None)
+
+
+def _available() -> float | None:
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        return next(1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, ValueError, StopIteration):
+        return None
+
+
+def _container_limit() -> float | None:
+    for name in CGROUP_LIMITS:
+        try:
+            return float(Path(name).read_text(encoding="ascii"))
+        except (OSError, ValueError):  # no such file, or the word `max`
+            continue
+    return None

@@ -1,0 +1,206 @@
+"""One run of a sweep, from whatever its folder holds to its numbers.
+
+In: a job, its sequence, a number of threads. Out: an `Outcome`, and the run folder with metrics.json. A folder that is
+finished is left as it is; one that was begun is continued from its last checkpoint, so that a run takes place once,
+wherever and however often it is asked for. Nothing is raised: a failure is an outcome with a reason of one line.
+"""
+
+import errno
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from endotsr.errors import InputError
+from endotsr.runs.files import os_error_line
+from endotsr.runs.folder import RunBusy, RunFolder, create_run, open_run
+from endotsr.sequences.sequence import Sequence
+from endotsr.sweeps.jobs import Job, finished_folder, refuse_other_settings
+from endotsr.sweeps.locks import file_lock, run_lock
+from endotsr.untrusted.names import plain_line
+
+FINISHED, FAILED, INTERRUPTED = "finished", "failed", "interrupted"
+COMMAND = ["endotsr", "sweep"]
+FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
+
+
+class Outcome(NamedTuple):
+    """What became of a run."""
+
+    name: str  # of the job
+    status: str  # finished, failed or interrupted
+    reason: str = ""  # of a failure, one line
+    ends_sweep: bool = False  # no other run can succeed either: the disk is full, say
+
+
+class Silent:
+    """An observer that says nothing, and stops the run when it is asked to."""
+
+    def __init__(self, stop: Callable[[], bool] = lambda: False) -> None:
+        self._stop = stop
+
+    def begin(self, start: int) -> None:
+        """As `runs.training.Observer`."""
+
+    def update(self, entry: dict[str, Any]) -> None:
+        """As `runs.training.Observer`. Raises KeyboardInterrupt if the run is to stop."""
+        if self._stop():
+            raise KeyboardInterrupt
+
+    def say(self, message: str) -> None:
+        """As `runs.training.Observer`."""
+
+    def close(self) -> None:
+        """As `runs.training.Observer`."""
+
+
+def execute(
+    job: Job, threads: int, sequence: Sequence | None = None, stop: Callable[[], bool] | None = None
+) -> Outcome:
+    """Make a run, or what is missing of it.
+
+    threads   of compiled kernels; they change no result
+    sequence  of the job; None = it is read
+    stop      asked after every iteration
+    """
+    from endotsr.kernels.threads import use_threads
+
+    try:
+        if finished_folder(job) is None:
+            use_threads(threads)
+            loaded = loaded_sequence(job) if sequence is None else sequence
+            folder = _trained(job, loaded, threads, Silent(stop or (lambda: False)))
+            with run_lock(folder):
+                _measured(job, folder, loaded)
+    except KeyboardInterrupt:
+        return Outcome(job.name, INTERRUPTED)
+    except MemoryError:
+        return Outcome(job.name, FAILED, "not enough memory; fewer --workers need less")
+    except Exception as error:
+        return Outcome(job.name, FAILED, _reason(error), ends_sweep=_full_disk(error))
+    return Outcome(job.name, FINISHED)
+
+
+def loaded_sequence(job: Job) -> Sequence:
+    """The sequence of a job, read and checked. Raises InputError."""
+    from endotsr.runs.sources import load_sequence
+
+    return load_sequence(job.source, job.config, job.simulator)
+
+
+def _trained(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunFolder:
+    """The folder of the job, trained to the end."""
+    from endotsr.runs.sources import check_same_input
+    from endotsr.runs.training import resume_run
+
+    path = Path(job.folder)
+    if not path.exists():
+        try:
+            return _begun(job, sequence, threads, observer)
+        except InputError:
+            if not path.exists():
+                raise  # otherwise another process has begun it in the meantime
+    folder = open_run(path)
+    refuse_other_settings(job, folder)
+    check_same_input(folder, sequence, job.source)
+    with run_lock(folder):
+        abandoned = job.start is not None and not folder.has_checkpoint  # its first state was not written
+    if abandoned:
+        shutil.rmtree(path)
+        return _begun(job, sequence, threads, observer)
+    while True:
+        try:
+            resume_run(folder, sequence, threads, observer)
+            return folder
+        except RunBusy:
+            with run_lock(folder):
+                pass
+
+
+def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunFolder:
+    """A new run, trained to the end."""
+    from endotsr.runs.model import save_training
+    from endotsr.runs.sources import sequence_record
+    from endotsr.runs.training import start_record, train_new_run, train_run
+
+    record = start_record([*COMMAND, job.name], job.source, sequence, job.config, job.simulator, threads)
+    if job.start is None:
+        return train_new_run(Path(job.folder), record, sequence, job.config, observer)
+    state = _start_state(job, sequence)
+    record["start"] = {"configuration": job.start.configuration, "iteration": job.start.iteration}
+    folder = create_run(Path(job.folder), job.config, record, sequence_record(sequence))
+    with folder.locked():
+        save_training(folder, state, job.config)
+        train_run(folder, state, sequence, job.config, observer)
+    return folder
+
+
+def _start_state(job: Job, sequence: Sequence) -> Any:
+    """The state that the run begins with; it is trained by the first run that needs it, while the others wait."""
+    from endotsr.fitting.checkpoint import load_checkpoint
+    from endotsr.fitting.state import state_from_checkpoint
+
+    path = job.shared_checkpoint
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with file_lock(path.with_suffix(".lock"), wait=True):
+        if not path.exists():
+            _train_start(job, sequence, path)
+    return state_from_checkpoint(load_checkpoint(path), job.config)
+
+
+def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
+    """Train the other configuration to the iteration at which this one begins, with its own schedule."""
+    from endotsr.fitting.compile_ahead import compile_ahead
+    from endotsr.fitting.state import new_training, save_state, workshop
+    from endotsr.fitting.trainer import training_step
+    from endotsr.runs.stopping import stop_asked
+
+    assert job.start is not None
+    config = job.start.config
+    compile_ahead(config, lambda line: None)
+    shop, state = workshop(sequence, config), new_training(sequence, config)
+    while state.iteration < job.start.iteration:
+        training_step(state, shop)
+        if stop_asked():
+            raise KeyboardInterrupt
+    save_state(path, state, config)
+
+
+def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
+    """metrics.json, pictures and report of a trained run; checkpoints that are not wanted are removed."""
+    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.evaluation.measures import measured
+    from endotsr.evaluation.run import measure_run
+    from endotsr.report.run_files import write_evaluation
+    from endotsr.runs.model import load_model
+    from endotsr.runs.records import REPORTED
+    from endotsr.runs.sources import true_positions_of
+
+    if (folder.path / "metrics.json").exists():
+        return
+    model, weights = load_model(folder), load_lpips_weights(job.lpips)
+    truth = true_positions_of(job.source, job.simulator, job.config)
+    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, (), truth)
+    if job.measures:
+        metrics["measures"] = measured(job.measures, model, sequence, job.source)
+    write_evaluation(folder, sequence, metrics, held_out)
+    (folder.path / "checkpoint.previous.npz").unlink(missing_ok=True)
+    if not job.keep_checkpoints:
+        folder.checkpoint.unlink(missing_ok=True)
+
+
+def _reason(error: Exception) -> str:
+    """One line."""
+    if isinstance(error, OSError):
+        return plain_line(os_error_line(error))
+    named = isinstance(error, InputError | FloatingPointError)
+    return plain_line(str(error) if named else f"{type(error).__name__}: {error}")
+
+
+def _full_disk(error: BaseException | None) -> bool:
+    """Whether a full disk is behind an error."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in FULL_DISK:
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -1,0 +1,147 @@
+"""The runs of a sweep, and what their folders say about them.
+
+In: a checked spec, the folder of the sweep and its sequences. Out: one `Job` a run with its settings, name and folder.
+A job holds all that another process or machine needs to make the run.
+"""
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from endotsr.config import Config, lengthened
+from endotsr.errors import InputError
+from endotsr.runs.folder import RunFolder, open_run
+from endotsr.runs.sources import SIMULATED
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.sweeps.spec import Configuration, Spec, Start, split_name, split_settings
+
+RUNS, SHARED = "runs", "shared"  # folders of the runs and of the checkpoints that several runs begin with
+
+
+class Job(NamedTuple):
+    """One run of a sweep."""
+
+    name: str  # unique in the sweep, and the name of its folder
+    sequence: str  # name of the sequence in tables
+    source: str  # its folder, or `simulated`
+    split: str
+    configuration: str
+    seed: int
+    config: Config
+    simulator: SimulatorSettings
+    folder: str  # absolute path of the run folder
+    start: Start | None = None
+    measures: tuple[str, ...] = ()
+    lpips: str | None = None
+    keep_checkpoints: bool = True
+
+    @property
+    def input_key(self) -> str:
+        """Equal for jobs that read the same sequence with the same settings."""
+        return f"{self.source} {msgspec.json.encode([self.config.sequence, self.config.raster.near]).decode()}"
+
+    @property
+    def shared_checkpoint(self) -> Path:
+        """The checkpoint that the run begins with, if it has a `start`."""
+        assert self.start is not None
+        parts = (self.sequence, self.split, self.start.configuration, f"seed{self.seed}", str(self.start.iteration))
+        return Path(self.folder).parents[1] / SHARED / f"{file_word('-'.join(parts))}.npz"
+
+
+def file_word(name: str) -> str:
+    """A name as part of a file name."""
+    return name.replace(" ", "_")
+
+
+def sequence_names(sources: tuple[str, ...]) -> dict[str, str]:
+    """Source -> name in tables: that of its folder. Raises InputError if two folders have one name."""
+    names = {source: source if source == SIMULATED else Path(source).name for source in sources}
+    for source, name in names.items():
+        twice = [other for other in sources if other != source and names[other] == name]
+        if twice:
+            raise InputError(f"{source} and {twice[0]}: two sequences are called {name}; allowed: different names")
+    return names
+
+
+def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> list[Job]:
+    """Every run of a sweep; the first seed of every configuration comes first, so that a short sweep shows them all.
+
+    training_frames   how many the sequence of a job has; the length of a run can depend on it
+    Raises:           InputError for a sequence that cannot be used, or two runs of one name.
+    """
+    names, jobs = sequence_names(spec.sequences), []
+    for seed in spec.seeds:
+        for source in spec.sequences:
+            for split in spec.splits or ("",):
+                for configuration in spec.configurations:
+                    job = _job(spec, configuration, names[source], source, split, seed, out)
+                    jobs.append(_lengthened(job, training_frames(job)))
+    seen: set[str] = set()
+    for job in jobs:
+        if job.name.lower() in seen:
+            raise InputError(f"{job.name}: two runs have this name; allowed: names that differ in more than case")
+        seen.add(job.name.lower())
+    return jobs
+
+
+def _job(spec: Spec, configuration: Configuration, name: str, source: str, split: str, seed: int, out: Path) -> Job:
+    config = _of_run(configuration.config, split, seed)
+    shown = split_name(config.sequence)
+    run = file_word(f"{name}-{shown}-{configuration.name}-seed{seed}")
+    start = None
+    if configuration.start is not None:
+        other, iteration = configuration.start
+        found = next(c for c in spec.configurations if c.name == other)
+        start = Start(_of_run(found.config, split, seed), other, iteration)
+    return Job(
+        run, name, source, shown, configuration.name, seed, config, spec.simulator,
+        str(out.absolute() / RUNS / run), start, spec.measures, spec.lpips, spec.keep_checkpoints,
+    )  # fmt: skip
+
+
+def _of_run(config: Config, split: str, seed: int) -> Config:
+    """The settings with the split and the seed of a run."""
+    sequence = config.sequence
+    if split:
+        sequence = msgspec.structs.replace(sequence, **split_settings(split))
+    return msgspec.structs.replace(
+        config, sequence=sequence, training=msgspec.structs.replace(config.training, seed=seed)
+    )
+
+
+def _lengthened(job: Job, training_frames: int) -> Job:
+    start = job.start
+    if start is not None:
+        start = start._replace(config=lengthened(start.config, training_frames))
+    return job._replace(config=lengthened(job.config, training_frames), start=start)
+
+
+def finished_folder(job: Job) -> RunFolder | None:
+    """The folder of a run that is trained to the end and measured; None if there is still work to do.
+
+    Raises: InputError if the folder holds a run of other settings, or is none.
+    """
+    path = Path(job.folder)
+    if not path.exists():
+        return None
+    folder = open_run(path)
+    refuse_other_settings(job, folder)
+    with contextlib.suppress(InputError):
+        if folder.record().get("status") == "finished" and (path / "metrics.json").is_file():
+            return folder
+    return None
+
+
+def refuse_other_settings(job: Job, folder: RunFolder) -> None:
+    """Raises InputError if the folder holds a run of other settings than those of the job, threads apart."""
+    ours, theirs = msgspec.to_builtins(job.config), msgspec.to_builtins(folder.config())
+    for section, values in ours.items():
+        for key, value in values.items() if isinstance(values, dict) else ():
+            if theirs[section][key] != value and (section, key) != ("training", "threads"):
+                raise InputError(
+                    f"{folder.path}: holds a run with {section}.{key} = {theirs[section][key]!r}, the sweep asks for "
+                    f"{value!r}; allowed: the settings that the sweep began with, or another --out"
+                )

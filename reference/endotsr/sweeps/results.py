@@ -1,0 +1,118 @@
+"""The table of a sweep: one row a run, as JSON, CSV and Markdown, written anew after every run.
+
+In: jobs and what their folders hold. Out: rows of plain values. A row of a finished run is read from its folder; the
+reason of a failed one is kept in results.json alone.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.report.spreadsheet import csv_text
+from endotsr.report.tables import markdown
+from endotsr.runs.files import read_json, replace_file, write_json
+from endotsr.runs.machine import now
+from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
+from endotsr.sweeps.jobs import Job
+
+FORMAT = 1  # of results.json; raised when a key changes its name or meaning
+FILES = ("results.json", "results.csv", "results.md")
+OPEN = "open"  # status of a run that was not made yet, or not to its end
+METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric")
+ABOUT = ("sequence", "split", "configuration", "seed")
+COSTS = ("iterations", "gaussians", "seconds", "peak_memory_bytes")
+BESIDE = ("training_psnr_full", "training_psnr_tissue", "cross_fade_psnr_full", "cross_fade_psnr_tissue")
+SHOWN = (
+    ("psnr_full", "PSNR full", "{:.2f}"), ("psnr_tissue", "PSNR tissue", "{:.2f}"),
+    ("ssim_full", "SSIM full", "{:.4f}"), ("ssim_tissue", "SSIM tissue", "{:.4f}"), ("lpips", "LPIPS", "{:.4f}"),
+    ("training_psnr_tissue", "training PSNR tissue", "{:.2f}"), ("cross_fade_psnr_tissue", "cross-fade", "{:.2f}"),
+    ("gaussians", "Gaussians", "{}"), ("seconds", "seconds", "{:.0f}"),
+)  # fmt: skip
+
+
+def finished_row(job: Job) -> dict[str, Any]:
+    """The numbers of a run that is trained and measured. Raises InputError if its metrics.json lacks a key."""
+    path = Path(job.folder) / "metrics.json"
+    metrics = read_json(path, ("held_out.mean", "training.mean", "run.input.arrays_sha256", "baselines"))
+    run, held_out, inside = metrics["run"], metrics["held_out"], metrics["training"]["mean"]
+    faded = (metrics.get("cross_fade") or {}).get("mean") or {}
+    names = ("psnr_full", "psnr_tissue")
+    return {
+        **about(job),
+        "status": FINISHED,
+        **{name: held_out["mean"].get(name) for name in METRICS},
+        **{f"training_{name}": inside.get(name) for name in names},
+        **{f"cross_fade_{name}": faded.get(name) for name in names},
+        "iterations": run.get("iteration"),
+        "gaussians": run.get("gaussians"),
+        "seconds": run.get("seconds"),
+        "peak_memory_bytes": run.get("peak_memory_bytes"),
+        "threads": run.get("threads"),
+        "preset": run["settings"]["preset"],
+        "width": run["input"].get("width"),
+        "height": run["input"].get("height"),
+        "arrays_sha256": run["input"]["arrays_sha256"],
+        "settings": run["settings"],
+        "per_frame": held_out["per_frame"],
+        "baselines": {name: {"label": row["label"], "mean": row["mean"]} for name, row in metrics["baselines"].items()},
+        "measures": metrics.get("measures", {}),
+        "versions": run.get("versions"),
+        "machine": run.get("machine"),
+    }
+
+
+def about(job: Job) -> dict[str, Any]:
+    """What identifies a run."""
+    return {"name": job.name} | {key: getattr(job, key) for key in ABOUT}
+
+
+def open_row(job: Job, outcome: Outcome | None = None) -> dict[str, Any]:
+    """A run without numbers; failed ones have a reason."""
+    failed = outcome is not None and outcome.status == FAILED
+    return about(job) | ({"status": FAILED, "reason": outcome.reason} if failed and outcome else {"status": OPEN})
+
+
+def failures(out: Path) -> dict[str, str]:
+    """Name -> reason of the runs that failed when the sweep ran last. Raises InputError for a damaged results.json."""
+    path = out / FILES[0]
+    if not path.exists():
+        return {}
+    found = read_json(path, ("rows", "format"))
+    if found["format"] != FORMAT or not isinstance(found["rows"], list):
+        raise InputError(f"{path}: not the results of this version; allowed: a file that `endotsr sweep` wrote")
+    rows = [row for row in found["rows"] if isinstance(row, dict) and row.get("status") == FAILED]
+    return {str(row.get("name")): str(row.get("reason", "")) for row in rows}
+
+
+def write_results(out: Path, rows: list[dict[str, Any]]) -> None:
+    """results.json, results.csv and results.md, each replaced whole. Raises OSError."""
+    write_json(out / FILES[0], {"format": FORMAT, "date": now(), "rows": rows})
+    for name, text in zip(FILES[1:], (results_csv(rows), results_markdown(rows) + "\n"), strict=True):
+        replace_file(out / name, lambda temporary, text=text: temporary.write_text(text, encoding="utf-8"))
+
+
+def results_csv(rows: list[dict[str, Any]]) -> str:
+    """One line a run; an empty cell for a run without the number."""
+    columns = ("name", *ABOUT, "status", *METRICS, *BESIDE, *COSTS, "reason")
+    return csv_text(columns, ([row.get(name) for name in columns] for row in rows))
+
+
+def results_markdown(rows: list[dict[str, Any]]) -> str:
+    """The finished runs as a table, and the failed ones by name with their reasons."""
+    finished = [row for row in rows if row["status"] == FINISHED]
+    failed = [row for row in rows if row["status"] == FAILED]
+    columns = [column for column in SHOWN if any(row.get(column[0]) is not None for row in finished)]
+    cells = (
+        [*(str(row[key]) for key in ABOUT), *(_cell(row.get(key), form) for key, _, form in columns)]
+        for row in finished
+    )
+    parts = [f"{len(finished)} of {len(rows)} runs finished, {len(failed)} failed."]
+    if finished:
+        parts.append(markdown([*ABOUT, *(head for _, head, _ in columns)], cells))
+    if failed:
+        parts.append("\n".join(f"- {row['name']}: {row['reason']}".replace("|", "\\|") for row in failed))
+    return "\n\n".join(parts)
+
+
+def _cell(value: Any, form: str) -> str:
+    return "-" if value is None else form.format(value)

@@ -1,0 +1,188 @@
+"""A sweep from its spec to its table: what is finished is kept, the rest is run, every result is written as it comes.
+
+In: a checked spec and the folder of the sweep; where the runs take place is a function from jobs to outcomes, of this
+machine or of a cluster. Out: the rows of the table, in the order of the spec.
+
+    DIR/runs/NAME/     one run folder a run          DIR/results.json, .csv, .md   the table as it grows
+    DIR/shared/        checkpoints that several runs begin with                    DIR/sweep.lock
+"""
+
+import contextlib
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from endotsr.errors import InputError
+from endotsr.runs.files import refuse_folder
+from endotsr.runs.log import last_iteration
+from endotsr.sequences.sequence import Sequence
+from endotsr.sweeps.capacity import Size
+from endotsr.sweeps.execute import FAILED, FINISHED, Outcome, loaded_sequence
+from endotsr.sweeps.jobs import RUNS, Job, finished_folder, jobs_of
+from endotsr.sweeps.locks import file_lock
+from endotsr.sweeps.results import failures, finished_row, open_row, write_results
+from endotsr.sweeps.spec import Spec
+
+LOCK = "sweep.lock"
+Rows = list[dict[str, Any]]
+
+
+class Reporter(Protocol):
+    """What is told while a sweep runs."""
+
+    def begin(self, steps: int) -> None:
+        """The iterations of all runs that are not finished."""
+
+    def step(self, count: int = 1) -> None:
+        """Iterations that were completed."""
+
+    def say(self, message: str) -> None:
+        """One line of text for the user."""
+
+
+class Inputs:
+    """The sequences of a sweep, each read and checked once before anything runs."""
+
+    def __init__(self, keep: bool) -> None:
+        self._keep = keep  # whether they are needed here, to be sent to a cluster
+        self._sizes: dict[str, tuple[int, Size]] = {}
+        self._sequences: dict[str, Sequence] = {}
+
+    def training_frames(self, job: Job) -> int:
+        """Of the sequence of a job. Raises InputError for a sequence that cannot be used."""
+        return self._of(job)[0]
+
+    def size(self, job: Job) -> Size:
+        """Of the sequence of a job."""
+        return self._of(job)[1]
+
+    def sequence(self, job: Job) -> Sequence:
+        """The sequence of a job."""
+        self._of(job)
+        return self._sequences[job.input_key]
+
+    def _of(self, job: Job) -> tuple[int, Size]:
+        if job.input_key not in self._sizes:
+            sequence = loaded_sequence(job)
+            size = Size(sequence.count, sequence.width, sequence.height)
+            self._sizes[job.input_key] = len(sequence.train_index), size
+            if self._keep:
+                self._sequences[job.input_key] = sequence
+        return self._sizes[job.input_key]
+
+
+Outcomes = Callable[[list[Job], Inputs], Generator[Outcome | None, None, None]]
+
+
+class Plan(NamedTuple):
+    """The runs of a sweep and what is left of them."""
+
+    jobs: list[Job]
+    rows: dict[str, dict[str, Any]]  # by name of the run
+    left: list[Job]
+    failed: dict[str, str]  # runs that failed before and are not tried again: name -> reason
+
+
+def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> Plan:
+    """Every run, and which of them are to be made.
+
+    retry    also those that failed before
+    Raises:  InputError for a sequence or a folder that cannot be used.
+    """
+    jobs, before = jobs_of(spec, out, inputs.training_frames), failures(out)
+    rows = {job.name: finished_row(job) if finished_folder(job) else open_row(job) for job in jobs}
+    failed = (
+        {} if retry else {name: before[name] for name in rows if name in before and rows[name]["status"] != FINISHED}
+    )
+    for job in jobs:
+        if job.name in failed:
+            rows[job.name] = open_row(job, Outcome(job.name, FAILED, failed[job.name]))
+    left = [job for job in jobs if rows[job.name]["status"] != FINISHED and job.name not in failed]
+    return Plan(jobs, rows, left, failed)
+
+
+def run_sweep(
+    spec: Spec,
+    out: Path,
+    outcomes: Outcomes,
+    reporter: Reporter,
+    *,
+    inputs: Inputs,
+    retry: bool = False,
+    on_rows: Callable[[Rows], None] = lambda rows: None,
+) -> Rows:
+    """Make every run that is not finished; the table is written before the first and after each of them.
+
+    outcomes   makes the runs that are left, anywhere; its outcomes come in any order, None when there is none
+    on_rows    called with the rows after each run
+    Raises:    InputError for what cannot be used, for a sweep that is running already, and for a full disk;
+               KeyboardInterrupt with a line that says how to continue.
+    """
+    out = Path(out)
+    refuse_folder(out)
+    (out / RUNS).mkdir(parents=True, exist_ok=True)
+    with file_lock(out / LOCK, f"{out}: another process runs this sweep; wait until it ends, or stop it"):
+        plan = planned(spec, out, inputs, retry)
+        rows = plan.rows
+        write_results(out, list(rows.values()))
+        on_rows(list(rows.values()))
+        for name, reason in plan.failed.items():
+            reporter.say(f"failed before: {name}: {reason}")
+        try:
+            with contextlib.closing(_made(plan, outcomes, inputs, reporter)) as made:
+                for job in made:
+                    write_results(out, list(rows.values()))
+                    on_rows(list(rows.values()))
+                    reporter.say(_line(rows, job))
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"{_count(rows)} runs are finished; the same command continues") from None
+        return list(rows.values())
+
+
+def _made(plan: Plan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter) -> Generator[Job, None, None]:
+    """The jobs as they end, with their rows replaced and the progress shown; closed, it ends what still runs."""
+    if not plan.left:
+        return
+    jobs, watch = {job.name: job for job in plan.left}, Watch(plan.left)
+    reporter.begin(watch.total)
+    with contextlib.closing(outcomes(plan.left, inputs)) as found:
+        for outcome in found:
+            reporter.step(watch.progress())
+            if outcome is None:
+                continue
+            if outcome.ends_sweep:
+                raise InputError(f"{outcome.reason}; {_count(plan.rows)} runs are finished; the same command continues")
+            job = jobs[outcome.name]
+            finished = outcome.status == FINISHED
+            plan.rows[job.name] = finished_row(job) if finished else open_row(job, outcome)
+            yield job
+    reporter.step(watch.progress())
+
+
+class Watch:
+    """The iterations of runs, read from the ends of their logs."""
+
+    def __init__(self, jobs: list[Job]) -> None:
+        self._logs = {job.name: Path(job.folder) / "log.jsonl" for job in jobs}
+        self._seen = {name: last_iteration(log) for name, log in self._logs.items()}
+        self.total = sum(job.config.training.iterations - self._seen[job.name] for job in jobs)
+
+    def progress(self) -> int:
+        """Iterations since the last call; a run that was set back to its checkpoint counts again."""
+        found = {name: last_iteration(log) for name, log in self._logs.items()}
+        steps = sum(found[name] - seen for name, seen in self._seen.items())
+        self._seen = found
+        return max(steps, 0)
+
+
+def _line(rows: dict[str, dict[str, Any]], job: Job) -> str:
+    row = rows[job.name]
+    if row["status"] != FINISHED:
+        return f"{row['status']}: {job.name}" + (f": {row['reason']}" if "reason" in row else "")
+    value = row["psnr_tissue"]
+    shown = "-" if value is None else f"{value:.2f}"
+    return f"{_count(rows)}: {job.name}: PSNR tissue {shown} dB, {row['gaussians']} Gaussians"
+
+
+def _count(rows: dict[str, dict[str, Any]]) -> str:
+    return f"{sum(row['status'] == FINISHED for row in rows.values())} of {len(rows)}"

@@ -1,0 +1,96 @@
+"""The page of claims: what it says is what the results say, and a verdict needs numbers."""
+
+import json
+
+import claims
+import pytest
+from claims_parts import NOT_YET, increment_verdict, level_verdict, protocols, student, tables, verdicts
+from marks import replaced
+
+from endotsr.cli.ablate import AblateOptions
+from endotsr.cli.parts.fields import fields_of
+from endotsr.sweeps.ablation_page import ablation_record
+from endotsr.sweeps.cost import planned_hours
+
+
+@pytest.mark.parametrize("page", [claims.PAGE, claims.GUIDE], ids=lambda page: page.name)
+def test_committed_pages_are_what_the_results_say(page):
+    text = page.read_text(encoding="utf-8")
+    assert "<!-- claims:" in text and replaced(text, claims.parts(), page, "claims") == text
+
+
+def test_without_results_every_claim_says_so():
+    text = verdicts(None, [])
+    rows = [line for line in text.splitlines()[2:]]
+    assert len(rows) == 12 and sum(NOT_YET in row for row in rows) == 11
+    assert "not testable" in rows[-1]
+    assert tables(None) == protocols(None, []) == NOT_YET
+
+
+@pytest.mark.parametrize(
+    "published, low, high, pairs, verdict",
+    [
+        (0.29, 0.2, 0.4, 3, "reproduced"),
+        (0.29, 0.2, 0.4, 2, "not decided: 2 of 3 seeds"),
+        (0.29, None, None, 3, "not decided: 3 of 3 seeds"),
+        (0.29, -0.1, 0.4, 3, "not decided: the interval holds 0 too"),
+        (0.29, -0.1, 0.2, 3, "not reproduced"),
+        (0.29, 0.4, 0.5, 3, "direction reproduced, size not"),
+        (0.29, -0.4, -0.2, 3, "not reproduced: the opposite"),
+        (0.0, -0.005, 0.009, 3, "reproduced"),
+        (0.0, -0.05, 0.02, 3, "not decided: the interval is wider"),
+        (0.0, 0.02, 0.05, 3, "not reproduced"),
+    ],
+)
+def test_verdicts_of_differences(published, low, high, pairs, verdict):
+    assert increment_verdict(published, low, high, pairs) == verdict
+
+
+def test_verdicts_of_levels():
+    assert level_verdict(39.34, 39.0, 39.5, True) == level_verdict(39.34, 40.0, 41.0, True) == "reproduced"
+    assert level_verdict(39.34, 38.0, 39.0, True) == "not reproduced"
+    assert (
+        level_verdict(0.035, 0.03, 0.04, False) == "reproduced"
+        and level_verdict(0.035, 0.04, 0.05, False) != "reproduced"
+    )
+    assert level_verdict(39.34, None, None, True) == "not decided: one seed"
+    mean, low, high = student([39.0, 39.2, 39.4])
+    assert mean == pytest.approx(39.2) and high - low == pytest.approx(2 * 4.30265 * 0.2 / 3**0.5, rel=1e-5)
+
+
+def made_up_record(gain: float) -> dict:
+    """An ablation of two configurations and three seeds."""
+    rows = []
+    for seed in range(3):
+        for name, psnr in (("base", 38.0 + seed), ("A", 38.0 + seed + gain + 0.01 * seed)):
+            rows.append({
+                "name": f"{name}{seed}", "sequence": "pulling", "split": "every_eighth", "configuration": name,
+                "seed": seed, "status": "finished", "psnr_full": psnr, "psnr_tissue": psnr - 1.8, "ssim_full": 0.96,
+                "iterations": 6000, "preset": "paper", "gaussians": 60000,
+                "arrays_sha256": {"images": "a"}, "seconds": 600.0, "threads": 1,
+            })  # fmt: skip
+    return json.loads(json.dumps(ablation_record(rows, ["endotsr", "ablate"])))
+
+
+def test_a_measured_claim_has_verdict_number_and_interval():
+    line = next(x for x in verdicts(made_up_record(0.28), []).splitlines() if x.startswith("| Temporal appearance"))
+    assert "| reproduced | +0.290 dB | +0.280 to +0.300 dB |" in line
+    line = next(x for x in verdicts(made_up_record(-0.5), []).splitlines() if x.startswith("| Temporal appearance"))
+    assert "| not reproduced: the opposite |" in line
+    assert "6 of 6 runs" in tables(made_up_record(0.28))
+
+
+def test_hours_follow_the_model():
+    assert planned_hours(15, 2, 30.0, begin=0.0) == pytest.approx(8 * 30 / 60)
+    assert planned_hours(15, 4, 30.0, threads=2, begin=0.0) == pytest.approx(8 * 15 / 60)
+    assert planned_hours(15, 64, 30.0, begin=1.0) == pytest.approx(31 / 60)
+    assert planned_hours(0, 2, 30.0) == 0.0
+    with pytest.raises(ValueError, match="no worker"):
+        planned_hours(3, 1, 30.0, threads=2)
+
+
+def test_the_commands_of_the_page_have_the_options_that_exist():
+    text = claims.PAGE.read_text(encoding="utf-8") + claims.GUIDE.read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if line.startswith("endotsr ablate ")]
+    names = {field.name for field in fields_of(AblateOptions)}
+    assert lines and all(word in names for line in lines for word in line.split() if word.startswith("--"))

@@ -1,0 +1,71 @@
+"""`endotsr ablate` from the command line to its three files."""
+
+import json
+
+import pytest
+from tiny_sweep import rows_of
+
+from endotsr.cli.main import main
+
+WORDS = (
+    *("ablate", "simulated", "--preset", "demo", "--iterations", "12", "--seeds", "1", "--workers", "1"),
+    *("--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"),
+    *("--configurations", "base", "A", "--measures", "depth"),
+)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ablate")
+    assert main([*WORDS, "--out", str(folder / "out"), "--json", str(folder / "ablation.json")]) == 0
+    return folder
+
+
+def test_configurations_differ_in_their_components_and_fixed_ones_in_no_gaussian(done):
+    rows = {row["configuration"]: row for row in rows_of(done / "out").values()}
+    assert set(rows) == {"base", "A", "base fixed", "A fixed"}
+    for name, row in rows.items():
+        model = row["settings"]["model"]
+        assert model["appearance"] == name.startswith("A") and not model["spectral_motion"] and not model["laplacian"]
+        assert row["measures"]["depth"]["rows"][0]["label"] == "this model"
+    assert rows["base fixed"]["gaussians"] == rows["A fixed"]["gaussians"]
+    assert not list((done / "out").glob("runs/*/checkpoint*.npz"))  # a model is kept on request
+    assert len(list((done / "out" / "shared").glob("*.npz"))) == 1
+
+
+def test_the_results_are_paired_and_written_three_times_over(done):
+    record = json.loads((done / "ablation.json").read_text())
+    assert record == json.loads((done / "out" / "ablation.json").read_text())
+    found = {(f["claim"], f["metric"]): f for f in record["increments"]}
+    rows = {row["configuration"]: row for row in record["rows"]}
+    entry = found["A, temporal appearance", "psnr_tissue"]
+    assert entry["mean"] == pytest.approx(rows["A"]["psnr_tissue"] - rows["base"]["psnr_tissue"])
+    assert entry["mean_low"] is None and entry["pairs"] == 1
+    assert ("A, fixed count", "psnr_full") in found
+    assert "A, temporal appearance" in (done / "out" / "ablation.md").read_text()
+    assert (done / "out" / "ablation.png").stat().st_size > 1000
+
+
+def test_collect_writes_the_finished_runs_and_trains_nothing(done, capsys):
+    more = [word if word != "1" else "2" for word in WORDS[:8]] + list(WORDS[8:])
+    assert more[more.index("--seeds") + 1] == "2"
+    assert main([*more, "--out", str(done / "out"), "--collect"]) == 0
+    assert "4 of 8 runs finished, 0 failed." in capsys.readouterr().out
+    assert len(list((done / "out" / "runs").iterdir())) == 4
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [(["--seeds", "0"], "--seeds 0 is not allowed"), (["--iterations", "1"], "--iterations 1 is not allowed"),
+     (["--configurations", "B"], "'B' is not allowed; allowed: base, A, S, L"),
+     (["--splits", "middle"], "splits = 'middle' is not allowed"), (["--measures", "beauty"], "allowed: depth")],
+)  # fmt: skip
+def test_mistakes_are_one_line(tmp_path, capsys, words, said):
+    assert main(["ablate", "simulated", "--out", str(tmp_path / "out"), *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+
+
+def test_a_folder_is_needed(capsys):
+    assert main(["ablate", "simulated"]) == 2
+    assert "--out DIR is missing" in capsys.readouterr().err

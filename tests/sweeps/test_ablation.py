@@ -1,0 +1,123 @@
+"""Paired differences: known numbers, equal weights, matched input, honest intervals."""
+
+import json
+
+import numpy as np
+import pytest
+
+from endotsr.errors import InputError
+from endotsr.sweeps.ablation import (
+    COMPARISONS,
+    CONFIGURATIONS,
+    FIXED,
+    ablation_spec,
+    estimate,
+    increments,
+    levels,
+    model_of,
+)
+from endotsr.sweeps.ablation_page import FILES, ablation_record, interval_text, write_ablation
+from endotsr.sweeps.spec import spec_of
+
+
+def row(configuration, seed, psnr, sequence="one", split="every_eighth", **more):
+    """A finished run."""
+    name = f"{sequence}-{split}-{configuration}-seed{seed}"
+    about = {"name": name, "sequence": sequence, "split": split, "configuration": configuration, "seed": seed}
+    same = {"iterations": 30, "preset": "paper", "arrays_sha256": {"images": sequence}, "gaussians": 100 + seed}
+    return about | same | {"status": "finished", "psnr_full": psnr, "psnr_tissue": psnr - 1.8, "lpips": None} | more
+
+
+def open_row(configuration, seed):
+    return row(configuration, seed, 0.0) | {"status": "open"}
+
+
+def pairs(**groups):
+    return [
+        {"sequence": name, "seed": k, "difference": v} for name, values in groups.items() for k, v in enumerate(values)
+    ]
+
+
+def test_a_difference_is_paired_by_seed():
+    """The levels of the seeds are far apart, the differences are not."""
+    rows = [row("base", s, 30.0 + 5 * s) for s in range(3)] + [row("A", s, 30.2 + 5 * s + 0.1 * s) for s in range(3)]
+    found = next(f for f in increments(rows) if f.metric == "psnr_full")
+    assert found.comparison.claim == "A, temporal appearance" and found.comparison.published == 0.29
+    assert found.estimate.mean == pytest.approx(0.3) and found.estimate.median == pytest.approx(0.3)
+    assert 0.199 <= found.estimate.mean_low < 0.3 < found.estimate.mean_high <= 0.401
+    assert [p["seed"] for p in found.pairs] == [0, 1, 2]
+
+
+def test_sequences_have_equal_weights_whatever_their_seeds():
+    found = estimate(pairs(many=[1.0, 1.0, 1.0, 1.0, 1.0, 1.0], few=[0.0, 0.0]))
+    assert found.mean == found.median == 0.5 and (found.pairs, found.sequences) == (8, 2)
+    rows = [row("base", s, 30.0) for s in range(6)] + [row("base", s, 20.0, "two") for s in range(2)]
+    assert levels(rows)[0]["psnr_full"] == 25.0 and levels(rows)[0]["runs"] == 8
+
+
+def test_one_seed_has_no_interval():
+    found = estimate(pairs(a=[0.4], b=[0.6, 0.8]))
+    assert found.mean == pytest.approx(0.55) and found.mean_low is None and found.median_high is None
+    assert interval_text(found._asdict(), "mean", 2) == "-"
+
+
+def test_the_interval_is_that_of_the_seeds_within_each_sequence():
+    """Two constant sequences that differ: seeds change nothing, so the interval is a point."""
+    found = estimate(pairs(a=[1.0, 1.0, 1.0], b=[3.0, 3.0, 3.0]))
+    assert (found.mean_low, found.mean_high) == (2.0, 2.0)
+
+
+def test_the_interval_covers_the_true_difference_about_as_often_as_it_says():
+    rng, covered = np.random.default_rng(3), 0
+    for k in range(60):
+        found = estimate(pairs(a=list(rng.normal(0.2, 1.0, 20)), b=list(rng.normal(0.2, 1.0, 20))), seed=k)
+        covered += found.mean_low <= 0.2 <= found.mean_high
+    assert 50 <= covered <= 60
+
+
+@pytest.mark.parametrize("key, value", [("iterations", 31), ("preset", "sharp"), ("arrays_sha256", {"images": "x"})])
+def test_runs_on_other_input_are_no_pair(key, value):
+    with pytest.raises(InputError, match=f"differ in {key}"):
+        increments([row("base", 0, 30.0), row("A", 0, 30.0, **{key: value})])
+
+
+def test_what_is_not_finished_is_no_pair():
+    assert increments([row("base", 0, 30.0), open_row("A", 0), row("A", 1, 31.0)]) == []
+
+
+def test_every_comparison_is_between_configurations_that_are_made():
+    made = ablation_spec(["simulated"], 3, fixed_at=3000)["configurations"]
+    named = {name for c in COMPARISONS for name in (c.with_, c.without)}
+    assert named <= set(made) and set(CONFIGURATIONS) <= set(made)
+    assert len(made) == 2 * len(CONFIGURATIONS)
+
+
+def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
+    spec = spec_of(ablation_spec(["simulated"], 3, fixed_at=3000), "test", tmp_path)
+    configs = {c.name: c for c in spec.configurations}
+    for c in COMPARISONS:
+        one, other = configs[c.with_], configs[c.without]
+        assert one.start == other.start
+        assert one.config.density == other.config.density and one.config.training == other.config.training
+        prior = "prior" in c.claim
+        assert (one.config.loss != other.config.loss) == prior and (one.config.model != other.config.model) != prior
+    fixed = configs[f"A{FIXED}"]
+    assert fixed.start == ("base", 3000) and fixed.config.density.until == 0
+    assert model_of("S without prior")["loss"] == {"lambda_msp": 0.0}
+
+
+def test_the_files_hold_what_was_measured(tmp_path):
+    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "A") for s in range(3)]
+    record = write_ablation(tmp_path, [*rows, open_row("S", 0)], ["endotsr", "ablate"])
+    assert json.loads((tmp_path / FILES[0]).read_text()) == json.loads(json.dumps(record))
+    assert record["runs"] == {"planned": 7, "finished": 6, "failed": []}
+    text = (tmp_path / FILES[1]).read_text()
+    assert "| A, temporal appearance | PSNR full, dB | +0.25 | +0.25 to +0.25 | +0.25 |" in text
+    assert "+0.29 | 3 on 1 |" in text
+    assert (tmp_path / FILES[2]).read_bytes()[:4] == b"\x89PNG"
+
+
+def test_without_a_pair_there_is_no_picture(tmp_path):
+    record = write_ablation(tmp_path, [open_row("base", 0)], [])
+    assert record["increments"] == [] and not (tmp_path / FILES[2]).exists()
+    assert ablation_record([], [])["runs"]["planned"] == 0

@@ -1,0 +1,36 @@
+"""Workers and threads: no core and no memory is given out twice."""
+
+import pytest
+
+from endotsr.sweeps.capacity import Size, capacity, free_memory, run_bytes
+
+FULL = Size(63, 640, 512)
+
+
+@pytest.mark.parametrize("cores", [1, 2, 3, 8, 64])
+@pytest.mark.parametrize("runs", [1, 3, 40])
+@pytest.mark.parametrize("free", [1e9, 5e9, 24e9, 1e12])
+def test_cores_and_memory_suffice(cores, runs, free):
+    found = capacity([FULL] * runs, cores=cores, free=free)
+    assert 1 <= found.workers <= min(runs, cores) and found.workers * found.threads <= cores
+    assert found.workers == 1 or found.workers * run_bytes(FULL) <= free
+
+
+def test_the_largest_sequence_sets_the_memory():
+    small = Size(63, 160, 128)
+    assert capacity([small] * 8, cores=8, free=8e9).workers > capacity([small] * 7 + [FULL], cores=8, free=8e9).workers
+
+
+def test_what_is_asked_for_is_kept():
+    assert capacity([FULL] * 9, cores=2, free=1e9, workers=3)[:2] == (3, 1)
+    assert capacity([FULL] * 9, cores=8, free=1e12, threads=4)[:2] == (2, 4)
+
+
+def test_a_run_of_full_size_needs_what_was_measured():
+    """Runs of this size were measured at 1.7 (paper) and 2.3 GB (sharp)."""
+    assert 2.3e9 < run_bytes(FULL) < 3.5e9
+
+
+def test_memory_of_this_machine_is_found():
+    found = free_memory()
+    assert found is None or 1e6 < found < 1e15

@@ -1,0 +1,144 @@
+"""A sweep through a real Dask scheduler and real worker processes; skipped without Dask."""
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from tiny_sweep import (
+    BASE,
+    CONFIGURATIONS,
+    assert_same_checkpoints,
+    iterations,
+    kill,
+    numbers,
+    rows_of,
+    start,
+    wait_until,
+    write_spec,
+)
+
+from endotsr.cli.main import main
+
+pytest.importorskip("distributed", reason="Dask is not installed (pip install 'endotsr[cluster]')")
+
+LENGTH = 150  # iterations, enough to kill a worker in the middle
+
+
+class Cluster:
+    """A scheduler and its workers, each a process."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._processes = folder, []
+        file = folder / "scheduler.json"
+        self._start("scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
+        wait_until(lambda: file.exists() and file.read_text().strip().endswith("}"))
+        self.address = json.loads(file.read_text())["address"]
+
+    def worker(self, name: str, *more: str, **environment: str) -> subprocess.Popen:
+        """Start a worker."""
+        words = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name)
+        local = ("--local-directory", str(self._folder / name))
+        return self._start("worker", self.address, *words, *local, *more, **environment)
+
+    def _start(self, kind: str, *words: str, **environment: str) -> subprocess.Popen:
+        log = (self._folder / f"{kind}.log").open("ab")
+        process = subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *words],
+            env=os.environ | {"MPLBACKEND": "Agg"} | environment,
+            stdout=log,
+            stderr=log,
+        )
+        self._processes.append(process)
+        return process
+
+    def end(self) -> None:
+        """End all processes."""
+        for process in self._processes:
+            with contextlib.suppress(ProcessLookupError):
+                kill(process)
+
+
+@pytest.fixture
+def cluster(tmp_path) -> Iterator[Cluster]:
+    made = Cluster(tmp_path)
+    yield made
+    made.end()
+
+
+def refused(capsys, *words: str) -> str:
+    """What a command says that ends with exit code 2 and one line."""
+    capsys.readouterr()
+    assert main(list(words)) == 2
+    said = capsys.readouterr().err.splitlines()
+    lines = [line for line in said if line.startswith("endotsr: error: ")]
+    assert len(lines) == 1, said
+    return lines[0]
+
+
+def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster, tmp_path):
+    first, _ = cluster.worker("first"), cluster.worker("second")
+    spec = write_spec(tmp_path, iterations=str(LENGTH))
+    out, local = tmp_path / "cluster", tmp_path / "local"
+    sweep = start("sweep", str(spec), "--out", str(out), "--scheduler", cluster.address)
+    runs = out / "runs"
+    # the middle: one run is finished, and two are under way
+    wait_until(lambda: len(list(runs.glob("*/metrics.json"))) >= 1 or sweep.poll() is not None)
+    wait_until(lambda: _under_way(runs) == 2 or sweep.poll() is not None)
+    assert sweep.poll() is None, sweep.communicate()
+    finished = {path.parent.name: path.stat().st_mtime_ns for path in runs.glob("*/metrics.json")}
+    kill(first)
+    said, errors = sweep.communicate(timeout=500)
+    assert sweep.returncode == 0, (said, errors)
+
+    rows = rows_of(out)
+    assert len(rows) == 4 and {row["status"] for row in rows.values()} == {"finished"}
+    for name in rows:
+        assert iterations(runs / name) == list(range(1, LENGTH + 1))  # each iteration once, none lost
+    records = [json.loads((runs / name / "run.json").read_text()) for name in rows]
+    assert sum(len(record["resumed"]) for record in records) == 1  # that of the killed worker went on
+    for name, written in finished.items():
+        assert (runs / name / "metrics.json").stat().st_mtime_ns == written  # what was finished was left alone
+
+    assert main(["sweep", str(spec), "--out", str(local), "--workers", "1"]) == 0
+    assert numbers(out) == numbers(local)
+    assert_same_checkpoints(out, local)
+
+
+def _under_way(runs: Path) -> int:
+    """Runs that have a checkpoint and are not in their last third."""
+    logs = [path for path in runs.glob("*/log.jsonl") if (path.parent / "checkpoint.npz").exists()]
+    return sum(7 < len(path.read_text().splitlines()) < LENGTH * 2 // 3 for path in logs)
+
+
+def test_no_scheduler_is_one_line(capsys, tmp_path):
+    spec = write_spec(tmp_path)
+    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9")
+    assert "tcp://127.0.0.1:9: no Dask scheduler answers; allowed: " in said
+
+
+def test_a_worker_of_another_version_is_one_line(cluster, capsys, tmp_path):
+    (tmp_path / "other_version.py").write_text("import endotsr\nendotsr.__version__ = '9.9'\n")
+    cluster.worker("other", "--preload", str(tmp_path / "other_version.py"))
+    spec = write_spec(tmp_path)
+    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", cluster.address)
+    assert "endotsr 9.9 (here " in said and "allowed: those of this machine" in said
+    assert not list((tmp_path / "out" / "runs").iterdir())
+
+
+def test_a_worker_that_takes_several_runs_is_one_line(cluster, capsys, tmp_path):
+    cluster.worker("wide", "--nthreads", "3")
+    spec = write_spec(tmp_path)
+    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", cluster.address)
+    assert "takes 3 runs at a time; allowed: --nthreads 1" in said
+
+
+def test_no_scheduler_option_without_dask_is_one_line(capsys, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    spec = write_spec(tmp_path, BASE + CONFIGURATIONS)
+    said = refused(capsys, "sweep", str(spec), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9")
+    assert "endotsr[cluster]" in said
