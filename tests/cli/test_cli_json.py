@@ -13,25 +13,29 @@ NOT_ALONE = {"golden", "bench"}  # only with a second word
 WITHOUT = {
     "completion": "prints a script, not a result",
     "bench all": "the folder it writes holds the JSON files of every measurement",
+    "sweep": "the folder it writes holds results.json",
     "tradeoff train": "the folder it writes holds training.json",
 }
 EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), "tradeoff train"]
 EVERY += [f"golden {door}" for door in DOORS] + [f"bench {what}" for what in MEASURES]
+PRINTING = [name for name in EVERY if name not in WITHOUT]
+NUMBERS = range(len(EVERY))  # not the names: `pytest -k gradcheck` selects the gradient checks alone
 
 
-@pytest.mark.parametrize("command", EVERY)
+@pytest.mark.parametrize("command", EVERY, ids=map(str, NUMBERS))
 def test_every_command_that_prints_a_result_writes_json(command, capsys):
     assert main([*command.split(), "--help"]) == 0
     assert ("--json FILE" in capsys.readouterr().out) == (command not in WITHOUT), WITHOUT.get(command, "")
 
 
-@pytest.mark.parametrize("command", [name for name in EVERY if name not in WITHOUT])
+@pytest.mark.parametrize("command", PRINTING, ids=map(str, NUMBERS[: len(PRINTING)]))
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(command, tmp_path, finished_run, capsys):
     """Every command gets enough to begin its work; none of it is done."""
     run, out = str(finished_run), str(tmp_path / "out")
     needed = {
         "demo": ["--out", out], "train": ["simulated", "--out", out], "prepare": [run, "--out", out],
-        "depth": [run], "check": [run], "simulate": ["still", "--out", out], "inspect": [run], "calibrate": [run],
+        "depth": [run], "masks": [run], "ablate": ["simulated", "--out", out],
+        "check": [run], "simulate": ["still", "--out", out], "inspect": [run], "calibrate": [run],
         "render": [run, "--out", out], "view": [run, "--out", f"{out}.html"], "export": [run, "--out", f"{out}.ply"],
         "evaluate": [run], "compare": [run, run], "tradeoff": ["--out", out, "--budget", "10 ms"],
         "golden judge": [run], "golden run": ["--port", "true {requests} {outputs}"], "golden reference": [out],

@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.cli.parts.parser import parse
+from endotsr.runs.files import refuse_unwritable
 
 
 @dataclass
@@ -25,11 +27,14 @@ class MasksOptions:
     """layout of the source instead of the detected one"""
     replace: bool = False
     """replace masks that exist"""
+    json: JsonFile = None
+    """also write what was found as JSON"""
 
 
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
+    refuse_unwritable(options.json)
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal
     from endotsr.sequences.source_options import SourceOptions
@@ -41,10 +46,11 @@ def run(words: list[str]) -> int:
         refuse_existing(options.out)
         recording = open_recording(options.sequence, SourceOptions(layout=options.layout))
         proposal, place = write_proposal(recording, options.out), options.out
+    fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
+    write_result(options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction)
     if not proposal.found:
         print(f"{options.sequence}: no masks proposed: {proposal.reason}; nothing was written")
         return 1
-    fraction = sum(float(plane.mean()) for plane in proposal.excluded) / len(proposal.excluded)
     print(f"{options.sequence}: {proposal.reason}; {fraction:.1%} of the pixels are excluded")
     print(f"these masks are proposals: look at {place / OVERLAY} before a training")
     return 0

@@ -194,6 +194,11 @@ def warp_bilinear(image: Array, flow: Array) -> Array:
     return sample_bilinear(image, np.arange(width)[None, :] + flow[0], np.arange(height)[:, None] + flow[1])
 
 
+def gaussian_blur(plane: Array, deviation: float) -> NDArray[np.float32]:
+    """A float32 plane (H, W) averaged by a Gaussian window of this standard deviation in px; mirrored at the border."""
+    return _cv2().GaussianBlur(plane, (0, 0), deviation)
+
+
 def sample_bilinear(image: Array, x: Array, y: Array) -> Array:
     """image[..., y, x] by bilinear interpolation; outside, the nearest border value.
 

@@ -104,15 +104,15 @@ def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArra
     weights       (2,) of the two frames
     """
     of_moved, of_still = _difference(moved), _difference(still)
-    share = np.where(both, of_moved / (of_moved + of_still), np.float32(0))
-    return (1 - share) * _blended(moved, seen, weights) + share * np.tensordot(weights, still, 1)
+    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the still pair
+    return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)
 
 
 def _difference(pair: FloatArray) -> FloatArray:
     """(H, W) mean squared difference of two pictures (2, 3, H, W) around a pixel, at least `ONE_STEP`."""
-    import cv2
+    from endotsr.opencv import gaussian_blur
 
-    return cv2.GaussianBlur(np.square(pair[0] - pair[1]).mean(axis=0), (0, 0), NEARBY) + np.float32(ONE_STEP)
+    return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)
 
 
 def _blended(pair: FloatArray, usable: BoolArray, weights: FloatArray) -> FloatArray:

@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
-from endotsr.sequences.checks.cost import estimated_cost, memory_of_machine
+from endotsr.kernels.memory import memory_of_machine
+from endotsr.sequences.checks.cost import estimated_cost
 
 MARGIN = 1.4  # measured peaks of a training over the estimate, both presets
 USABLE = 0.9  # of the memory that is free
