@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.runs.files import refuse_unwritable
 
 
