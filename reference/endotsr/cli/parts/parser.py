@@ -6,6 +6,7 @@ what is allowed; no text of argparse is shown or read.
 """
 
 import argparse
+import re
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
