@@ -14,7 +14,9 @@ author = "the endotsr authors"
 copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
-extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs", "unbroken_units"]  # in _extensions
+# Those of docs/_extensions.
+extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]
+extensions += ["unbroken_units", "demo_run"]
 exclude_patterns = ["_build", "_extensions", "conf.py", "pages/**", "results/**"]  # makers and data of other pages
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
