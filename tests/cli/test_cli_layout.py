@@ -49,4 +49,4 @@ def test_pages_of_commands_fit_their_window(finished_run, tmp_path):
     for name in ("report.html", "view.html"):
         (tmp_path / name).write_bytes((finished_run / name).read_bytes())
     found = layout_problems(tmp_path, [*pages, "report.html", "view.html"])
-    assert not found
+    assert not found, "\n".join(map(str, found))
