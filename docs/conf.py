@@ -14,7 +14,9 @@ author = "the endotsr authors"
 copyright = "the endotsr authors, Apache-2.0"  # the name Sphinx gives to this setting
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
-extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]  # in _extensions
+# Those of docs/_extensions.
+extensions += ["paper_equations", "book_pages", "book_links", "api_pages", "notebook_runs"]
+extensions += ["unbroken_units", "demo_run"]
 exclude_patterns = ["_build", "_extensions", "conf.py", "pages/**", "results/**"]  # makers and data of other pages
 source_suffix = {".md": "myst-nb", ".py": "myst-nb", ".rst": "restructuredtext"}
 
@@ -47,6 +49,7 @@ html_static_path = ["_static"]
 html_css_files = ["endotsr.css"]
 # The whole tree of pages beside every page would take most of the time of a build.
 html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True, "collapse_navigation": True}
+html_theme_options |= {"navbar_persistent": []}  # one search, in the sidebar
 html_sidebars = {"_modules/**": []}
 html_show_sphinx = False
 

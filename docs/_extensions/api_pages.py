@@ -10,8 +10,27 @@ from book_pages import NOTE, check_links, golden_links, notebook_links, reverse_
 from docstring_layout import DocstringDirective
 from package_names import ROOT, definitions, modules
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 
 API = ROOT / "docs" / "api"
+GROUPS = (
+    ("Start here", "Load a sequence, train, render, evaluate, save.", ("package",)),
+    (
+        "Recordings and sequences",
+        "From a recording to the arrays that a training reads.",
+        ("sequences", "simulator", "effects", "opencv", "untrusted"),
+    ),
+    ("Training", "What is fitted, how, and what a run keeps.", ("scene", "fitting", "runs")),
+    ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
+    (
+        "The method",
+        "Each forward pass has its reverse pass below it.",
+        ("equations", "splatting", "losses", "kernels"),
+    ),
+    ("Checks and ports", "Gradients, stored numbers, and the registry of both.", ("gradcheck", "golden", "stages")),
+    ("Time and accuracy", "Measurements of this machine.", ("bench", "tradeoff")),
+    ("Commands", "The program `endotsr`.", ("cli",)),
+)  # in the order in which a user meets them
 ROLE = re.compile(r"\{([\w:]+)\}(?=`)")
 
 
@@ -34,14 +53,25 @@ def room_page(room: str, names: list[str]) -> str:
     return "\n".join(lines)
 
 
+def summary(room: str) -> str:
+    """The first sentence of the docstring of a room; that of the package for its modules without a room."""
+    tree = ast.parse(modules()["endotsr" if room == "package" else f"endotsr.{room}"].read_text(encoding="utf-8"))
+    first = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
+    return re.split(r"(?<=\.)\s", first)[0]
+
+
 def index_page() -> str:
-    lines = [
-        NOTE + "# API",
-        "",
-        "Every public function of `endotsr`: shapes, units, edges, errors, and its source.",
-        "",
-    ]
-    return "\n".join([*lines, "```{toctree}", ":maxdepth: 2", "", *sorted(rooms()), "```", ""])
+    """The rooms in the order in which a user meets them. Raises: ExtensionError for a room without a group."""
+    lines = [NOTE + "# API", "", "Every public function of `endotsr`: shapes, units, edges, errors, and its source."]
+    lines += ["A program that uses the package starts with {doc}`/guides/python`.", ""]
+    known = [room for _, _, names in GROUPS for room in names]
+    if sorted(known) != sorted(rooms()):
+        raise ExtensionError(f"rooms without one group in api_pages.GROUPS: {sorted({*known} ^ {*rooms()})}")
+    for title, sentence, names in GROUPS:
+        lines += [f"## {title}", "", sentence, ""]
+        lines += [f"- {{doc}}`{room}`: {summary(room)}" for room in names]
+        lines += ["", "```{toctree}", ":hidden:", "", *names, "```", ""]
+    return "\n".join(lines)
 
 
 def write_api(app: Sphinx) -> None:

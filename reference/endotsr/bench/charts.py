@@ -1,7 +1,7 @@
 """Charts of benchmark results: stacked bars of the stages, and cost against each size.
 
-In: the results of `bench.stages` and `bench.scaling`. Out: a picture file, png or svg. The colours of stages are
-defined here, the rest of the style in `endotsr.report.style`.
+In: the results of `bench.stages` and `bench.scaling`. Out: a picture file, png or svg, in the colours and the style of
+`endotsr.report.style`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,39 +9,47 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.bench.clock import REST, STAGES
-from endotsr.report.style import INK, NORMAL, SMALL, legend, name_axes, new_figure, plain_axes, save
+from endotsr.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    NORMAL,
+    OCHRE,
+    ORANGE,
+    PINK,
+    SMALL,
+    legend,
+    name_axes,
+    new_figure,
+    plain_axes,
+    save,
+)
 
-# Stages of one kind share a hue: time bases blue, splatting orange to red, losses green, optimiser violet.
-COLOURS = {
-    "FDM": "#0b6e99",
-    "Fourier": "#a9d3e6",
-    "projection": "#7f2704",
-    "binning": "#b8480f",
-    "blend forward": "#e8762c",
-    "blend reverse": "#fdb27a",
-    "L1 and SSIM": "#3f6d1c",
-    "pyramid": "#79ab45",
-    "depth and smoothness": "#bfdc9a",
-    "Adam": "#8a4fa3",
-    "density control": "#cfa9df",
-    REST: "#9aa6b0",
+# The stages in five groups: so many colours can be told apart and named. The tables list every stage.
+GROUPS = {
+    "time bases": (("FDM", "Fourier"), BLUE),
+    "splatting": (("projection", "binning", "blend forward", "blend reverse"), ORANGE),
+    "losses": (("L1 and SSIM", "pyramid", "depth and smoothness"), GREEN),
+    "optimiser": (("Adam", "density control"), PINK),
+    "rest": ((REST,), GREY),
 }
-assert set(COLOURS) == {*STAGES, REST}
+assert {stage for stages, _ in GROUPS.values() for stage in stages} == {*STAGES, REST}
 
 
 def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """One stacked bar a case with the stages in their order; the time of the whole iteration is printed at its end."""
+    """One stacked bar a case with the groups of stages; the time of the whole iteration is printed at its end."""
     figure = new_figure(9.6, 1.7 + 0.42 * len(cases))
     axes = figure.subplots()
     labels = [_label(case["case"]) for case in cases]
     left = [0.0] * len(cases)
-    for name, colour in COLOURS.items():
-        widths = [case["stages"][name]["median_ms"] for case in cases]
+    for name, (stages, colour) in GROUPS.items():
+        widths = [sum(case["stages"][stage]["median_ms"] for stage in stages) for case in cases]
         axes.barh(labels, widths, left=left, color=colour, label=name, height=0.72, edgecolor="white", linewidth=0.5)
         left = [a + b for a, b in zip(left, widths)]
     longest = max(left, default=0.0)
     for row, (end, case) in enumerate(zip(left, cases)):
-        text = f"{case['iteration']['median_ms']:.0f} ms"
+        text = f"{case['iteration']['median_ms']:.0f}\u00a0ms"
         axes.text(end + 0.012 * longest, row, text, va="center", color=INK, fontsize=NORMAL.text)
     axes.set_xlim(0, 1.1 * longest)
     axes.invert_yaxis()
@@ -53,12 +61,12 @@ def stage_bars(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
 
 CURVE_COLOURS = {
     "iteration": INK,
-    "splat": "#b8480f",
-    "blending": "#e8762c",
-    "binning": "#7f2704",
-    "time bases": "#0b6e99",
-    "Fourier": "#8a4fa3",
-    "losses": "#5b8c2a",
+    "splat": ORANGE,
+    "blending": OCHRE,
+    "binning": GREY,
+    "time bases": BLUE,
+    "Fourier": PINK,
+    "losses": GREEN,
 }
 
 

@@ -127,6 +127,8 @@ font-variant-numeric:tabular-nums}
 table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;padding:.6rem .9rem 0}
 th,td{padding:.5rem .9rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
+tbody th,td.words{white-space:normal}td.words{text-align:left;min-width:11rem}
+h1,h2,p,dt{overflow-wrap:anywhere}
 thead th{color:var(--soft);font-weight:600;font-size:.8rem;vertical-align:bottom;white-space:normal}
 th:first-child{text-align:left;position:sticky;left:0;background:var(--panel)}
 tbody th{font-weight:500}
@@ -164,8 +166,8 @@ code{font:.85em ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wr
 footer{margin-top:3rem;border-top:1px solid var(--line);padding-top:1rem;color:var(--soft);font-size:.86rem}
 @media(max-width:640px){main{padding:1.3rem .9rem 3rem}.charts{grid-template-columns:1fr}
 .views{grid-auto-flow:row;grid-template-rows:none;grid-template-columns:1fr 1fr}
-.cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}dl{grid-template-columns:1fr}dd{margin-bottom:.4rem}
-tbody th{white-space:normal;min-width:8.5rem}
+.cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}tbody th{min-width:8.5rem}
+dl{grid-template-columns:minmax(0,1fr)}dd{margin-bottom:.4rem}
 .few table,.few thead,.few tbody,.few caption{display:block}
 .few tr{display:grid;grid-template-columns:repeat(var(--cells),minmax(0,1fr));border-bottom:1px solid var(--line)}
 .few tbody tr:last-child{border-bottom:0}

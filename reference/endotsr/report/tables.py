@@ -8,6 +8,7 @@ import html
 import re
 from collections.abc import Iterable, Sequence
 
+LONGEST_VALUE = 32  # characters of a cell that stands on one line
 FEW = 6  # columns of numbers that stand side by side on a telephone
 
 
@@ -35,6 +36,12 @@ def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([body[0], "|" + "---|" * len(columns), *body[1:]])
 
 
+def _cell(content: str) -> str:
+    """A cell; one with a sentence in it breaks its lines."""
+    words = len(re.sub("<[^>]*>", "", content)) > LONGEST_VALUE
+    return f'<td class="words">{content}</td>' if words else f"<td>{content}</td>"
+
+
 def unbroken(name: str) -> str:
     """The name of a quantity, whose unit stays on the line of the comma: `PSNR, dB`."""
     return re.sub(r", (\S+)$", ",\u00a0\1", name)
@@ -58,7 +65,7 @@ def html_table(
     body = []
     for position, (first, *rest) in enumerate(rows):
         kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
-        body.append(f'<tr{kind}><th scope="row">{first}</th>' + "".join(f"<td>{c}</td>" for c in rest) + "</tr>")
+        body.append(f'<tr{kind}><th scope="row">{first}</th>{"".join(map(_cell, rest))}</tr>')
     title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
     few = f' few" style="--cells:{len(names) - 1}' if 2 <= len(names) <= FEW + 1 else ""
     table = f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"

@@ -1,9 +1,13 @@
-"""Labels beside points that do not overlap: each is placed at the first free position around its point."""
+"""Labels beside points: each is placed at the first position around its point that no other label and no line takes."""
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
+STEP = 3.0  # pixels between the points that stand for a line
 COINCIDENT = 4.0  # pixels within which points have one common label
 RADII = (6, 13, 22, 34)  # points of the page
 DIRECTIONS = ((1, 0.5), (-1, -0.5), (1, -0.5), (-1, 0.5), (0, 1), (0, -1))
@@ -31,10 +35,25 @@ def place_labels(figure: Any, labels: list[Label]) -> None:
         room = Bbox.from_extents(*axes.get_window_extent(renderer).extents).padded(2)
         taken = [text.get_window_extent(renderer) for text in axes.texts]
         taken += [_around(axes.transData.transform((label.x, label.y))) for label in mine]
+        lines = _line_points(axes)
         for label in mine:
-            box = _write(label, renderer, room, taken)
+            # A place that no line crosses, or else one that covers no other label and no point.
+            box = _write(label, renderer, room, taken, lines) or _write(label, renderer, room, taken, lines[:0])
             if box is not None:
                 taken.append(box)
+
+
+def _line_points(axes: Any) -> NDArray[np.float64]:
+    """Points in pixels along every line of the axes, (M, 2)."""
+    found = [np.empty((0, 2))]
+    for line in axes.lines:
+        ends = line.get_transform().transform(np.column_stack(line.get_data(orig=False)).astype(float))
+        if line.get_linestyle() in ("None", "") or len(ends) < 2 or not np.isfinite(ends).all():
+            continue
+        for a, b in pairwise(ends):
+            count = max(2, int(np.hypot(*(b - a)) / STEP))
+            found.append(a + np.linspace(0, 1, count)[:, None] * (b - a))
+    return np.concatenate(found)
 
 
 def _merged(labels: list[Label]) -> list[Label]:
@@ -61,7 +80,7 @@ def _around(point: Any) -> Bbox:
     return Bbox.from_bounds(point[0] - 4, point[1] - 4, 8, 8)
 
 
-def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox]) -> Bbox | None:
+def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox], lines: NDArray[np.float64]) -> Bbox | None:
     for radius in RADII:
         for right, up in DIRECTIONS:
             text = label.axes.annotate(
@@ -74,7 +93,8 @@ def _write(label: Label, renderer: Any, room: Bbox, taken: list[Bbox]) -> Bbox |
             )  # fmt: skip
             box = _text_box(text, renderer)
             inside = box.x0 >= room.x0 and box.x1 <= room.x1 and box.y0 >= room.y0 and box.y1 <= room.y1
-            if inside and not any(box.overlaps(other) for other in taken):
+            crossed = box.padded(1).count_contains(lines) if len(lines) else 0
+            if inside and not crossed and not any(box.overlaps(other) for other in taken):
                 return box
             text.remove()
     return None

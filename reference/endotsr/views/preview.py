@@ -27,13 +27,21 @@ WORDS = "The scene over all times: from the observed camera, and from a camera t
 
 def preview(scene: MovingScene) -> Preview | None:
     """The preview of a scene; None if even the lowest quality is larger than PREVIEW_BYTES."""
+    return encoded(preview_pictures(scene), WORDS)
+
+
+def encoded(found: list[ByteImage], words: str) -> Preview | None:
+    """Pictures of one size as a preview; None if even the lowest quality is larger than PREVIEW_BYTES.
+
+    words   what they show
+    """
     from PIL import Image
 
-    pictures = [Image.fromarray(picture) for picture in preview_pictures(scene)]
+    pictures = [Image.fromarray(picture) for picture in found]
     for quality in QUALITIES:
         content = _animated(pictures, quality)
         if len(content) <= PREVIEW_BYTES:
-            return Preview(content, _animated(pictures[:1], quality), *pictures[0].size, WORDS)
+            return Preview(content, _animated(pictures[:1], quality), *pictures[0].size, words)
     return None
 
 

@@ -163,16 +163,23 @@ def converted(kind: Any, word: str) -> Any:
 
 
 def _refused(field: Field, word: str) -> InputError:
-    allowed = allowed_values(field.item) + _written_out(word)
+    allowed = allowed_values(field.item) + _written_out(field, word)
     if "." in field.name:
         return InputError(f"command line: {field.key} = {word!r} is not allowed; allowed: {allowed}")
     return InputError(f"{field.name} {word!r} is not allowed; allowed: {allowed}")
 
 
-def _written_out(word: str) -> str:
-    """Advice for a number with a letter, such as 1k or 1.5M; "" for other words."""
+def _written_out(field: Field, word: str) -> str:
+    """Advice for a number with a letter, such as 1k or 1.5M; "" for other words and options without such numbers."""
     found = re.fullmatch(r"(\d+\.?\d*|\.\d+)([kKM])", word)
-    return f", written out ({float(found[1]) * THOUSANDS[found[2]]:.15g})" if found else ""
+    if found is None:
+        return ""
+    number = f"{float(found[1]) * THOUSANDS[found[2]]:.15g}"
+    try:
+        converted(field.item, number)
+    except ValueError:
+        return ""
+    return f", written out ({number})"
 
 
 def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], Any], default: T | None) -> T:

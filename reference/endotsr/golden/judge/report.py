@@ -101,13 +101,16 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
     )  # fmt: skip
 
 
-_PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{claim}</title><style>
+_PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>{claim}</title><style>
 body{{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:75em;padding:0 1em;color:#1c2430}}
 table{{border-collapse:collapse;width:100%}}td,th{{text-align:left;vertical-align:top;padding:.3em .6em;
 border-bottom:1px solid #dde3ea}}.passed td:first-child{{border-left:4px solid #3a8f5c}}
 .refused td:first-child{{border-left:4px solid #b3392f}}.missing td:first-child{{border-left:4px solid #b8a03a}}
 img{{image-rendering:pixelated;height:120px;margin:.3em .6em .3em 0;border:1px solid #ccd}}figure{{margin:0}}
-figcaption{{color:#5a6675;font-size:13px}}</style></head><body><h1>{claim}</h1><p>{notes}</p>
+figcaption{{color:#5a6675;font-size:13px}}td,li{{overflow-wrap:anywhere}}ul{{padding-left:1.2em}}
+@media(max-width:640px){{tr,td{{display:block}}th{{display:none}}td{{border:0;padding:.1em .6em}}
+tr{{border-bottom:1px solid #dde3ea;padding:.3em 0}}}}</style></head><body><h1>{claim}</h1><p>{notes}</p>
 <table><tr><th>level</th><th></th><th>outputs</th></tr>{levels}</table>{suspects}
 <h2>Cases</h2><table><tr><th>case</th><th>level</th><th>what it is for</th><th>verdict</th></tr>{rows}</table>
 </body></html>
