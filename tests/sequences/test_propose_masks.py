@@ -73,7 +73,8 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     pictures, true = scene("pulling")
     for i, (picture, mask) in enumerate(zip(pictures, true)):
         write_png(clip / "images" / f"{i:06d}.png", picture)
-        write_png(clip / "depth" / f"{i:06d}.png", np.where(mask, 0, 4000 + i).astype(np.uint16))
+        depth = 4000 + i + 10 * np.arange(mask.shape[1])[None, :]
+        write_png(clip / "depth" / f"{i:06d}.png", np.where(mask, 0, depth).astype(np.uint16))
     text = (clip / FILE_NAME).read_text().replace("width = 32", "width = 160").replace("height = 24", "height = 128")
     (clip / FILE_NAME).write_text(text)
     assert len(pictures) == FRAMES and main(["masks", str(clip)]) == 0

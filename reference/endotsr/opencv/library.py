@@ -3,7 +3,6 @@
 from functools import cache
 from typing import Any
 
-
 SILENT = 0  # LOG_LEVEL_SILENT, which the Python module of OpenCV 4 does not name
 
 
