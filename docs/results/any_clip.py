@@ -4,8 +4,8 @@
     python docs/results/any_clip.py --ways stereo  measure one way again
     python docs/results/any_clip.py --table        write the table of the last result again
 
-A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the layout
-of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends: the
+A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the
+layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends: the
 EndoNeRF folder with depth from its own stereo pairs, and a recording whose film has no loss. They separate the cost of
 the depth, of the layout and of the compression.
 The result is docs/results/any_clip.json; the table stands in docs/guides/prepare.md.
@@ -139,8 +139,8 @@ def table(result: dict[str, Any]) -> str:
     about = (
         f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. Against the lossless pictures,"
         f" the depth from stereo changes the PSNR by {by_depth:+.2f} dB, the raw layout by {by_layout:+.2f} dB, and the"
-        f" compression of the film by {by_film:+.2f} dB. The given depth is rounded to whole millimetres. A film that is"
-        f" compressed loses sensor noise, which makes its own held-out frames easier to predict. {result['date']}."
+        f" compression of the film by {by_film:+.2f} dB. The given depth is rounded to whole millimetres. A compressed"
+        f" film loses sensor noise, which makes its own held-out frames easier to predict. {result['date']}."
     )
     return markdown(headings, rows) + "\n\n" + about
 

@@ -65,9 +65,7 @@ def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> 
     recording = partial(stereomis.write_recording, lossless=options.lossless)
     check, write = (stereomis.check_recording, recording) if raw else (folder.check_scene, folder.write_sequence)
     if options.lossless and not raw:
-        raise InputError(
-            "simulate: --lossless belongs to --layout stereomis; the files of the other layout have no loss"
-        )
+        raise InputError("simulate: --lossless belongs to --layout stereomis; files of the other layout have no loss")
     refuse_existing(out)
     check(settings)
     print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)
