@@ -5,9 +5,9 @@
     python docs/results/any_clip.py --table        write the table of the last result again
 
 A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the
-layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends: the
-EndoNeRF folder with depth from its own stereo pairs, and a recording whose film has no loss. They separate the cost of
-the depth, of the layout and of the compression.
+layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends:
+the EndoNeRF folder with depth from its own stereo pairs, and a recording whose film has no loss. They separate the cost
+of the depth, of the layout and of the compression.
 The result is docs/results/any_clip.json; the table stands in docs/guides/prepare.md.
 """
 
