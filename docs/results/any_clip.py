@@ -123,6 +123,8 @@ def table(result: dict[str, Any]) -> str:
     """One way a row, and what separates them."""
     ways, rows = result["ways"], []
     for way, label in WAYS.items():
+        if way not in ways:
+            continue
         row = ways[way]
         film = row.get("film", np.inf)
         depth = f"{row['depth_mm']:.2f}, {row['coverage']:.0%}" if "depth_mm" in row else "given"
@@ -132,15 +134,18 @@ def table(result: dict[str, Any]) -> str:
         )  # fmt: skip
     headings = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM full", "optical flow, dB",
                 "loss of the film, dB", "depth: error in mm, coverage"]  # fmt: skip
-    by_depth, by_film = (
-        ways[a]["lossless"] - ways[b]["lossless"] for a, b in (("stereo", "endonerf"), ("stereomis", "lossless"))
-    )
-    by_layout = ways["lossless"]["lossless"] - ways["stereo"]["lossless"]
+    steps = {
+        "the depth from stereo": ("stereo", "endonerf"),
+        "the raw layout": ("lossless", "stereo"),
+        "the compression of the film": ("stereomis", "lossless"),
+    }
+    if "lossless" not in ways:
+        steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and film": ("stereomis", "stereo")}
+    changes = [f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()]
     about = (
-        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. Against the lossless pictures,"
-        f" the depth from stereo changes the PSNR by {by_depth:+.2f} dB, the raw layout by {by_layout:+.2f} dB, and the"
-        f" compression of the film by {by_film:+.2f} dB. The given depth is rounded to whole millimetres. A compressed"
-        f" film loses sensor noise, which makes its own held-out frames easier to predict. {result['date']}."
+        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR against the"
+        f" lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A compressed film"
+        f" loses sensor noise, which makes its own held-out frames easier to predict. {result['date']}."
     )
     return markdown(headings, rows) + "\n\n" + about
 
