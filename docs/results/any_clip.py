@@ -133,7 +133,7 @@ def table(result: dict[str, Any]) -> str:
              "-" if film is None or not np.isfinite(film) else f"{film:.1f}", depth]
         )  # fmt: skip
     headings = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM full", "optical flow, dB",
-                "loss of the film, dB", "depth: error in mm, coverage"]  # fmt: skip
+                "PSNR of the prepared pictures, dB", "depth: error in mm, coverage"]  # fmt: skip
     steps = {
         "the depth from stereo": ("stereo", "endonerf"),
         "the raw layout": ("lossless", "stereo"),
@@ -143,9 +143,10 @@ def table(result: dict[str, Any]) -> str:
         steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and film": ("stereomis", "stereo")}
     changes = [f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()]
     about = (
-        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR against the"
-        f" lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A compressed film"
-        f" loses sensor noise, which makes its own held-out frames easier to predict. {result['date']}."
+        f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR"
+        f" against the lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A"
+        " compressed film loses sensor noise, which makes its own held-out frames easier to predict."
+        f" {result['date']}."
     )
     return markdown(headings, rows) + "\n\n" + about
 

@@ -36,7 +36,7 @@ class SimulateOptions:
     layout: Literal["endonerf", "stereomis"] = "endonerf"
     """endonerf: pictures, depth, masks and poses; stereomis: stacked film, calibration, trajectory and masks"""
     lossless: bool = False
-    """with the layout stereomis: a film without loss (FFV1) in place of a compressed one"""
+    """with the layout stereomis: a film without loss, in place of a compressed one"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 

@@ -86,10 +86,10 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
 
     pictures  (H, W, 3) uint8 RGB, all of one size with even sides
     rate      pictures a second
-    lossless  FFV1 in place of VP9: `video_pictures` returns the same pictures; few players show such a film
+    lossless  PNG pictures in place of VP9: `video_pictures` returns the same pictures; few players show such a film
     Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode the format.
     """
-    code = "FFV1" if lossless else "vp09"
+    code = "png " if lossless else "vp09"  # of the lossless formats, OpenCV 4 and 5 both put this one into .mp4
     cv2, writer = cv2_library(), None
     try:
         for picture in pictures:
