@@ -83,12 +83,23 @@ def test_the_rest_of_the_way_takes_one_command_each(chain, capsys):
         (["--stereo.on", "false"], ("stereo.on = False does not fit the layout stereomis",)),
         (["--width", "97"], ("width = 97 does not fit a film", "even")),
         (["--layout", "colmap"], ("layout", "endonerf, stereomis")),
+        (["--layout", "endonerf", "--lossless"], ("--lossless belongs to --layout stereomis",)),
     ],
 )
 def test_what_the_layout_cannot_hold_is_refused(tmp_path, capsys, words, named):
     first = ["--layout", "stereomis"] if "--layout" not in words else []
     assert_refused(capsys, ["simulate", *SCENE, *first, *words, "--out", str(tmp_path / "out")], *named)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_without_loss_holds_the_pictures_of_the_other_layout(tmp_path):
+    scene = [*SCENE, "--width", "48", "--height", "40", "--frames", "4"]
+    said("simulate", *scene, "--out", tmp_path / "raw", "--layout", "stereomis", "--lossless")
+    said("simulate", *scene, "--out", tmp_path / "clean")
+    said("prepare", tmp_path / "raw", "--out", tmp_path / "clip")
+    for name in ("images", "images_right"):
+        for file in sorted((tmp_path / "clean" / name).iterdir()):
+            np.testing.assert_array_equal(read_png(tmp_path / "clip" / name / file.name), read_png(file))
 
 
 def test_without_instruments_there_are_no_masks(tmp_path, capsys):

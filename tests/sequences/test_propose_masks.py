@@ -9,8 +9,9 @@ from common_folder import FRAMES, written
 
 from data_folder import data_folder
 from endotsr.cli.main import main
-from endotsr.config import SequenceConfig
+from endotsr.config import PAPER, SequenceConfig
 from endotsr.opencv import read_png, write_png
+from endotsr.sequences.checks.check import check_sequence
 from endotsr.sequences.common import read_common
 from endotsr.sequences.propose_masks import propose_masks
 from endotsr.sequences.sequence_file import FILE_NAME, read_sequence_file
@@ -73,7 +74,8 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     pictures, true = scene("pulling")
     for i, (picture, mask) in enumerate(zip(pictures, true)):
         write_png(clip / "images" / f"{i:06d}.png", picture)
-        write_png(clip / "depth" / f"{i:06d}.png", np.where(mask, 0, 4000 + i).astype(np.uint16))
+        depth = 4000 + i + 10 * np.arange(mask.shape[1])[None, :]
+        write_png(clip / "depth" / f"{i:06d}.png", np.where(mask, 0, depth).astype(np.uint16))
     text = (clip / FILE_NAME).read_text().replace("width = 32", "width = 160").replace("height = 24", "height = 128")
     (clip / FILE_NAME).write_text(text)
     assert len(pictures) == FRAMES and main(["masks", str(clip)]) == 0
@@ -82,6 +84,7 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     assert found.masks is not None and found.masks.proposed and found.masks.excluded_value == "white"
     sequence = read_common(clip, SequenceConfig(), 0.2)
     assert iou(~sequence.masks, true) > 0.7 and any("proposed by a program" in note for note in sequence.notes)
+    assert "proposed-masks" in [finding.code for finding in check_sequence(clip, PAPER).findings]
     assert main(["masks", str(clip)]) == 2 and "has masks already" in capsys.readouterr().err
     assert main(["masks", str(clip), "--replace"]) == 0
 

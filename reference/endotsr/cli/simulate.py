@@ -1,6 +1,7 @@
 """`endotsr simulate`: writes a simulated sequence and its truth as a folder."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -39,6 +40,8 @@ class SimulateOptions:
     """also write what was simulated as JSON"""
     layout: Literal["endonerf", "stereomis"] = "endonerf"
     """endonerf: pictures, depth, masks and poses; stereomis: stacked film, calibration, trajectory and masks"""
+    lossless: bool = False
+    """with the layout stereomis: a film without loss, in place of a compressed one"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 
@@ -72,9 +75,10 @@ def _write(options: SimulateOptions, settings: SimulatorSettings, name: str) -> 
 
     out, raw = options.out, options.layout == "stereomis"
     assert out is not None
-    check, write = (
-        (stereomis.check_recording, stereomis.write_recording) if raw else (folder.check_scene, folder.write_sequence)
-    )
+    recording = partial(stereomis.write_recording, lossless=options.lossless)
+    check, write = (stereomis.check_recording, recording) if raw else (folder.check_scene, folder.write_sequence)
+    if options.lossless and not raw:
+        raise InputError("simulate: --lossless belongs to --layout stereomis; files of the other layout have no loss")
     refuse_existing(out)
     check(settings)
     print(f"{settings.frames} frames of {settings.width}x{settings.height}, seed {settings.seed}", flush=True)

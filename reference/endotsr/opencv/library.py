@@ -13,7 +13,7 @@ def cv2_library() -> Any:
 
     # Its messages on standard error name no file, and every failed call raises or returns nothing.
     if hasattr(cv2, "setLogLevel"):  # OpenCV 4
-        cv2.setLogLevel(SILENT)
+        cv2.setLogLevel(SILENT)  # pyright: ignore[reportAttributeAccessIssue]
     else:  # OpenCV 5
         cv2.utils.logging.setLogLevel(SILENT)
     return cv2

@@ -81,13 +81,15 @@ def _ended(path: Path, position: int) -> InputError:
     return InputError(f"{path}: the video ends after {position} pictures: it is truncated or damaged")
 
 
-def write_video(path: Path, pictures: Iterable[Array], rate: float) -> None:
+def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bool = False) -> None:
     """Write a film in the VP9 format; the ending of the name, .mp4 or .webm, chooses the container.
 
     pictures  (H, W, 3) uint8 RGB, all of one size with even sides
     rate      pictures a second
-    Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode VP9.
+    lossless  PNG pictures in place of VP9: `video_pictures` returns the same pictures; few players show such a film
+    Raises:   InputError if there is no picture, or if this build of OpenCV cannot encode the format.
     """
+    code = "png " if lossless else "vp09"  # of the lossless formats, OpenCV 4 and 5 both put this one into .mp4
     cv2, writer = cv2_library(), None
     try:
         for picture in pictures:
@@ -95,7 +97,7 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float) -> None:
                 height, width = picture.shape[:2]
                 with _silent():  # the library warns of a tag that a webm file does not hold
                     writer = cv2.VideoWriter(
-                        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), float(rate), (width, height)
+                        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*code), float(rate), (width, height)
                     )
                 if not writer.isOpened():
                     raise InputError(f"{path}: this build of OpenCV cannot encode the film; allowed: a name in .gif")

@@ -14,7 +14,7 @@ Comes in: the pictures of a clip; goes out: a `Proposal`, or the reason why ther
 """
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +100,8 @@ def _regions(redness: FloatArray, usual: float) -> list[_Region]:
     grown = ndimage.binary_propagation(redness < SEED * usual, mask=redness < GROW * usual)
     padded = np.pad(ndimage.binary_opening(grown), reach, "edge")  # closing must not retreat from the border
     closed = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
-    labels, count = ndimage.label(ndimage.binary_fill_holes(closed))
+    labels: Any
+    labels, count = ndimage.label(ndimage.binary_fill_holes(closed))  # pyright: ignore[reportGeneralTypeIssues]
     found = []
     for label in range(1, count + 1):
         pixels = labels == label
@@ -137,7 +138,8 @@ def _flow(pictures: list[Picture], i: int) -> NDArray[np.float32] | None:
     other = i + 1 if i + 1 < len(pictures) else i - 1
     if other < 0 or pictures[other].shape != pictures[i].shape:
         return None
-    return dense_flow(*(np.ascontiguousarray(pictures[k].transpose(2, 0, 1)) for k in (i, other)))
+    here, there = (np.ascontiguousarray(pictures[k].transpose(2, 0, 1)) for k in (i, other))
+    return dense_flow(here, there)
 
 
 def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
@@ -145,7 +147,8 @@ def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
     from scipy.ndimage import binary_dilation
 
     reach = max(2, round(RING * max(pixels.shape)))
-    ring = binary_dilation(pixels, iterations=reach) & ~binary_dilation(pixels, iterations=2)
+    near, far = (np.asarray(binary_dilation(pixels, iterations=width), bool) for width in (2, reach))
+    ring = far & ~near
     if not ring.any():
         return False
     inside, around = (np.median(flow[:, part], axis=1) for part in (pixels, ring))
@@ -155,7 +158,9 @@ def _moves_alone(pixels: BoolArray, flow: NDArray[np.float32]) -> bool:
 def _widened(plane: BoolArray) -> BoolArray:
     from scipy.ndimage import binary_dilation
 
-    return binary_dilation(plane, iterations=max(1, round(MARGIN * max(plane.shape)))) if plane.any() else plane
+    if not plane.any():
+        return plane
+    return np.asarray(binary_dilation(plane, iterations=max(1, round(MARGIN * max(plane.shape)))), bool)
 
 
 def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:

@@ -7,7 +7,7 @@
     truth/                    see truth.py
 
 In: settings. Out: files, one frame at a time. The cameras are an ideal pair: without distortion, rectified already. The
-film is compressed as real recordings are, so that the pictures differ from those of `write_sequence`.
+film is compressed as real recordings are, or without loss; then its pictures are those of `write_sequence`.
 """
 
 from collections.abc import Callable, Iterator
@@ -41,9 +41,15 @@ def check_recording(settings: SimulatorSettings) -> None:
 
 
 def write_recording(
-    folder: Path, settings: SimulatorSettings, name: str = "", on_frame: Callable[[], object] = lambda: None
+    folder: Path,
+    settings: SimulatorSettings,
+    name: str = "",
+    on_frame: Callable[[], object] = lambda: None,
+    lossless: bool = False,
 ) -> None:
     """Write a recording and its truth into an existing, empty folder. `on_frame` is called after every frame.
+
+    lossless  a film without loss, which is about ten times as large
 
     Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
     """
@@ -53,7 +59,7 @@ def write_recording(
     scene = make_scene(settings)
     (folder / CALIBRATION).write_text(calibration_text(scene), encoding="utf-8")
     (folder / TRAJECTORY).write_text(trajectory_text(scene), encoding="utf-8")
-    write_video(folder / FILM, _stacked(folder, scene, name, on_frame), RATE)
+    write_video(folder / FILM, _stacked(folder, scene, name, on_frame), RATE, lossless)
 
 
 def _stacked(folder: Path, scene: Scene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:

@@ -107,9 +107,13 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
                 None,
                 "there are no masks",
                 "instruments count as tissue",
-                "supply masks: endotsr prepare --masks",
+                "supply masks (endotsr prepare --masks), or let them be proposed (endotsr masks)",
             )
         )
+    elif file.masks.proposed:
+        what, why = "a program proposed the masks", "what it missed becomes tissue, and nobody has looked at them"
+        remedy = "look at proposed_masks.png"
+        findings.append(Finding("note", "proposed-masks", str(where), None, what, why, remedy))
     if any(file.camera.distortion):
         findings.append(
             Finding(
