@@ -7,6 +7,7 @@ To measure, on a machine that has nothing else to do (each command continues whe
 
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
         --json docs/results/ablation_pulling.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --collect --json ...   what is finished
     endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
 
 A result that is not there is called "not measured yet"; a result of some seeds is shown with their number.
@@ -24,6 +25,7 @@ from endotsr.errors import InputError
 DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
 FILES = {"pulling": "ablation_pulling.json", "simulated": "ablation_simulated.json"}
+COST = "sweep_cost.json"  # by docs/results/sweep_cost.py
 RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
 
 
@@ -40,13 +42,14 @@ def read_runs(folder: Path) -> list[dict[str, Any]]:
 
 def parts(folder: Path = RESULTS) -> dict[str, str]:
     """Every generated part of both pages by name."""
-    found, runs = read(folder), read_runs(folder)
+    found, runs, cost = read(folder), read_runs(folder), folder / COST
     return {
         "verdicts": claims_parts.verdicts(found["pulling"], runs),
         "pulling": claims_parts.tables(found["pulling"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "protocols": claims_parts.protocols(found["pulling"], runs),
         "cost": claims_parts.cost(found["pulling"], runs),
+        "divided": claims_parts.divided(read_json(cost, "docs/results/sweep_cost.py") if cost.exists() else None),
     }
 
 

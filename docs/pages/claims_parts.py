@@ -217,6 +217,22 @@ def _protocol_row(split: str, rows: list[Record]) -> list[str]:
     return [split, str(len(rows)), *model, baseline("two_neighbours"), baseline("flow_interpolation")]
 
 
+def divided(found: Record | None) -> str:
+    """Measured time of one sweep for several divisions of the cores of a machine."""
+    if found is None:
+        return "Not measured yet (`python docs/results/sweep_cost.py`)."
+    first = found["rows"][0]["seconds"]
+    rows = [
+        [str(row["workers"]), str(row["threads"]), f"{row['seconds']:.0f}", f"{np.mean(row['runs']):.0f}",
+         f"{first / row['seconds']:.2f}"]
+        for row in found["rows"]
+    ]  # fmt: skip
+    runs = len(found["rows"][0]["runs"])
+    about = f"{runs} runs of {found['iterations']} iterations, {found['sequence']}, {found['machine']['processor']}."
+    heads = ("runs at a time", "threads of each", "sweep, seconds", "one run, seconds", "speed")
+    return f"{about}\n\n" + markdown(heads, rows)
+
+
 def cost(found: Record | None, runs: list[Record]) -> str:
     """Hours of sweeps on several numbers of cores, from the measured seconds of one run."""
     measured = [(row["seconds"], row["threads"]) for row in (found["rows"] if found is not None else [])

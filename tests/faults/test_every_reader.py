@@ -63,6 +63,7 @@ READERS = {
     "depth/000008.png": TRAIN,
     "poses_bounds.npy": TRAIN,
     "settings.toml": [*TRAIN, "--config", "{sequence}/settings.toml"],
+    "SPEC.toml": ["sweep", "{sequence}/SPEC.toml", "--out", "{out}"],
     "weights.npz": [*TRAIN, "--lpips", "{sequence}/weights.npz"],
     "run/config.toml": ["render", "{run}", "--out", "{out}"],
     "run/run.json": ["evaluate", "{run}"],
@@ -78,6 +79,7 @@ AS_IMAGES = pytest.mark.faults  # not by default
 def place(folder, run):
     """A folder with a sequence, settings, LPIPS weights and a run that has one checkpoint."""
     (folder / "settings.toml").write_text('preset = "paper"\n')
+    (folder / "SPEC.toml").write_text('sequences = ["simulated"]\nconfigurations.base.model.appearance = false\n')
     weights = {"shift": np.zeros(3, np.float32), "scale": np.ones(3, np.float32)}
     for k, (before, after, size) in enumerate(zip(CHANNELS[:-1], CHANNELS[1:], KERNELS), start=1):
         weights[f"conv{k}_weight"] = np.zeros((after, before, size, size), np.float32)

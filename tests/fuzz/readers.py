@@ -119,6 +119,30 @@ def read_settings(path: Path) -> object:
     return load_config(path)
 
 
+def sweep_seeds() -> list[bytes]:
+    text = """sequences = ["simulated"]
+seeds = [0, 1, 2]
+splits = ["every_second", "blocks 4"]
+measures = ["depth"]
+preset = "sharp"
+iterations = 600
+lpips = "weights.npz"
+keep_checkpoints = false
+simulator.frames = 9
+settings.sequence.scale = 0.5
+configurations.base.model.appearance = false
+configurations."A from base".start = { configuration = "base", iteration = 300 }
+configurations."A from base".density.until = 0
+"""
+    return [text.encode()]
+
+
+def read_sweep(path: Path) -> object:
+    from endotsr.sweeps.spec import read_spec
+
+    return read_spec(path)
+
+
 @cache
 def _tiny():
     from endotsr.config import config_from_dict
@@ -290,6 +314,7 @@ READERS = {
     "splats (npz)": Reader("a.npz", scene_seeds, mutate.npz, read_splats),
     "splats (ply)": Reader("a.ply", ply_seeds, mutate.ply, read_splats),
     "settings (toml)": Reader("config.toml", toml_seeds, mutate.lines, read_settings),
+    "sweep (toml)": Reader("SPEC.toml", sweep_seeds, mutate.lines, read_sweep),
     "checkpoint": Reader("checkpoint.npz", checkpoint_seeds, mutate.checkpoint, read_checkpoint),
     "run.json": Reader("run.json", record_seeds, mutate.tree, read_record),
     "sequence.json": Reader("sequence.json", sequence_seeds, mutate.tree, read_sequence),

@@ -52,7 +52,7 @@ def test_names_of_splits_read_back(split):
 
 REFUSED = {
     "no such key": ("colour = 1", "unknown key colour; allowed: sequences, seeds"),
-    "seeds": ("seeds = [-1]", "seeds: -1 is not allowed; allowed: an integer >= 0"),
+    "seeds": ("seeds = [-1]", "seeds: -1 is not allowed; allowed: an integer >= 0 and <= "),
     "seed twice": ("seeds = [1, 1]", "seeds: one is named twice"),
     "no seed": ("seeds = []", "seeds: one is named twice or none at all"),
     "sequence": ('sequences = ["nowhere"]', "sequences = 'nowhere' is not allowed; allowed: a folder, or simulated"),
@@ -62,10 +62,13 @@ REFUSED = {
     "no length": ('splits = ["every_second 2"]', "splits = 'every_second 2' is not allowed"),
     "measure": ('measures = ["beauty"]', "measures = 'beauty' is not allowed; allowed: depth, flicker, right_view"),
     "preset": ('preset = "best"', "preset = 'best' is not allowed; allowed: paper, sharp, demo"),
-    "iterations": ("iterations = 0", "iterations: 0 is not allowed; allowed: an integer >= 1"),
+    "iterations": ("iterations = 0", "iterations: 0 is not allowed; allowed: an integer >= 1 and <= "),
     "switch": ("keep_checkpoints = 1", "keep_checkpoints = 1 is not allowed; allowed: true, false"),
     "simulator": ("simulator.colour = 1", "unknown key simulator.colour"),
     "setting": ("settings.model.apearance = true", "unknown key model.apearance; allowed: appearance"),
+    "preset in settings": ("settings.preset = { a = 1 }", "settings.preset is not allowed; allowed: preset beside"),
+    "long name": ('sequences = ["' + "x" * 5000 + '"]', "is not allowed; allowed: a folder, or simulated"),
+    "large seed": ("seeds = [99999999999999999999]", "allowed: an integer >= 0 and <= "),
     "section": ("settings.model = 3", "model = 3 is not allowed; allowed: a table of keys"),
     "value": ("settings.model.bases = 0", "model.bases = 0 is not allowed; allowed: an integer >= 1"),
     "name": ('configurations."a/b".model.appearance = true', "a/b: the name is not allowed; allowed: letters"),

@@ -110,6 +110,29 @@ def test_what_is_finished_is_not_run_again(whole):
     assert [row["psnr_full"] for row in again] == [row["psnr_full"] for row in rows]
 
 
+def test_a_run_that_was_killed_before_its_last_record_is_finished_without_training(whole, tmp_path):
+    """The last checkpoint is there, run.json still says running, and metrics.json is that of an earlier checkpoint."""
+    import shutil
+
+    spec, out, rows, _ = whole
+    shutil.copytree(out, tmp_path / "out")
+    run = open_run(tmp_path / "out" / "runs" / rows[1]["name"])
+    metrics = json.loads((run.path / "metrics.json").read_text())
+    metrics["run"]["iteration"] = 21
+    metrics["held_out"]["mean"]["psnr_tissue"] = 1.0
+    (run.path / "metrics.json").write_text(json.dumps(metrics))
+    run.update(status="running")
+    made = []
+
+    def make(job):
+        made.append(job.name)
+        return execute(job, 1)
+
+    again = sweep(spec, tmp_path / "out", make)
+    assert made == [rows[1]["name"]] and again[1]["psnr_tissue"] == rows[1]["psnr_tissue"]
+    assert run.record()["status"] == FINISHED and iterations(run.path) == list(range(1, 31))
+
+
 def test_a_finished_run_of_other_settings_is_refused(whole):
     spec, out, _, _ = whole
     other = spec.parent / "other.toml"

@@ -78,7 +78,7 @@ def run(words: list[str]) -> int:
     if options.out is None:
         raise InputError("ablate: --out DIR is missing: the folder of the sweep")
     spec, record = spec_of(spec_data(options), "ablate", Path.cwd()), {}
-    command = ["endotsr", "ablate", *words]
+    command = ["endotsr", "ablate", *(Path(word).name if Path(word).exists() else word for word in words)]
 
     def on_rows(rows: list[dict[str, Any]]) -> None:
         nonlocal record

@@ -108,8 +108,8 @@ def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
     height, width = mask.shape
     if not (depth > 0).any():
         return Moved(np.zeros((3, height, width), np.float32), np.zeros(mask.shape, bool))
-    nearest = distance_transform_edt(depth <= 0, return_distances=False, return_indices=True)
-    filled = np.where(depth > 0, depth, depth[tuple(nearest)])
+    nearest = np.asarray(distance_transform_edt(depth <= 0, return_distances=False, return_indices=True))
+    filled = np.where(depth > 0, depth, depth[nearest[0], nearest[1]])
     shift = sequence.cameras[index].fx * baseline / filled
     rows, columns = np.indices(mask.shape)
     there = np.rint(columns - shift).astype(int)
@@ -120,9 +120,9 @@ def moved_left(sequence: Sequence, index: int, baseline: float) -> Moved:
     x = columns + np.where(seen, sequence.cameras[index].fx * baseline / np.where(seen, front, 1), 0)
     at = np.clip(np.rint(x).astype(int), 0, width - 1)
     counted = seen & (x <= width - 1) & mask[rows, at] & (depth[rows, at] > 0)
-    counted = binary_erosion(counted, iterations=MARGIN)
+    kept: BoolArray = np.asarray(binary_erosion(counted, iterations=MARGIN)).astype(bool)
     picture = sample_bilinear(unit_image(sequence, index), x, rows.astype(float))
-    return Moved(np.where(seen, picture, 0).astype(np.float32), counted)
+    return Moved(np.where(seen, picture, 0).astype(np.float32), kept)
 
 
 def _frame(

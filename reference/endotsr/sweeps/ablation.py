@@ -149,11 +149,9 @@ def estimate(pairs: list[dict[str, Any]], seed: int = 0) -> Estimate:
     for pair in pairs:
         groups.setdefault(pair["sequence"], []).append(pair["difference"])
     samples = tuple(np.array(values) for values in groups.values())
-    numbers: list[float | None] = []
-    for middle in (np.mean, np.median):
-        value = float(np.mean([middle(sample) for sample in samples]))
-        numbers += [value, *_interval(samples, middle, seed)]
-    return Estimate(*numbers, len(pairs), len(samples))  # pyright: ignore[reportArgumentType]
+    mean, median = (float(np.mean([middle(sample) for sample in samples])) for middle in (np.mean, np.median))
+    of_mean, of_median = (_interval(samples, middle, seed) for middle in (np.mean, np.median))
+    return Estimate(mean, *of_mean, median, *of_median, len(pairs), len(samples))
 
 
 def _interval(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float | None, float | None]:

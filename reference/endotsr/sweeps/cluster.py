@@ -6,6 +6,9 @@ a lost worker to another one, which continues it from its checkpoint. Run folder
 this is checked, as are the versions of every worker, because another version gives other numbers.
 """
 
+# Dask is no dependency of this package.
+# pyright: reportMissingImports=false
+
 import contextlib
 import hashlib
 import logging
@@ -14,7 +17,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.runs.machine import versions
@@ -23,8 +26,7 @@ from endotsr.sweeps.capacity import usable_cores
 from endotsr.sweeps.execute import FAILED, Outcome, execute
 from endotsr.sweeps.jobs import Job
 
-if TYPE_CHECKING:
-    from distributed import Client, Future
+Client = Future = Any  # of `distributed`
 
 TICK = 0.5  # seconds between two looks at the runs
 PATIENCE = 15.0  # seconds for a scheduler to answer, and for its first worker
@@ -53,7 +55,7 @@ def cluster_outcomes(
 
 
 def _outcomes(
-    client: "Client", jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
+    client: Client, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
 ) -> Generator[Outcome | None, None, None]:
     sent, losses = _Sent(client, sequence_of), Counter[str]()
     running = {_submitted(client, job, sent, out, threads): job for job in jobs}
@@ -75,7 +77,7 @@ def _outcomes(
 class _Sent:
     """Sequences that the workers hold, by what they were read from."""
 
-    def __init__(self, client: "Client", sequence_of: Callable[[Job], Sequence]) -> None:
+    def __init__(self, client: Client, sequence_of: Callable[[Job], Sequence]) -> None:
         self._client, self._sequence_of = client, sequence_of
         self._found: dict[str, Any] = {}
 
@@ -91,7 +93,7 @@ class _Sent:
         self._found.pop(job.input_key, None)
 
 
-def _submitted(client: "Client", job: Job, sent: _Sent, out: Path, threads: int | None) -> "Future":
+def _submitted(client: Client, job: Job, sent: _Sent, out: Path, threads: int | None) -> Future:
     on_host = Counter(_host(worker) for worker in client.nthreads())
     key = f"{job.name}-{secrets.token_hex(4)}"
     return client.submit(
@@ -130,7 +132,7 @@ class _Asked:
         return self._file.exists()
 
 
-def _outcome(job: Job, future: "Future") -> Outcome:
+def _outcome(job: Job, future: Future) -> Outcome:
     if future.status == "finished":
         return future.result()
     if future.status in ("cancelled", "lost"):
@@ -140,15 +142,15 @@ def _outcome(job: Job, future: "Future") -> Outcome:
 
 
 @contextlib.contextmanager
-def _connected(address: str) -> Iterator["Client"]:
+def _connected(address: str) -> Iterator[Client]:
     """A client of the scheduler, silent on everything that Dask would log."""
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise InputError("--scheduler: Dask is not installed; `pip install 'endotsr[cluster]'` installs it") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError):
         raise InputError(
             f"--scheduler {address}: no Dask scheduler answers; allowed: the address of a running one, such as "
@@ -161,7 +163,7 @@ def _connected(address: str) -> Iterator["Client"]:
             client.close(timeout=5)
 
 
-def _refuse_workers(client: "Client", out: Path) -> None:
+def _refuse_workers(client: Client, out: Path) -> None:
     """Raises InputError if there is no worker, or one of another version, with several threads or without the disk."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunBusy, RunFolder, create_run, open_run
+from endotsr.runs.machine import now
 from endotsr.sequences.sequence import Sequence
-from endotsr.sweeps.jobs import Job, finished_folder, refuse_other_settings
+from endotsr.sweeps.jobs import Job, finished_folder, measured_at_the_end, refuse_other_settings
 from endotsr.sweeps.locks import file_lock, run_lock
 from endotsr.untrusted.names import plain_line
 
@@ -176,7 +177,9 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     from endotsr.runs.records import REPORTED
     from endotsr.runs.sources import true_positions_of
 
-    if (folder.path / "metrics.json").exists():
+    if folder.record().get("status") != FINISHED:  # killed between the last checkpoint and this record
+        folder.update(status=FINISHED, finished=now())
+    if measured_at_the_end(job):
         return
     model, weights = load_model(folder), load_lpips_weights(job.lpips)
     truth = true_positions_of(job.source, job.simulator, job.config)

@@ -13,6 +13,7 @@ import msgspec
 
 from endotsr.config import Config, lengthened
 from endotsr.errors import InputError
+from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
@@ -129,10 +130,18 @@ def finished_folder(job: Job) -> RunFolder | None:
         return None
     folder = open_run(path)
     refuse_other_settings(job, folder)
-    with contextlib.suppress(InputError):
-        if folder.record().get("status") == "finished" and (path / "metrics.json").is_file():
+    with contextlib.suppress(InputError):  # a record that cannot be read
+        if folder.record().get("status") == "finished" and measured_at_the_end(job):
             return folder
     return None
+
+
+def measured_at_the_end(job: Job) -> bool:
+    """Whether metrics.json is that of the last iteration, and not of a checkpoint on the way."""
+    with contextlib.suppress(InputError):
+        found = read_json(Path(job.folder) / "metrics.json", ("run.iteration",))
+        return found["run"]["iteration"] == job.config.training.iterations
+    return False
 
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:

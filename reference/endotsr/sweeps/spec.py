@@ -44,6 +44,7 @@ KEYS = (
 )  # fmt: skip
 SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
 LONGEST_BLOCK = 1 << 20  # frames
+LARGEST = 1 << 53  # of a seed or a number of iterations
 
 
 class Start(NamedTuple):
@@ -93,7 +94,7 @@ def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
         if key not in data:
             raise InputError(f"{where}: {key} is missing; allowed: at least one")
     sequences = tuple(_source(word, where, folder) for word in _texts(data["sequences"], f"{where}: sequences"))
-    seeds = tuple(integer(v, f"{where}: seeds", low=0) for v in listed(data.get("seeds", [0]), f"{where}: seeds"))
+    seeds = tuple(_seed(value, where) for value in listed(data.get("seeds", [0]), f"{where}: seeds"))
     splits = tuple(_split(word, where) for word in _texts(data.get("splits", []), f"{where}: splits", least=0))
     measures = _texts(data.get("measures", []), f"{where}: measures", least=0)
     for name in measures:
@@ -158,7 +159,7 @@ def _configuration(name: str, values: Any, data: dict[str, Any], where: str) -> 
         raise InputError(f"{here}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
     config = PRESETS[preset]
     if iterations is not None:
-        config = with_iterations(config, integer(iterations, f"{here}: iterations", low=1))
+        config = with_iterations(config, integer(iterations, f"{here}: iterations", low=1, high=LARGEST))
     for changes in (_table(data.get("settings", {}), f"{where}: settings"), own):
         config = _changed(config, changes, here)
     return Configuration(name, config, None if start is None else _start(start, f"{here}.start", config))
@@ -168,6 +169,8 @@ def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
     refuse_unknown_keys(changes, Config, where)
     merged = msgspec.to_builtins(config)
     for section, values in changes.items():
+        if section == "preset":
+            raise InputError(f"{where}: settings.preset is not allowed; allowed: preset beside settings")
         merged[section] = merged[section] | _table(values, f"{where}: {section}")
     return config_from_dict(merged, where)
 
@@ -178,6 +181,10 @@ def _start(value: Any, where: str, config: Config) -> tuple[str, int]:
         raise InputError(f"{where}: has the keys {', '.join(found) or 'none'}; allowed: configuration, iteration")
     last = config.training.iterations - 1
     return text(found["configuration"], where), integer(found["iteration"], f"{where}.iteration", low=1, high=last)
+
+
+def _seed(value: Any, where: str) -> int:
+    return integer(value, f"{where}: seeds", low=0, high=LARGEST)
 
 
 def _split(word: str, where: str) -> str:
@@ -193,8 +200,12 @@ def _split(word: str, where: str) -> str:
 def _source(word: str, where: str, folder: Path) -> str:
     if word == SIMULATED:
         return word
-    found = (folder / word).resolve()
-    if not found.is_dir():
+    try:
+        found = (folder / word).resolve()
+        there = found.is_dir()
+    except (OSError, RuntimeError):  # a name that is too long, links that lead round in a circle
+        found, there = folder, False
+    if not there:
         raise InputError(f"{where}: sequences = {word!r} is not allowed; allowed: a folder, or {SIMULATED}")
     return str(found)
 

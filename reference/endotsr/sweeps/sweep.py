@@ -123,13 +123,14 @@ def run_sweep(
     (out / RUNS).mkdir(parents=True, exist_ok=True)
     with file_lock(out / LOCK, f"{out}: another process runs this sweep; wait until it ends, or stop it"):
         plan = planned(spec, out, inputs, retry)
-        rows = plan.rows
+        rows, watch = plan.rows, Watch(plan.left)
+        reporter.begin(watch.total)
         write_results(out, list(rows.values()))
         on_rows(list(rows.values()))
         for name, reason in plan.failed.items():
             reporter.say(f"failed before: {name}: {reason}")
         try:
-            with contextlib.closing(_made(plan, outcomes, inputs, reporter)) as made:
+            with contextlib.closing(_made(plan, outcomes, inputs, reporter, watch)) as made:
                 for job in made:
                     write_results(out, list(rows.values()))
                     on_rows(list(rows.values()))
@@ -139,12 +140,13 @@ def run_sweep(
         return list(rows.values())
 
 
-def _made(plan: Plan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter) -> Generator[Job, None, None]:
+def _made(
+    plan: Plan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter, watch: "Watch"
+) -> Generator[Job, None, None]:
     """The jobs as they end, with their rows replaced and the progress shown; closed, it ends what still runs."""
     if not plan.left:
         return
-    jobs, watch = {job.name: job for job in plan.left}, Watch(plan.left)
-    reporter.begin(watch.total)
+    jobs = {job.name: job for job in plan.left}
     with contextlib.closing(outcomes(plan.left, inputs)) as found:
         for outcome in found:
             reporter.step(watch.progress())

@@ -111,7 +111,8 @@ class StepBar:
 
     def say(self, message: str) -> None:
         """A line that does not disturb the bar."""
-        self._bar.clear()
+        if self._bar is not None:
+            self._bar.clear()
         print(message, flush=True)
 
     def __exit__(self, *_: object) -> None:
