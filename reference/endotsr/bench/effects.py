@@ -2,11 +2,13 @@
 
 For each part two states of the common workload take turns, one with everything and one with the part off, so that other
 work on the machine disturbs both alike. A third takes turns with them: the part off, in a build in which the functions
-of the part do not exist. It must take the same time and memory as the second.
+of the part do not exist. It must take the same time and memory as the second. Memory is what the Gaussians and their
+moments hold, and the most that one iteration allocates beside what is held before it.
 """
 
 import statistics
 import time
+import tracemalloc
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 from unittest import mock
@@ -46,8 +48,8 @@ PARTS = (
 def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, config: Config = PAPER) -> dict[str, Any]:
     """Seconds of processor time of an iteration with everything, with a part off, and without its functions.
 
-    returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved"}}, medians of
-             `repeats` turns; sizes
+    returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved", ...}}, medians
+             of `repeats` turns; held bytes and the bytes that an iteration allocates at most, of all three; sizes
     """
     found = {part.name: _one(part, gaussians, repeats, width, height, config) for part in PARTS}
     return {"gaussians": gaussians, "width": width, "height": height, "repeats": repeats, "parts": found}
@@ -55,8 +57,7 @@ def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, con
 
 def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
     case = Case(gaussians=gaussians, width=width, height=height)
-    everything, off, absent = _prepared(case, config), _prepared(case, changed(config, part)), None
-    absent = _prepared(case, changed(config, part))
+    everything, off, absent = (_prepared(case, c) for c in (config, changed(config, part), changed(config, part)))
     seconds: dict[str, list[float]] = {"everything": [], "off": [], "absent": []}
     for turn in range(repeats + 2):
         for name, pair, missing in (
@@ -69,7 +70,9 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
                 seconds[name].append(taken)
     pairs = list(zip(seconds["off"], seconds["absent"]))
     medians = {name: statistics.median(values) for name, values in seconds.items()}
-    sizes = {name: _numbers(pair[0]) for name, pair in (("everything", everything), ("off", off), ("absent", absent))}
+    states = {"everything": (everything, ()), "off": (off, ()), "absent": (absent, part.functions)}
+    sizes = {name: _numbers(pair[0]) for name, (pair, _) in states.items()}
+    allocated = {name: _allocated(*pair, missing) for name, (pair, missing) in states.items()}
     return {
         "everything_ms": 1e3 * medians["everything"],
         "off_ms": 1e3 * medians["off"],
@@ -78,6 +81,9 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
         "off_over_absent": statistics.median([o / a for o, a in pairs]),
         "memory_saved": 1.0 - sizes["off"] / sizes["everything"],
         "memory_over_absent": sizes["off"] / sizes["absent"],
+        "held_bytes": sizes,
+        "allocated_bytes": allocated,
+        "allocated_over_absent": allocated["off"] / allocated["absent"],
     }
 
 
@@ -113,6 +119,16 @@ def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> f
     return taken
 
 
+def _allocated(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> int:
+    """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
+    tracemalloc.start()
+    try:
+        _iteration(state, shop, missing)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
 def _numbers(state: Any) -> int:
     """Bytes of the Gaussians and of their moments."""
     moments = [*state.adam.first.values(), *state.adam.second.values()]
@@ -123,8 +139,9 @@ def table(result: dict[str, Any]) -> str:
     """The result as a table for the terminal."""
     rows = [
         [name, f"{x['everything_ms']:.1f}", f"{x['off_ms']:.1f}", f"{x['saved']:.1%}", f"{x['off_over_absent']:.3f}",
-         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}"]
+         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}", f"{x['allocated_over_absent']:.3f}"]
         for name, x in result["parts"].items()
     ]  # fmt: skip
-    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent")
+    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent",
+             "allocated / absent")  # fmt: skip
     return plain(heads, rows)

@@ -76,7 +76,7 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
-    return evaluate_run(folder, sequence, options.lpips, published)
+    return evaluate_run(folder, sequence, options.lpips, published, options.sequence)
 
 
 def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
@@ -96,9 +96,16 @@ def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -
 
 
 def evaluate_run(
-    folder: RunFolder, sequence: "Sequence", lpips: Path | None = None, published: tuple[dict[str, Any], ...] = ()
+    folder: RunFolder,
+    sequence: "Sequence",
+    lpips: Path | None = None,
+    published: tuple[dict[str, Any], ...] = (),
+    source: str | None = None,
 ) -> dict[str, Any]:
-    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json."""
+    """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
+
+    source  where the sequence is now; None: where the run found it
+    """
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.run import measure_run
     from endotsr.report.run_files import write_evaluation
@@ -108,7 +115,8 @@ def evaluate_run(
     from endotsr.runs.sources import run_source, true_positions_of
 
     weights = load_lpips_weights(lpips)
-    model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
+    remembered, simulator = run_source(folder)
+    model, truth = load_model(folder), true_positions_of(source or remembered, simulator, folder.config(), sequence)
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
     write_evaluation(folder, sequence, metrics, held_out)
     print(held_out_table(metrics))
