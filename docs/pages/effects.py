@@ -57,7 +57,7 @@ def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
         print(f"{key}: {', '.join(wrong(clips[key], answer['said'])) or 'right'}", flush=True)
         return answer
 
-    about = {"seeds": [chosen.start, chosen.stop], "frames": FRAMES}
+    about = {"frames": FRAMES, "sources": kept.sources("effects", "simulator")}
     return summary(chosen, FRAMES, kept.measured(RESULTS / FILES["detect"], about, clips, measure))
 
 
@@ -82,7 +82,7 @@ def train(seeds: int, names: list[str]) -> dict[str, Any]:
         return found
 
     about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS}
-    answers = kept.measured(RESULTS / FILES["train"], about, pairs, measure)
+    answers = kept.measured(RESULTS / FILES["train"], about | {"sources": kept.sources("")}, pairs, measure)
     scenes = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in names or SCENES}
     return {"seeds": seeds, **about, "scenes": scenes}
 

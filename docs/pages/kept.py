@@ -1,14 +1,16 @@
 """Answers of a long measurement, kept one a line as they are found, so that an interrupted one goes on.
 
-The first line says what was measured: settings, and the versions of the package. A file of another measurement is
-refused. The file stands beside the result, whose name it has with `.part`, until the result is written.
+The first line says what was measured: settings, and a hash of the sources. A file of another measurement is refused.
+The file stands beside the result, whose name it has with `.part`, until the result is written.
 """
 
+import hashlib
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import endotsr
 from endotsr.errors import InputError
 
 
@@ -33,6 +35,15 @@ def measured(
                 file.write(json.dumps({"key": key, "answer": found[key]}) + "\n")
                 file.flush()
     return found
+
+
+def sources(*rooms: str) -> str:
+    """First 16 hex digits of the SHA-256 over the source files of rooms of the package; "" is the whole package."""
+    package, digest = Path(endotsr.__file__).parent, hashlib.sha256()
+    for room in rooms:
+        for file in sorted((package / room).rglob("*.py")):
+            digest.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def part_of(result: Path) -> Path:

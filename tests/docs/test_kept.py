@@ -54,3 +54,15 @@ def test_another_measurement_and_a_damaged_file_are_refused(tmp_path):
     kept.part_of(result).write_text("{}\nno json\n", encoding="utf-8")
     with pytest.raises(InputError, match="damaged"):
         kept.measured(result, {"frames": 3}, KEYS, lambda key: {})
+
+
+def test_a_changed_source_is_another_measurement(tmp_path, monkeypatch):
+    package = tmp_path / "endotsr"
+    (package / "effects").mkdir(parents=True)
+    (package / "effects" / "one.py").write_text("x = 1\n", encoding="utf-8")
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    monkeypatch.setattr("endotsr.__file__", str(package / "__init__.py"))
+    whole, room = kept.sources(""), kept.sources("effects")
+    assert kept.sources("") == whole != room and kept.sources("simulator") != room
+    (package / "effects" / "one.py").write_text("x = 2\n", encoding="utf-8")
+    assert kept.sources("") != whole and kept.sources("effects") != room
