@@ -25,6 +25,7 @@ from marks import read_json, write_marked
 from endotsr.bench.suite import dated
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
+from endotsr.runs.machine import now
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "effects.md", DOCS / "results"
@@ -139,7 +140,8 @@ def real(folders: list[Path]) -> dict[str, Any]:
         sinus = effects_sinus.is_sinus(folder)
         read_clip = effects_sinus.read_sinus if sinus else _read_endonerf
         inspection = inspect_sequence(read_clip(folder))
-        found[folder.name] = inspection_record(inspection) | {"plan": plan_record(make_plan(inspection, PAPER))}
+        plan = plan_record(make_plan(inspection, PAPER))
+        found[folder.name] = inspection_record(inspection) | {"plan": plan, "date": now()}
     return {"clips": found}
 
 

@@ -1,9 +1,11 @@
 """`bench effects`: a part that is off holds and allocates what a build without the part does."""
 
+import numpy as np
 import pytest
 
 from endotsr.bench import effects
 from endotsr.bench.effects import PARTS, benchmark_effects, table
+from endotsr.fitting import objective
 
 
 @pytest.fixture(scope="module")
@@ -24,17 +26,14 @@ def test_every_part_is_measured_with_its_memory(result):
 
 def test_an_allocation_of_a_part_that_is_off_is_seen(monkeypatch):
     """A megabyte that only the build with the part allocates."""
-    import numpy as np
+    plain = effects._step
 
-    plain = effects._iteration
-
-    def wasteful(state, shop, missing):
-        waste = None if missing else np.ones(1 << 17)
-        taken = plain(state, shop, missing)
+    def wasteful(state, shop):
+        waste = None if objective.normalised_depth_forward is None else np.ones(1 << 17)
+        plain(state, shop)
         del waste
-        return taken
 
-    monkeypatch.setattr(effects, "_iteration", wasteful)
+    monkeypatch.setattr(effects, "_step", wasteful)
     part = next(part for part in PARTS if part.name == "depth")
     found = effects._one(part, 60, 1, 48, 32, effects.PAPER)
     assert found["allocated_over_absent"] > 1.2

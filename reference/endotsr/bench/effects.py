@@ -9,7 +9,8 @@ moments hold, and the most that one iteration allocates beside what is held befo
 import statistics
 import time
 import tracemalloc
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -106,27 +107,40 @@ def _prepared(case: Case, config: Config) -> tuple[Any, Any]:
 
 
 def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> float:
-    from endotsr.fitting.trainer import training_step
-
-    iteration = state.iteration
-    with ExitStack() as stack:
-        for module, name in missing:
-            stack.enter_context(mock.patch.object(module, name, None))
+    """Seconds of processor time of one iteration without the functions `missing`."""
+    with _without(missing):
         began = time.process_time()
-        training_step(state, shop)
-        taken = time.process_time() - began
-    state.iteration = iteration
-    return taken
+        _step(state, shop)
+        return time.process_time() - began
 
 
 def _allocated(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> int:
     """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
-    tracemalloc.start()
-    try:
-        _iteration(state, shop, missing)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    with _without(missing):
+        tracemalloc.start()
+        try:
+            _step(state, shop)
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+
+def _step(state: Any, shop: Any) -> None:
+    """One iteration, after which the state counts as before."""
+    from endotsr.fitting.trainer import training_step
+
+    iteration = state.iteration
+    training_step(state, shop)
+    state.iteration = iteration
+
+
+@contextmanager
+def _without(functions: tuple[tuple[Any, str], ...]) -> Iterator[None]:
+    """A build in which these functions do not exist: calling one is an error."""
+    with ExitStack() as stack:
+        for module, name in functions:
+            stack.enter_context(mock.patch.object(module, name, None))
+        yield
 
 
 def _numbers(state: Any) -> int:
