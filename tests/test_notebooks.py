@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
-WITHOUT_DERIVATIVE = {"16_tradeoff"}  # measures what the others derive
+WITHOUT_DERIVATIVE = {"16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
 

@@ -1,31 +1,37 @@
 """Measure what `endotsr inspect` finds and what `--effects auto` saves, and write the tables of docs/effects.md.
 
-    python docs/pages/effects.py detect [SEEDS]              simulated clips: detections, false positives
+    python docs/pages/effects.py detect [SEEDS [FIRST]]      simulated clips: detections, false positives
     python docs/pages/effects.py train [SEEDS [SCENE ...]]   held-out PSNR and time, `auto` against `everything`
+    python docs/pages/effects.py truth [SEEDS [ITERATIONS]]  errors against the truth, leakage between light and motion
     python docs/pages/effects.py real FOLDER ...             verdicts on EndoNeRF folders and on `sinus_endoscopy`
     python docs/pages/effects.py                             write the page from docs/results
 
+An interrupted `detect`, `train` or `truth` goes on where it stopped when it is started again with the same words.
 `endotsr bench effects --json docs/results/bench_effects.json` measures the time of the parts.
 """
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import effects_parts
 import effects_sinus
+import effects_truth
+import kept
 from marks import read_json, write_marked
 
 from endotsr.bench.suite import dated
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
+from endotsr.runs.machine import now
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "effects.md", DOCS / "results"
 FILES = {
     "detect": "effects_detect.json", "train": "effects_train.json", "real": "effects_real.json",
-    "bench": "bench_effects.json",
+    "truth": "effects_truth.json", "bench": "bench_effects.json",
 }  # fmt: skip
 SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS = 5, 40, 24, 400
 SCENES = {
@@ -40,31 +46,63 @@ SCENES = {
 }
 
 
-def detect(seeds: int) -> dict[str, Any]:
-    """The study of the tests."""
-    from endotsr.effects.study import run_study
+def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
+    """The study of the tests, with seeds that no threshold was set with."""
+    from endotsr.effects.study import FIRST_SEED, answer_of, summary, trials, wrong
 
-    return run_study(seeds, FRAMES, print)
+    chosen = range(FIRST_SEED if first is None else first, (FIRST_SEED if first is None else first) + seeds)
+    clips = {trial.key: trial for trial in trials(chosen)}
+
+    def measure(key: str) -> dict[str, Any]:
+        answer = answer_of(clips[key], FRAMES)
+        print(f"{key}: {', '.join(wrong(clips[key], answer['said'])) or 'right'}", flush=True)
+        return answer
+
+    about = {"frames": FRAMES, "sources": kept.sources("effects", "simulator")}
+    return summary(chosen, FRAMES, kept.measured(RESULTS / FILES["detect"], about, clips, measure))
 
 
 def train(seeds: int, names: list[str]) -> dict[str, Any]:
-    """Every named scene (none = all) with both settings: tissue PSNR, processor time, numbers of a Gaussian."""
-    from endotsr.api import make_config
-    from endotsr.api import train as fit
+    """Every named scene (none = all) with both settings: tissue PSNR, processor time, numbers of a Gaussian.
+
+    Raises: InputError for a name that is not in SCENES.
+    """
+    unknown = [name for name in names if name not in SCENES]
+    if unknown:
+        raise InputError(f"scene {unknown[0]!r} is not allowed; allowed: {', '.join(SCENES)}")
+    pairs = {f"{name} {seed}": (name, seed) for seed in range(seeds) for name in names or SCENES}
+    ready: list[bool] = []
+
+    def measure(key: str) -> dict[str, Any]:
+        if not ready:
+            _load_kernels()
+            ready.append(True)
+        name, seed = pairs[key]
+        found = _pair(_clip(name, seed), seed)
+        print(key, found, flush=True)
+        return found
+
+    about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS}
+    answers = kept.measured(RESULTS / FILES["train"], about | {"sources": kept.sources("")}, pairs, measure)
+    scenes = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in names or SCENES}
+    return {"seeds": seeds, **about, "scenes": scenes}
+
+
+def _clip(name: str, seed: int) -> Any:
     from endotsr.effects.study import settings_of
-    from endotsr.kernels.threads import use_threads
     from endotsr.simulator.simulate import simulate
 
+    return simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
+
+
+def _load_kernels() -> None:
+    """A short training, so that the times hold no compilation."""
+    from endotsr.api import make_config
+    from endotsr.api import train as fit
+    from endotsr.kernels.threads import use_threads
+
     use_threads(1)
-    first = simulate(settings_of(SCENES["everything"], 0, TRAIN_FRAMES)).sequence
-    fit(first, make_config("demo", iterations=20, training={"threads": 1}), on_message=print)  # loads the kernels
-    scenes: dict[str, list[dict[str, Any]]] = {}
-    for seed in range(seeds):
-        for name in names or SCENES:
-            sequence = simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence
-            scenes.setdefault(name, []).append(_pair(sequence, seed))
-            print(name, seed, scenes[name][-1], flush=True)
-    return {"seeds": seeds, "frames": TRAIN_FRAMES, "iterations": ITERATIONS, "scenes": scenes}
+    fit(_clip("everything", 0), make_config("demo", iterations=20, training={"threads": 1}), on_message=print)
 
 
 def _pair(sequence: Any, seed: int) -> dict[str, Any]:
@@ -91,17 +129,19 @@ def _pair(sequence: Any, seed: int) -> dict[str, Any]:
 
 
 def real(folders: list[Path]) -> dict[str, Any]:
-    """Verdicts and plans on folders; a folder that cannot be read is an error."""
+    """Verdicts and plans on folders; clips that were inspected before and are not among them keep their results."""
     from endotsr.config import PAPER
     from endotsr.effects.inspect import inspect_sequence, inspection_record
     from endotsr.effects.plan import make_plan, plan_record
 
-    found = {}
+    file = RESULTS / FILES["real"]
+    found = read_json(file, "docs/pages/effects.py real")["clips"] if file.exists() else {}
     for folder in folders:
         sinus = effects_sinus.is_sinus(folder)
         read_clip = effects_sinus.read_sinus if sinus else _read_endonerf
         inspection = inspect_sequence(read_clip(folder))
-        found[folder.name] = inspection_record(inspection) | {"plan": plan_record(make_plan(inspection, PAPER))}
+        plan = plan_record(make_plan(inspection, PAPER))
+        found[folder.name] = inspection_record(inspection) | {"plan": plan, "date": now()}
     return {"clips": found}
 
 
@@ -119,6 +159,7 @@ def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
         "detections": (effects_parts.detections, "detect"),
         "amplitudes": (effects_parts.amplitudes, "detect"),
         "training": (effects_parts.training, "train"),
+        "truth": (effects_truth.table, "truth"),
         "real": (effects_parts.real, "real"),
     }
     return {
@@ -138,20 +179,36 @@ def read(folder: Path = RESULTS) -> dict[str, dict[str, Any]]:
 def main(words: list[str], page: Path = PAGE) -> None:
     """The command."""
     what, rest = (words[0], words[1:]) if words else ("", [])
-    if what not in ("", "detect", "train", "real"):
+    if what not in COMMANDS and what:
         sys.exit(__doc__)
-    if what == "real":
-        write_json(RESULTS / FILES[what], dated(real([Path(word) for word in rest])))
-    elif what:
-        seeds = int(rest[0]) if rest else SEEDS
-        result = detect(seeds) if what == "detect" else train(seeds, rest[1:])
-        write_json(RESULTS / FILES[what], dated(result))
-    else:
-        try:
+    try:
+        if what:
+            file = RESULTS / FILES[what]
+            write_json(file, dated(COMMANDS[what](rest)))
+            kept.finished(file)
+        else:
             write_marked(page, fragments(read()), "effects")
-        except InputError as error:
-            sys.exit(f"error: {error}")
+    except InputError as error:
+        sys.exit(f"error: {error}")
 
+
+def _number(words: list[str], place: int, usual: int | None) -> Any:
+    """The number at a place of the words. Raises: InputError for a word that is no whole number of 0 or more."""
+    if len(words) <= place:
+        return usual
+    if not words[place].isdigit():
+        raise InputError(f"{words[place]!r} is not allowed; allowed: a whole number")
+    return int(words[place])
+
+
+COMMANDS: dict[str, Callable[[list[str]], dict[str, Any]]] = {
+    "detect": lambda words: detect(_number(words, 0, SEEDS), _number(words, 1, None)),
+    "train": lambda words: train(_number(words, 0, SEEDS), words[1:]),
+    "truth": lambda words: effects_truth.truth(
+        RESULTS / FILES["truth"], _number(words, 0, SEEDS), _number(words, 1, effects_truth.ITERATIONS)
+    ),
+    "real": lambda words: real([Path(word) for word in words]),
+}
 
 if __name__ == "__main__":
     main(sys.argv[1:])

@@ -44,6 +44,9 @@ def costs(result: dict[str, Any]) -> str:
     parts = result["parts"].values()
     ratios, sizes = [x["off_over_absent"] for x in parts], {x["memory_over_absent"] for x in parts}
     equal = "the same memory" if sizes == {1.0} else "other memory"
+    peaks = [x["allocated_over_absent"] for x in parts if "allocated_over_absent" in x]
+    if peaks:
+        equal += f"; what it allocated meanwhile was {min(peaks):.3f} to {max(peaks):.3f} times as much"
     note = (
         f"Time is processor time of an iteration with {result['gaussians']} Gaussians at "
         f"{result['width']}x{result['height']} ({machine(result)}); memory is that of Gaussians and optimiser. In the "
@@ -60,9 +63,11 @@ def detections(result: dict[str, Any]) -> str:
         for name, x in result["effects"].items()
     ]
     table = markdown(("Test", "Detected", "False positives", "95 % upper limit"), rows)
+    first = result["first_seed"]
     note = (
-        f"{result['clips']} simulated clips of {result['frames']} frames, {result['seeds']} seeds, noise of "
-        f"{255 * result['noise']:.1f} grey levels ({machine(result)})."
+        f"{result['clips']} simulated clips of {result['frames']} frames, seeds {first} to "
+        f"{first + result['seeds'] - 1}, which no threshold was set with; noise of {255 * result['noise']:.1f} grey "
+        f"levels ({machine(result)})."
     )
     return f"{table}\n\n{note}"
 

@@ -315,7 +315,7 @@ class Run:
         weights = load_lpips_weights(None if lpips is None else Path(lpips))
         sequence, about = self.sequence, self.record["input"]
         simulator = checked(about.get("simulator", {}), SimulatorSettings, "run.json", "input.simulator.")
-        truth = sources.true_positions_of(str(about["source"]), simulator, self.config)
+        truth = sources.true_positions_of(self._source or str(about["source"]), simulator, self.config, sequence)
         return measure_model(self.model, sequence, weights, truth)[0]
 
     def resume(self, on_iteration: OnIteration | None = None, on_message: OnMessage = print) -> "Run":

@@ -1,5 +1,7 @@
 """`endotsr simulate`: a folder that `train` reads, and refusals of one line that leave nothing behind."""
 
+import json
+
 import pytest
 from tiny import SETTINGS, assert_refused
 
@@ -21,9 +23,20 @@ def test_a_scene_is_written_and_trained_without_a_word_more(tmp_path, capsys):
     assert (settings.width, settings.frames, settings.seed) == (40, 4, 5)
     assert settings.smoke.on and settings.exposure.on and not settings.pull.on and settings.stereo.on
     assert [path.name for path in out.parent.iterdir()] == ["scene"]
-    assert (
-        main(["train", str(out), "--out", str(tmp_path / "run"), "--no-evaluate", *SETTINGS, "--iterations", "2"]) == 0
-    )
+    run = tmp_path / "run"
+    assert main(["train", str(out), "--out", str(run), *SETTINGS, "--iterations", "2"]) == 0
+    assert "True motion: mean trajectory error" in capsys.readouterr().out
+    motion = json.loads((run / "metrics.json").read_text(encoding="utf-8"))["trajectories"]
+    assert motion["unit"] == "mm" and motion["motion_scene_units"] > 0.05 and motion["pixels"] > 0
+
+
+def test_a_damaged_truth_is_refused_before_the_training(tmp_path, capsys):
+    out = tmp_path / "scene"
+    assert main(["simulate", "still", "--out", str(out), *SMALL]) == 0
+    capsys.readouterr()
+    (out / "truth" / "tracks.npz").write_bytes(b"PK nothing")
+    assert_refused(capsys, ["train", str(out), "--out", str(tmp_path / "run"), *SETTINGS], "tracks.npz", "not a plain")
+    assert [path.name for path in tmp_path.iterdir()] == ["scene"]
 
 
 def test_a_list_of_effects_is_a_scene_too(tmp_path):

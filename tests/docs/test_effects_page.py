@@ -59,3 +59,45 @@ def test_unknown_words_and_missing_results_are_refused(tmp_path):
         effects.main(["paint"])
     with pytest.raises(InputError, match="made by"):
         effects.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "words, named",
+    [
+        (["detect", "five"], "'five' is not allowed; allowed: a whole number"),
+        (["detect", "2", "-1"], "'-1' is not allowed; allowed: a whole number"),
+        (["truth", "1", "x"], "'x' is not allowed"),
+        (["train", "1", "nowhere"], "scene 'nowhere' is not allowed; allowed: still, breathing"),
+    ],
+)
+def test_words_that_mean_nothing_are_refused(words, named):
+    with pytest.raises(SystemExit, match=re.escape(named)):
+        effects.main(words)
+
+
+def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
+    """Made-up answers: stopped after three clips, started again, and written when all are there."""
+    from endotsr.effects import study
+
+    asked = []
+
+    def answer_of(trial, frames):
+        asked.append(trial.key)
+        if len(asked) == 4:
+            raise KeyboardInterrupt
+        said = {name: bool(expected) for name, expected in trial.expected.items()}
+        return {"key": trial.key, "size": trial.amplitude, "noise": 0.01, "said": said}
+
+    monkeypatch.setattr(study, "answer_of", answer_of)
+    monkeypatch.setattr(effects, "RESULTS", tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        effects.main(["detect", "1"])
+    assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json.part"]
+    effects.main(["detect", "1"])
+    clips = [trial.key for trial in study.trials([study.FIRST_SEED])]
+    assert asked == clips[:4] + clips[3:]
+    assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json"]
+    result = effects.read(tmp_path)["detect"]
+    assert result["first_seed"] == study.FIRST_SEED and result["clips"] == len(clips)
+    text = effects.fragments({"detect": result})["detections"]
+    assert f"seeds {study.FIRST_SEED} to {study.FIRST_SEED}, which no threshold was set with" in text

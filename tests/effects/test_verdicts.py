@@ -90,10 +90,12 @@ def test_wider_views_determine_higher_degrees(amplitude, degree):
     assert view_verdict(moved, training_clip(moved)).details["degree"] == degree
 
 
-def test_a_moving_camera_without_depth_leaves_motion_open():
+def test_too_little_tissue_leaves_motion_open():
     """Motion is then assumed, so that no component is switched off by mistake."""
     sequence = clip("noise", "camera_motion")
-    verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["motion"]
+    masks = np.zeros_like(sequence.masks)
+    masks[:, 40:70, 40:70] = True
+    verdict = inspect_sequence(_with(sequence, masks=masks)).verdicts["motion"]
     assert verdict.present and verdict.kind == "unknown"
 
 

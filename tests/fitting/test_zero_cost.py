@@ -8,12 +8,22 @@ from endotsr.effects.plan import with_setting
 from endotsr.effects.savings import numbers_of_a_gaussian
 from endotsr.equations import laplacian
 from endotsr.equations.laplacian import support_masks
-from endotsr.fitting.model import scene_at, spectral_from
+from endotsr.fitting.model import exposed, exposed_reverse, scene_at, spectral_from
+from endotsr.fitting.objective import (
+    LossWeights,
+    depth_term,
+    frame_targets,
+    image_loss,
+    laplacian_term,
+    smoothness_term,
+)
 from endotsr.fitting.state import bench_state
 from endotsr.losses import smoothness
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
+from endotsr.scene import workload
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals, gaussians_at
+from endotsr.scene.parameters import Exposure
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import render_forward, render_reverse
 from endotsr.splatting.settings import PAPER as RASTER
@@ -88,6 +98,57 @@ def test_memory_is_that_of_the_parts_that_are_on(degree, residuals):
     assert sum(a.size for a in arrays(gaussians).values()) == N * numbers_of_a_gaussian(config)
     for moments in (state.adam.first, state.adam.second):
         assert sum(a.size for a in moments.values()) == N * numbers_of_a_gaussian(config)
+
+
+def test_exposure_off_equals_an_exposure_of_zero_bitwise():
+    rendered, _ = view(*made_up({}))
+    zero = np.zeros(3, np.float32)
+    (on, saved), (off, nothing) = exposed(rendered, Exposure(zero, zero)), exposed(rendered, None)
+    assert nothing is None and saved is not None
+    np.testing.assert_array_equal(on.colour, off.colour)
+    d_colour = np.random.default_rng(6).normal(size=on.colour.shape).astype(np.float32)
+    np.testing.assert_array_equal(exposed_reverse(d_colour, saved)[0], exposed_reverse(d_colour, None)[0])
+
+
+LOSSES = {
+    "ssim": ("loss.ssim_weight", 0.0, ()),
+    "depth": ("loss.depth_weight", 0.0, ("depth_term", "normalised_depth_forward")),
+    "smoothness": ("loss.smoothness_weight", 0.0, ("smoothness_term", "smoothness_forward")),
+    "laplacian": ("model.laplacian", False, ("laplacian_term", "laplacian_loss_forward")),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_a_loss_that_is_off_equals_the_loss_of_weight_zero_bitwise(name, monkeypatch):
+    """Loss and gradients; when it is off its functions are not called, and its targets are not made."""
+    key, value, functions = LOSSES[name]
+    rendered, _ = view(*made_up({}))
+    frame = workload.sequence(WIDTH, HEIGHT, frames=4).frame(0)
+    config = with_setting(PAPER, key, value)
+    weights = LossWeights(0.1, 1.0, 0.5, 0.8)._replace(**{name: 0.0})
+    whole, bare = frame_targets(frame, PAPER), frame_targets(frame, config)
+    assert sum(target is None for target in bare) == (name != "smoothness")  # edges are found as they are needed
+    zero = _terms_of_weight_zero(rendered, whole)
+    on = image_loss(rendered, whole, weights, PAPER.loss)
+    for function in functions:
+        monkeypatch.setattr(f"endotsr.fitting.objective.{function}", None)
+    off = image_loss(rendered, bare, weights, config.loss)
+    assert on.loss == off.loss and name not in off.terms
+    for gradient in ("d_colour", "d_depth"):
+        np.testing.assert_array_equal(getattr(on, gradient), getattr(off, gradient))
+    assert off.d_colour.any() and (name not in zero or not any(np.any(d) for d in zero[name]))
+
+
+def _terms_of_weight_zero(rendered, targets):
+    """Gradients of the terms, evaluated with weight 0."""
+    found = {
+        "depth": depth_term(rendered, targets.depth, 0.0),
+        "smoothness": smoothness_term(rendered, targets.mask, 0.0, 30.0, None),
+        "laplacian": laplacian_term(rendered.colour, targets.image, targets.supports, 0.0, "co_sited"),
+    }
+    for name, term in found.items():
+        assert term.value > 0, name
+    return {name: [d for d in term[1:] if d is not None] for name, term in found.items()}
 
 
 # --- masks that exclude nothing ---

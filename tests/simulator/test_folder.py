@@ -86,7 +86,7 @@ TINY = {
 }
 
 
-@pytest.mark.parametrize("name", ["moving-camera"])
+@pytest.mark.parametrize("name", ["moving-camera", "pulling"])
 def test_training_from_files_equals_training_in_memory(tmp_path, name):
     write_sequence(tmp_path, small(name))
     runs = [train(sequence, **TINY) for sequence in (read_endonerf(tmp_path, EXACT), simulate(small(name)).sequence)]

@@ -2,12 +2,15 @@
 
 For each part two states of the common workload take turns, one with everything and one with the part off, so that other
 work on the machine disturbs both alike. A third takes turns with them: the part off, in a build in which the functions
-of the part do not exist. It must take the same time and memory as the second.
+of the part do not exist. It must take the same time and memory as the second. Memory is what the Gaussians and their
+moments hold, and the most that one iteration allocates beside what is held before it.
 """
 
 import statistics
 import time
-from contextlib import ExitStack
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -46,8 +49,8 @@ PARTS = (
 def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, config: Config = PAPER) -> dict[str, Any]:
     """Seconds of processor time of an iteration with everything, with a part off, and without its functions.
 
-    returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved"}}, medians of
-             `repeats` turns; sizes
+    returns  JSON-able: "parts" {name: {"saved": 1 - off / everything, "off_over_absent", "memory_saved", ...}}, medians
+             of `repeats` turns; held bytes and the bytes that an iteration allocates at most, of all three; sizes
     """
     found = {part.name: _one(part, gaussians, repeats, width, height, config) for part in PARTS}
     return {"gaussians": gaussians, "width": width, "height": height, "repeats": repeats, "parts": found}
@@ -55,8 +58,7 @@ def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, con
 
 def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
     case = Case(gaussians=gaussians, width=width, height=height)
-    everything, off, absent = _prepared(case, config), _prepared(case, changed(config, part)), None
-    absent = _prepared(case, changed(config, part))
+    everything, off, absent = (_prepared(case, c) for c in (config, changed(config, part), changed(config, part)))
     seconds: dict[str, list[float]] = {"everything": [], "off": [], "absent": []}
     for turn in range(repeats + 2):
         for name, pair, missing in (
@@ -69,7 +71,9 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
                 seconds[name].append(taken)
     pairs = list(zip(seconds["off"], seconds["absent"]))
     medians = {name: statistics.median(values) for name, values in seconds.items()}
-    sizes = {name: _numbers(pair[0]) for name, pair in (("everything", everything), ("off", off), ("absent", absent))}
+    states = {"everything": (everything, ()), "off": (off, ()), "absent": (absent, part.functions)}
+    sizes = {name: _numbers(pair[0]) for name, (pair, _) in states.items()}
+    allocated = {name: _allocated(*pair, missing) for name, (pair, missing) in states.items()}
     return {
         "everything_ms": 1e3 * medians["everything"],
         "off_ms": 1e3 * medians["off"],
@@ -78,6 +82,9 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
         "off_over_absent": statistics.median([o / a for o, a in pairs]),
         "memory_saved": 1.0 - sizes["off"] / sizes["everything"],
         "memory_over_absent": sizes["off"] / sizes["absent"],
+        "held_bytes": sizes,
+        "allocated_bytes": allocated,
+        "allocated_over_absent": allocated["off"] / allocated["absent"],
     }
 
 
@@ -100,17 +107,40 @@ def _prepared(case: Case, config: Config) -> tuple[Any, Any]:
 
 
 def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> float:
+    """Seconds of processor time of one iteration without the functions `missing`."""
+    with _without(missing):
+        began = time.process_time()
+        _step(state, shop)
+        return time.process_time() - began
+
+
+def _allocated(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> int:
+    """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
+    with _without(missing):
+        tracemalloc.start()
+        try:
+            _step(state, shop)
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+
+def _step(state: Any, shop: Any) -> None:
+    """One iteration, after which the state counts as before."""
     from endotsr.fitting.trainer import training_step
 
     iteration = state.iteration
-    with ExitStack() as stack:
-        for module, name in missing:
-            stack.enter_context(mock.patch.object(module, name, None))
-        began = time.process_time()
-        training_step(state, shop)
-        taken = time.process_time() - began
+    training_step(state, shop)
     state.iteration = iteration
-    return taken
+
+
+@contextmanager
+def _without(functions: tuple[tuple[Any, str], ...]) -> Iterator[None]:
+    """A build in which these functions do not exist: calling one is an error."""
+    with ExitStack() as stack:
+        for module, name in functions:
+            stack.enter_context(mock.patch.object(module, name, None))
+        yield
 
 
 def _numbers(state: Any) -> int:
@@ -123,8 +153,9 @@ def table(result: dict[str, Any]) -> str:
     """The result as a table for the terminal."""
     rows = [
         [name, f"{x['everything_ms']:.1f}", f"{x['off_ms']:.1f}", f"{x['saved']:.1%}", f"{x['off_over_absent']:.3f}",
-         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}"]
+         f"{x['memory_saved']:.1%}", f"{x['memory_over_absent']:.3f}", f"{x['allocated_over_absent']:.3f}"]
         for name, x in result["parts"].items()
     ]  # fmt: skip
-    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent")
+    heads = ("part", "with it, ms", "off, ms", "time saved", "off / absent", "memory saved", "memory / absent",
+             "allocated / absent")  # fmt: skip
     return plain(heads, rows)

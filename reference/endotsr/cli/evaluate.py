@@ -140,10 +140,11 @@ def evaluate_run(
         if name not in MEASURES:
             raise InputError(f"--measures {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
     weights = load_lpips_weights(lpips)
-    model, truth = load_model(folder), true_positions_of(*run_source(folder), folder.config())
+    remembered, simulator = run_source(folder)
+    model, truth = load_model(folder), true_positions_of(source or remembered, simulator, folder.config(), sequence)
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
     if measures:
-        metrics["measures"] = measured(measures, model, sequence, source or run_source(folder)[0])
+        metrics["measures"] = measured(measures, model, sequence, source or remembered)
     scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
     write_run_page(folder.path, scene, sequence if view else None)
     write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")

@@ -89,7 +89,8 @@ def run(words: list[str]) -> int:
     if options.evaluate:
         from endotsr.cli.evaluate import evaluate_run
 
-        write_result(options.json, **evaluate_run(folder, sequence, lpips=options.lpips))
+        found = evaluate_run(folder, sequence, lpips=options.lpips, source=options.sequence or None)
+        write_result(options.json, **found)
     return 0
 
 
@@ -112,6 +113,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     from endotsr.runs.files import refuse_inside
     from endotsr.runs.sources import SIMULATED, load_sequence
     from endotsr.runs.training import start_record, train_new_run
+    from endotsr.simulator.recorded import recorded_positions
 
     if not options.sequence:
         raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
@@ -121,6 +123,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     if source != SIMULATED:
         refuse_inside(options.out, Path(source), "the sequence")
     sequence = load_sequence(source, config, options.simulator)
+    if options.evaluate and source != SIMULATED:
+        recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
     config = lengthened(config, len(sequence.train_index))
     threads = use_threads(config.training.threads)
     found: dict[str, Any] = {}

@@ -50,7 +50,7 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
     clip = training_clip(sequence)
     noise = estimate_noise(sequence, clip)
     tracks = make_tracks(clip, noise)
-    motion, lines = motion_verdict(sequence, clip, tracks)
+    motion, lines = motion_verdict(sequence, clip, tracks, noise)
     camera = camera_verdict(sequence, clip)
     found = [
         motion, camera, view_verdict(sequence, clip), occluder_verdict(sequence, clip),

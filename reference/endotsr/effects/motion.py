@@ -2,22 +2,24 @@
 
 The flow of a tile counts as motion when its root mean square over time exceeds `NULL_FACTOR` times what noise alone
 shows in that tile, and `LEAST_MOTION` pixels, in at least `LEAST_TILES` tiles and a fiftieth of them. A moving camera
-is accounted for first: the flow that its poses and the depth predict for rigid tissue is removed.
+is accounted for first: the flow of the rigid scene that fits its poses best is removed, tiles beside excluded pixels
+are left out, and the distance by which flow to a frame and back misses counts as noise (rigid.py).
 """
 
 import numpy as np
 
-from endotsr.effects.clip import TILE, Clip, tile_map, tile_means
+from endotsr.effects.clip import TILE, Clip, tile_map
+from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line, spectral_lines
-from endotsr.effects.tracks import VISIBLE_FRAMES, Tracks, filled_tiles
+from endotsr.effects.rigid import fit_rigid
+from endotsr.effects.tracks import Tracks, filled_tiles
 from endotsr.effects.verdict import Curve, Map, Verdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import backproject, project
 
 NULL_FACTOR = 2.0
 LEAST_MOTION = 0.05  # pixels of the full size
-RIGID_ERROR = 0.25  # fraction of the flow of the camera that errors of the depth and a moving light may leave
+RIGID_ERROR = 0.25  # fraction of the flow of the camera that errors of the poses and a moving light may leave
 LEAST_TILES = 2
 TILE_FRACTION = 0.02
 EXPLAINED = 0.99  # of the squared motion, by which its half waves are counted
@@ -25,13 +27,16 @@ AFFINE_FRACTION = 0.98  # of the squared flow: above it the picture moves as a w
 FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
 
 
-def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks) -> tuple[Verdict, list[Line]]:
+def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks, noise: Noise) -> tuple[Verdict, list[Line]]:
     """Whether tissue moves, and how; with the lines of its spectrum (empty without periodic motion)."""
-    tiles, null = tracks.tiles - camera_flow(sequence, clip, tracks), tracks.null
-    known = np.isfinite(tiles[:, 0]).mean(axis=0) >= VISIBLE_FRAMES  # a tile without depth has no predicted flow
-    moving = tracks._replace(tiles=tiles, usable=tracks.usable & known)
-    predicted, size = _root_mean_square(tracks.tiles - tiles), _root_mean_square(tiles)
-    limit = np.maximum(NULL_FACTOR * null, LEAST_MOTION) + RIGID_ERROR * predicted
+    null, clear, camera = tracks.null, np.ones_like(tracks.usable), np.zeros_like(tracks.tiles)
+    if not sequence.static_camera:
+        rigid = fit_rigid(clip, tracks, noise)
+        null, clear, camera = np.maximum(null, rigid.error), rigid.clear, rigid.flow
+    tiles = tracks.tiles - camera
+    moving = tracks._replace(tiles=tiles, usable=tracks.usable & clear)
+    size = _root_mean_square(tiles)
+    limit = np.maximum(NULL_FACTOR * null, LEAST_MOTION) + RIGID_ERROR * _root_mean_square(camera)
     ratio = np.where(moving.usable, size / limit, 0.0)
     needed = max(LEAST_TILES, round(TILE_FRACTION * int(moving.usable.sum())))
     if int(moving.usable.sum()) < needed:
@@ -65,24 +70,6 @@ def _root_mean_square(tiles: FloatArray) -> FloatArray:
     return np.sqrt(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
 
-def camera_flow(sequence: Sequence, clip: Clip, tracks: Tracks) -> FloatArray:
-    """Flow in tiles (m, 2, T) that camera motion and the reference depth predict for rigid tissue; 0 if static."""
-    if sequence.static_camera:
-        return np.zeros_like(tracks.tiles)
-    camera, depth = clip.cameras[clip.reference], clip.depth[clip.reference].astype(np.float64)
-    rows, columns = np.indices(depth.shape)
-    offset = clip.shrink // 2
-    u, v = columns * clip.shrink + offset, rows * clip.shrink + offset
-    points = backproject(camera, u.ravel().astype(float), v.ravel().astype(float), depth.ravel())
-    out = np.zeros_like(tracks.tiles)
-    for k, other in enumerate(clip.cameras):
-        x, y, _ = project(other, points)
-        flow = np.stack([(x - 0.5).reshape(depth.shape) - u, (y - 0.5).reshape(depth.shape) - v])
-        known = tracks.valid[k] & (depth > 0) & np.isfinite(flow).all(axis=0)
-        out[k] = tile_means(np.where(known, flow, 0.0), known)[0]
-    return out
-
-
 def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
     """Fraction of the squared flow that an affine map of the picture explains, frame by frame."""
     rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
@@ -101,7 +88,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
     largest = float(size[tracks.usable].max(initial=0.0))
     rates = ", ".join(f"{line.cycles:.2g}" for line in lines)
     reason = {
-        "unknown": "Too few tiles of tissue are seen with depth to tell; motion is assumed.",
+        "unknown": "Too few tiles of tissue are seen to tell; motion is assumed.",
         "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
         "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), all of it along one affine map of the picture.",
         "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",

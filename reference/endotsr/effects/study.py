@@ -1,10 +1,13 @@
 """How reliable the tests are: simulated clips with known effects, several seeds, a sweep of amplitudes.
 
-In: numbers of seeds and frames. Out: JSON-able counts of detections and false positives for each effect, and the
-smallest amplitude that is found in every seed, in the unit of the effect (px, percent, degrees, mm).
+In: seeds and a number of frames. Out: one JSON-able answer a clip (`answer_of`), so that a study that was interrupted
+goes on where it stopped; and their summary (`summary`): detections and false positives of each effect, and how often
+each amplitude is found, in the unit of the effect (px, percent, degrees, mm).
+
+Thresholds were set with seeds below `FIRST_SEED`. A study takes seeds from there on, which no threshold has seen.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,7 +18,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import SimulatedSequence, simulate
 
-FRAMES = 40
+FIRST_SEED = 100
 FOUND = (*EFFECTS, "periodic motion")
 MOTIONS = ("breathing", "pulsation", "pull")
 LIGHTS = ("exposure", "brightening")
@@ -29,8 +32,10 @@ SWEEPS: dict[str, tuple[float, ...]] = {
     "highlights": (0.25, 0.5, 1.0, 2.0),
     "camera_motion": (0.001, 0.1, 1.0, 3.0, 9.0),
     "depth_errors": (0.02, 0.05, 0.1, 0.5),
+    "cutting": (1.0, 2.0, 4.0),
 }
-STRENGTH = {"highlights": "strength", "depth_errors": "sigma"}  # the setting that is swept; otherwise `amplitude`
+STRENGTH = {"highlights": "strength", "depth_errors": "sigma", "cutting": "opening"}
+"""The setting that is swept; otherwise `amplitude`."""
 MIXTURES = (
     ("noise", "breathing", "pulsation", "instrument", "highlights"),
     ("noise", "pull", "exposure", "instrument"),
@@ -42,14 +47,23 @@ SPOILED = {"blur": (0.5, 1.0, 2.0), "smoke": (0.05, 0.1, 0.2, 0.4)}  # pixels, f
 
 
 class Trial(NamedTuple):
-    """One simulated clip and what is known about it."""
+    """One clip of the study."""
 
-    scene: str
+    seed: int
+    scene: str  # names of the effects
     swept: str  # effect whose amplitude is swept, or ""
     amplitude: float
-    sequence: Sequence
-    size: float  # the amplitude in the unit of the table
     expected: dict[str, bool | None]  # by effect; None = neither answer is wrong
+
+    @property
+    def key(self) -> str:
+        """Unique among the clips of a study of a given length."""
+        return f"{self.seed}: {self.scene} {self.amplitude:g}"
+
+    @property
+    def strongest(self) -> bool:
+        """Whether the amplitude is the largest of its sweep, or none is swept."""
+        return not self.swept or self.amplitude == max((SWEEPS | SPOILED)[self.swept])
 
 
 def settings_of(names: tuple[str, ...], seed: int, frames: int, amplitude: float | None = None) -> SimulatorSettings:
@@ -66,10 +80,10 @@ def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
     """What the tests should say of a clip with these effects.
 
     Tissue that moves under the lamp, or a lamp that moves with the camera, does change the light: not counted. The
-    same holds for the view, which is a matter of degree.
+    same holds for the view, which is a matter of degree. A slit moves the tissue beside it, once.
     """
     on = set(names)
-    moves = bool(on & set(MOTIONS))
+    moves = bool(on & {*MOTIONS, "cutting"})
     light: bool | None = bool(on & set(LIGHTS)) or (None if moves or "camera_motion" in on else False)
     return {
         "motion": moves,
@@ -80,7 +94,7 @@ def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:
         "camera motion": "camera_motion" in on,
         "view change": None if "camera_motion" in on else False,
         "depth quality": "depth_errors" in on,
-        "topology change": False,
+        "topology change": "cutting" in on,
         "smoke": False,
         "blur": False,
     }
@@ -92,23 +106,30 @@ def _beats(on: set[str]) -> bool | None:
     return None if beats and on & {"pull", "camera_motion"} else beats
 
 
-def trials(seeds: range, frames: int) -> Iterator[Trial]:
-    """All clips of the study, one at a time."""
+def trials(seeds: Iterable[int]) -> Iterator[Trial]:
+    """All clips of the study, in order; nothing is simulated yet."""
     for seed in seeds:
         for names in (("noise",), ("noise", "instrument"), *MIXTURES):
-            made = simulate(settings_of(names, seed, frames))
-            yield Trial(" + ".join(names), "", 0.0, made.sequence, 0.0, expectation(names))
+            yield Trial(seed, " + ".join(names), "", 0.0, expectation(names))
         for effect, amplitudes in SWEEPS.items():
             for amplitude in amplitudes:
-                names = ("noise", effect)
-                made = simulate(settings_of(names, seed, frames, amplitude))
-                size = size_of(effect, amplitude, made)
-                yield Trial(effect, effect, amplitude, made.sequence, size, expectation(names))
-        still = simulate(settings_of(("noise",), seed, frames)).sequence
-        for effect, spoil in (("blur", blurred), ("smoke", smoky)):
-            for amplitude in SPOILED[effect]:
+                yield Trial(seed, effect, effect, amplitude, expectation(("noise", effect)))
+        for effect, amplitudes in SPOILED.items():
+            for amplitude in amplitudes:
                 expected = expectation(("noise",)) | {effect: True, "photometric": None}
-                yield Trial(effect, effect, amplitude, spoil(still, amplitude), amplitude, expected)
+                yield Trial(seed, effect, effect, amplitude, expected)
+
+
+def clip_of(trial: Trial, frames: int) -> tuple[Sequence, float]:
+    """The clip of a trial, and the size of what is swept in the unit of the table (0 without a sweep)."""
+    if trial.swept in SPOILED:
+        still = simulate(settings_of(("noise",), trial.seed, frames)).sequence
+        spoil = {"blur": blurred, "smoke": smoky}[trial.swept]
+        return spoil(still, trial.amplitude), trial.amplitude
+    if not trial.swept:
+        return simulate(settings_of(tuple(trial.scene.split(" + ")), trial.seed, frames)).sequence, 0.0
+    made = simulate(settings_of(("noise", trial.swept), trial.seed, frames, trial.amplitude))
+    return made.sequence, size_of(trial.swept, trial.amplitude, made)
 
 
 def size_of(effect: str, amplitude: float, made: SimulatedSequence) -> float:
@@ -120,16 +141,17 @@ def size_of(effect: str, amplitude: float, made: SimulatedSequence) -> float:
         return float(np.sqrt(np.mean([(flow**2).sum(axis=0) for flow in flows], axis=0)).max())
     if effect == "camera_motion":
         return float(np.degrees(np.arctan(amplitude / made.settings.distance)))
-    return amplitude if effect in ("depth_errors", "highlights") else 100.0 * amplitude
+    return amplitude if effect in STRENGTH else 100.0 * amplitude
 
 
 UNITS = {
     **dict.fromkeys(MOTIONS, "px"), "exposure": "percent", "brightening": "percent", "highlights": "strength",
-    "camera_motion": "degrees", "depth_errors": "mm", "blur": "px", "smoke": "of full density",
+    "camera_motion": "degrees", "depth_errors": "mm", "cutting": "mm", "blur": "px", "smoke": "of full density",
 }  # fmt: skip
 ANSWERS = {
     **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(LIGHTS, "photometric"), "highlights": "highlights",
-    "camera_motion": "camera motion", "depth_errors": "depth quality", "blur": "blur", "smoke": "smoke",
+    "camera_motion": "camera motion", "depth_errors": "depth quality", "cutting": "topology change",
+    "blur": "blur", "smoke": "smoke",
 }  # fmt: skip
 
 
@@ -165,39 +187,50 @@ def answers(inspection: Inspection) -> dict[str, bool]:
     return said | {"periodic motion": bool(inspection.lines)}
 
 
-def run_study(seeds: int, frames: int, on_message: Callable[[str], object]) -> dict[str, Any]:
-    """All trials. JSON-able: "effects" {name: false positives and clips, detections and clips}, "sweeps", "scenes"."""
+def answer_of(trial: Trial, frames: int) -> dict[str, Any]:
+    """What the tests say of a clip, JSON-able: "key", "size", "noise" and "said" {effect: found}."""
+    sequence, size = clip_of(trial, frames)
+    inspection = inspect_sequence(sequence)
+    return {"key": trial.key, "size": size, "noise": inspection.noise.level, "said": answers(inspection)}
+
+
+def wrong(trial: Trial, said: dict[str, bool]) -> list[str]:
+    """The effects on which the answer is not what is expected."""
+    return [name for name, expected in trial.expected.items() if expected is not None and said[name] != expected]
+
+
+def summary(seeds: range, frames: int, found: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Counts over the answers of all trials of these seeds, by key. Raises: KeyError if one is missing.
+
+    returns  JSON-able: "effects" {name: positives, detected, negatives, false}, "sweeps" {effect: rows}, and the sizes
+    """
     counts = {name: {"positives": 0, "detected": 0, "negatives": 0, "false": 0} for name in FOUND}
-    sweeps: dict[str, dict[str, list[Any]]] = {name: {} for name in ANSWERS}
-    noise, scenes = [], {}
-    for trial in trials(range(seeds), frames):
-        inspection = inspect_sequence(trial.sequence)
-        said = answers(inspection)
-        strongest = not trial.swept or trial.amplitude == max((SWEEPS | SPOILED)[trial.swept])
+    sweeps: dict[str, dict[float, list[Any]]] = {name: {} for name in ANSWERS}
+    noise = []
+    for trial in trials(seeds):
+        answer = found[trial.key]
+        said = answer["said"]
         for name, expected in trial.expected.items():
             counts[name]["negatives"] += expected is False
             counts[name]["false"] += expected is False and said[name]
-            counts[name]["positives"] += expected is True and strongest
-            counts[name]["detected"] += expected is True and strongest and said[name]
+            counts[name]["positives"] += expected is True and trial.strongest
+            counts[name]["detected"] += expected is True and trial.strongest and said[name]
         if trial.swept:
-            row = sweeps[trial.swept].setdefault(f"{trial.amplitude:g}", [])
-            row.append([trial.size, said[ANSWERS[trial.swept]]])
-        wrong = [name for name, expected in trial.expected.items() if expected is not None and said[name] != expected]
-        scenes.setdefault(trial.scene, []).append(wrong)
-        noise.append(inspection.noise.level)
-        on_message(f"{trial.scene} {trial.amplitude:g}: {', '.join(wrong) or 'right'}")
-    swept = {name: [_row(amplitude, rows) for amplitude, rows in found.items()] for name, found in sweeps.items()}
+            row = sweeps[trial.swept].setdefault(trial.amplitude, [])
+            row.append((answer["size"], said[ANSWERS[trial.swept]]))
+        noise.append(answer["noise"])
+    swept = {name: [_row(amplitude, rows) for amplitude, rows in all_.items()] for name, all_ in sweeps.items()}
     return {
-        "seeds": seeds, "frames": frames, "clips": len(noise), "noise": float(np.median(noise)), "effects": counts,
-        "sweeps": swept,
+        "seeds": len(seeds), "first_seed": seeds.start, "frames": frames, "clips": len(noise),
+        "noise": float(np.median(noise)), "effects": counts, "sweeps": swept,
     }  # fmt: skip
 
 
-def _row(amplitude: str, rows: list[Any]) -> dict[str, Any]:
-    sizes = [size for size, _ in rows]
+def _row(amplitude: float, rows: list[Any]) -> dict[str, Any]:
+    """One amplitude of a sweep, over the seeds."""
     return {
-        "amplitude": float(amplitude),
-        "size": float(np.median(sizes)),
+        "amplitude": amplitude,
+        "size": float(np.median([size for size, _ in rows])),
         "detected": sum(bool(found) for _, found in rows),
         "clips": len(rows),
     }

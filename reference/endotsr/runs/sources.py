@@ -140,11 +140,18 @@ def load_run_sequence(folder: RunFolder, source: str | None = None) -> Sequence:
 
 
 def true_positions_of(
-    source: str, simulator: SimulatorSettings, config: Config
+    source: str, simulator: SimulatorSettings, config: Config, sequence: Sequence
 ) -> "Callable[[int, int], FloatArray] | None":
-    """The true motion of a sequence, if it is simulated; see `SimulatedSequence.true_positions`."""
-    if source != SIMULATED:
+    """The true motion of a sequence that is simulated, in memory or in a folder; see `SimulatedSequence`.
+
+    Raises: InputError if the folder holds a truth that cannot be used.
+    """
+    if source == IN_MEMORY:
         return None
+    if source != SIMULATED:
+        from endotsr.simulator.recorded import recorded_positions
+
+        return recorded_positions(Path(source), sequence)
     from endotsr.simulator.simulate import simulate
 
     return simulate(simulated_settings(simulator, config)).true_positions

@@ -29,9 +29,12 @@ def blood_cover(settings: SimulatorSettings, material: FloatArray, t: float) -> 
     if t <= part.start:
         return np.zeros(material.shape[1:])
     da, db = material[0] - CENTRE[0] * settings.distance, material[1] - CENTRE[1] * settings.distance
-    angle = np.arctan2(db, da)
     phases = np.random.default_rng([settings.seed, 4]).uniform(0, 2 * np.pi, len(LOBES))
+    distance, size = np.hypot(da, db), part.radius * np.sqrt((t - part.start) / (1 - part.start))
+    near = distance <= size * (1 + sum(height for _, height in LOBES))  # beyond, there is no blood
+    angle = np.arctan2(db[near], da[near])
     wave = sum(height * np.sin(lobes * angle + phase) for (lobes, height), phase in zip(LOBES, phases))
-    margin = part.radius * np.sqrt((t - part.start) / (1 - part.start)) * (1 + wave)
-    inside = np.clip((margin - np.hypot(da, db)) / EDGE, 0.0, 1.0)
-    return part.opacity * inside * inside * (3 - 2 * inside)
+    inside = np.clip((size * (1 + wave) - distance[near]) / EDGE, 0.0, 1.0)
+    cover = np.zeros(distance.shape)
+    cover[near] = part.opacity * inside * inside * (3 - 2 * inside)
+    return cover

@@ -134,12 +134,14 @@ def _tissue_light(scene: Scene, eye: Eye, lamp: Camera, blocker: Blocker | None,
     times = moments(settings)
     cameras = make_cameras(settings, np.array([t + times[0], t, t + times[-1]]), eye.right)
     views = views_during(surface, cameras, eye.view, t, times)
-    light = highlight = np.zeros(())
+    light = np.zeros((3, *eye.view.depth.shape))
+    highlight = np.zeros(eye.view.depth.shape) if settings.highlights.on else None
     for view in views:
         one = shade(settings, scene.texture, view, lamps, t)
-        light = light + one.light / len(times)
-        highlight = highlight if one.highlight is None else highlight + one.highlight / len(times)
-    return TissueLight(light, highlight if settings.highlights.on else None)
+        light += one.light / len(times)
+        if highlight is not None:
+            highlight += one.highlight / len(times)
+    return TissueLight(light, highlight)
 
 
 def _picture(settings: SimulatorSettings, light: FloatArray, stream: int, i: int) -> NDArray[np.uint8]:

@@ -40,6 +40,13 @@ class Drawing(NamedTuple):
     excluded: BoolArray  # (H, W) instrument and margin
 
 
+class Pose(NamedTuple):
+    """One instrument at one moment, image widths."""
+
+    points: FloatArray  # (2, 4) entry, wrist and the two tips
+    segments: list[tuple[FloatArray, FloatArray, float, FloatArray]]  # start, end, half width, colour
+
+
 def graspers(settings: SimulatorSettings) -> tuple[Grasper, ...]:
     """The instruments that are switched on."""
     first = (FIRST,) if settings.instrument.on else ()
@@ -73,14 +80,21 @@ def _aspect(settings: SimulatorSettings) -> FloatArray:
 
 
 def _blurred(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
-    """One instrument, as the mean over the exposure."""
-    if open_span(settings) == 0.0:
-        return _draw_one(settings, grasper, t, shift)
-    parts = [_draw_one(settings, grasper, t + moment, shift) for moment in moments(settings)]
-    coverage = np.asarray(sum(part.coverage for part in parts)) / len(parts)
-    light = np.asarray(sum(part.light * part.coverage for part in parts)) / len(parts)
-    excluded = np.logical_or.reduce([part.excluded for part in parts])
-    return Drawing(_unmixed(light, coverage), coverage, excluded)
+    """One instrument, as the mean over the exposure. Only the part of the picture around it is computed."""
+    times = [t] if open_span(settings) == 0.0 else [float(t + moment) for moment in moments(settings)]
+    poses = [_pose(settings, grasper, one, shift) for one in times]
+    box = _box(settings, np.concatenate([pose.points for pose in poses], axis=1))
+    parts = [_draw_one(settings, pose, box) for pose in poses]
+    inner = parts[0]
+    if len(parts) > 1:
+        coverage = np.asarray(sum(part.coverage for part in parts)) / len(parts)
+        light = np.asarray(sum(part.light * part.coverage for part in parts)) / len(parts)
+        excluded = np.logical_or.reduce([part.excluded for part in parts])
+        inner = Drawing(_unmixed(light, coverage), coverage, excluded)
+    whole = (settings.height, settings.width)
+    drawing = Drawing(np.zeros((3, *whole)), np.zeros(whole), np.zeros(whole, bool))
+    drawing.light[:, *box], drawing.coverage[box], drawing.excluded[box] = inner
+    return drawing
 
 
 def _over(front: Drawing, behind: Drawing) -> Drawing:
@@ -96,10 +110,9 @@ def _unmixed(light: FloatArray, coverage: FloatArray) -> FloatArray:
     return np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
 
 
-def _draw_one(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
-    """One instrument at one moment. Only the part of the picture around it is computed."""
-    part = settings.instrument
-    angle = 2 * np.pi * part.cycles * t + grasper.phase
+def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Pose:
+    """The parts of an instrument at one moment."""
+    angle = 2 * np.pi * settings.instrument.cycles * t + grasper.phase
     wrist = wrist_at(settings, grasper, t) + [shift, 0.0]
     entry = grasper.entry * _aspect(settings) + [shift, 0.0]
     along = (wrist - entry) / np.linalg.norm(wrist - entry)
@@ -112,31 +125,43 @@ def _draw_one(settings: SimulatorSettings, grasper: Grasper, t: float, shift: fl
         (grip, tips[0], JAW, METAL * 1.1),
         (grip, tips[1], JAW, METAL * 0.9),
     ]
+    return Pose(np.stack([entry, wrist, *tips], axis=1), segments)
+
+
+def _draw_one(settings: SimulatorSettings, pose: Pose, box: tuple[slice, slice]) -> Drawing:
+    """One instrument at one moment, inside a box of the picture."""
     pixel = 1.0 / settings.width
-    box = _box(settings, np.stack([entry, wrist, *tips]), SHAFT + part.margin + 3 * pixel)
     x, y = np.meshgrid(
         ((np.arange(settings.width) + 0.5) / settings.width)[box[1]],
         ((np.arange(settings.height) + 0.5) / settings.width)[box[0]],
     )
     light, coverage = np.zeros((3, *x.shape)), np.zeros(x.shape)
     outline = np.full_like(coverage, np.inf)
-    for start, end, half_width, colour in segments:
-        distance, side = _segment(x, y, start, end)
+    for start, end, half_width, colour in pose.segments:
+        near = _within(box, _box(settings, np.stack([start, end], axis=1)))  # further away, a segment changes nothing
+        distance, side = _segment(x[near], y[near], start, end)
         cover = np.clip(0.5 - (distance - half_width) / pixel, 0.0, 1.0)
-        light = light * (1 - cover) + colour[:, None, None] * (_sheen(side / half_width) * cover)
-        coverage = cover + coverage * (1 - cover)
-        outline = np.minimum(outline, distance - half_width)
-    whole = (settings.height, settings.width)
-    drawing = Drawing(np.zeros((3, *whole)), np.zeros(whole), np.zeros(whole, bool))
-    drawing.light[:, *box], drawing.coverage[box] = _unmixed(light, coverage), coverage
-    drawing.excluded[box] = outline < part.margin + pixel
-    return drawing
+        on = cover > 0
+        sheen = np.zeros_like(cover)
+        sheen[on] = _sheen(side[on] / half_width) * cover[on]
+        light[:, *near] = light[:, *near] * (1 - cover) + colour[:, None, None] * sheen
+        coverage[near] = cover + coverage[near] * (1 - cover)
+        outline[near] = np.minimum(outline[near], distance - half_width)
+    return Drawing(_unmixed(light, coverage), coverage, outline < settings.instrument.margin + pixel)
 
 
-def _box(settings: SimulatorSettings, points: FloatArray, border: float) -> tuple[slice, slice]:
-    """Rows and columns of the picture around points (P, 2), image widths, with a border."""
-    low = np.floor((points.min(axis=0) - border) * settings.width).astype(int)
-    high = np.ceil((points.max(axis=0) + border) * settings.width).astype(int)
+def _within(box: tuple[slice, slice], inner: tuple[slice, slice]) -> tuple[slice, slice]:
+    """The part of a box of the picture that another one has in common with it, counted from its corner."""
+    starts = [max(one.start - whole.start, 0) for whole, one in zip(box, inner)]
+    stops = [max(min(one.stop, whole.stop) - whole.start, 0) for whole, one in zip(box, inner)]
+    return slice(starts[0], stops[0]), slice(starts[1], stops[1])
+
+
+def _box(settings: SimulatorSettings, points: FloatArray) -> tuple[slice, slice]:
+    """Rows and columns of the picture around points (2, P), image widths, with room for instrument and margin."""
+    border = SHAFT + settings.instrument.margin + 3 / settings.width
+    low = np.floor((points.min(axis=1) - border) * settings.width).astype(int)
+    high = np.ceil((points.max(axis=1) + border) * settings.width).astype(int)
     (left, top), (right, bottom) = np.maximum(low, 0), np.maximum(high, 0)
     return slice(int(top), int(bottom)), slice(int(left), int(right))
 

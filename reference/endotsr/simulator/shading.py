@@ -12,7 +12,7 @@ from endotsr.simulator.bleeding import with_blood
 from endotsr.simulator.lamps import Blocker, Lit, lit_by_endoscope, lit_by_second, mirrored
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.surface import gaussian_weight
-from endotsr.simulator.texture import Texture, sample
+from endotsr.simulator.texture import BLOCK_ROWS, Texture, sample
 from endotsr.simulator.views import View
 from endotsr.splatting.camera import Camera
 
@@ -41,8 +41,29 @@ def shade(settings: SimulatorSettings, texture: Texture, view: View, lamps: list
 
     reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.half)^exponent with the same
     fall-off, where l points to a lamp, r is its distance, half lies half-way between lamp and camera, and n' is the
-    normal of the fine relief; summed over the lamps.
+    normal of the fine relief; summed over the lamps. Rows that stay in the processor's cache are shaded together.
     """
+    parts = []
+    for top in range(0, view.material.shape[1], BLOCK_ROWS):
+        rows = slice(top, top + BLOCK_ROWS)
+        some = [Lit(lamp.diffuse[rows], lamp.received[rows], lamp.half[:, rows]) for lamp in lamps]
+        parts.append(_shade_rows(settings, texture, _rows_of(view, rows), some, t))
+    light = np.concatenate([part.light for part in parts], axis=1)
+    if not settings.highlights.on:
+        return TissueLight(light, None)
+    return TissueLight(light, np.concatenate([part.highlight for part in parts]))
+
+
+def _rows_of(view: View, rows: slice) -> View:
+    """Some rows of a view."""
+    fields = (view.material, view.point, view.normal)
+    return View(
+        *(field[:, rows] for field in fields), view.depth[rows], None if view.wound is None else view.wound[rows]
+    )
+
+
+def _shade_rows(settings: SimulatorSettings, texture: Texture, view: View, lamps: list[Lit], t: float) -> TissueLight:
+    """As `shade`, for some rows."""
     maps = sample(texture, view.material)
     reflectance = maps[:3]
     if view.wound is not None:

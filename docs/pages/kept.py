@@ -1,0 +1,74 @@
+"""Answers of a long measurement, kept one a line as they are found, so that an interrupted one goes on.
+
+The first line says what was measured: settings, and a hash of the sources. A file of another measurement is refused.
+The file stands beside the result, whose name it has with `.part`, until the result is written.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import endotsr
+from endotsr.errors import InputError
+
+
+def measured(
+    result: Path, about: dict[str, Any], keys: Iterable[str], measure: Callable[[str], dict[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """The answers for all keys; those that are kept are read, the others are measured and kept.
+
+    about    JSON-able; kept answers must have the same
+
+    Raises: InputError naming the file, if it belongs to another measurement or is damaged.
+    """
+    path = part_of(result)
+    about = json.loads(json.dumps(about))
+    found = _read(path, about)
+    if not path.exists():
+        path.write_text(json.dumps(about) + "\n", encoding="utf-8")
+    with path.open("a", encoding="utf-8") as file:
+        for key in keys:
+            if key not in found:
+                found[key] = measure(key)
+                file.write(json.dumps({"key": key, "answer": found[key]}) + "\n")
+                file.flush()
+    return found
+
+
+def sources(*rooms: str) -> str:
+    """First 16 hex digits of the SHA-256 over the source files of rooms of the package; "" is the whole package."""
+    package, digest = Path(endotsr.__file__).parent, hashlib.sha256()
+    for room in rooms:
+        for file in sorted((package / room).rglob("*.py")):
+            digest.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def part_of(result: Path) -> Path:
+    """The file of the kept answers of a result."""
+    return result.with_name(result.name + ".part")
+
+
+def finished(result: Path) -> None:
+    """Remove the kept answers of a result that is written."""
+    part_of(result).unlink(missing_ok=True)
+
+
+def _read(path: Path, about: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The kept answers. A last line without its end is left out and removed: the measurement stopped while writing."""
+    if not path.exists():
+        return {}
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    try:
+        first, *lines = [json.loads(line) for line in whole.splitlines()] or [None]
+        answers = {line["key"]: line["answer"] for line in lines}
+    except (ValueError, TypeError, KeyError):
+        raise InputError(f"{path}: damaged; allowed: the answers of this command, or no file") from None
+    if first != about:
+        raise InputError(f"{path}: belongs to another measurement: {first}; allowed: {about}, or no file")
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return answers

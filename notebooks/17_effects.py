@@ -1,0 +1,231 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 17. What a scene calls for
+#
+# A scene at rest needs no time bases, and steady light needs no colour residual. `endotsr inspect` tests the training
+# frames of a clip for each effect, and plans the components that answer what it finds. This notebook repeats four of
+# the tests by hand, on clips in which every effect is known.
+#
+# The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must carry. The
+# page {doc}`/effects` says how often the tests are right, and what a plan saves.
+
+# %%
+import os
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from endotsr.config import PAPER
+from endotsr.effects.clip import TILE, training_clip
+from endotsr.effects.inspect import inspect_sequence
+from endotsr.effects.noise import temporal_noise
+from endotsr.effects.plan import apply_plan, make_plan
+from endotsr.effects.rigid import inverse_depth
+from endotsr.effects.savings import memory_fraction, numbers_of_a_gaussian
+from endotsr.effects.study import settings_of
+from endotsr.equations.dictionary import frequencies, report_atoms
+from endotsr.simulator.simulate import simulate
+
+SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
+FRAMES = 16 if SMALL else 40
+CLIPS = {
+    "still": ("noise",),
+    "beating": ("noise", "pulsation"),
+    "light": ("noise", "exposure"),
+}
+made = {name: simulate(settings_of(effects, 7, FRAMES)) for name, effects in CLIPS.items()}
+found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
+
+# %% [markdown]
+# ## Noise first
+#
+# Every test measures in units of the noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes all slow
+# change. Of independent noise of deviation $\sigma$ it has the deviation $\sqrt{1+4+1}\,\sigma$. The median of the
+# absolute values, which is $0.6745$ deviations for a normal distribution, is not misled by a few moving edges.
+
+
+# %% tags=["transcription"]
+def noise_text(x, mask):
+    """x (n, pixels): the frames at equal steps of time; mask (n, pixels)."""
+    estimates = []
+    for t in range(1, len(x) - 1):
+        seen = mask[t - 1] & mask[t] & mask[t + 1]
+        estimates.append(np.median(np.abs(x[t - 1] - 2 * x[t] + x[t + 1])[seen]) / (0.6745 * np.sqrt(6)))
+    return np.median(estimates)
+
+
+# %%
+whole = training_clip(made["still"].sequence)
+run = slice(1, 8)  # frames 2 to 8: between two that are held out, at equal steps
+part = whole._replace(images=whole.images[run], masks=whole.masks[run], times=whole.times[run])
+assert np.ptp(np.diff(part.times)) < 1e-12
+by_channel = [
+    noise_text(part.images[:, c].reshape(part.count, -1), part.masks.reshape(part.count, -1)) for c in range(3)
+]
+np.testing.assert_allclose(temporal_noise(part), by_channel, rtol=1e-5)
+sigma = made["still"].settings.noise.sigma
+print(f"true {255 * sigma:.2f} grey levels, found {255 * found['still'].noise.level:.2f}")
+assert abs(found["still"].noise.level / sigma - 1) < 0.15
+
+# %% [markdown]
+# ## Motion, in units of what noise would show
+#
+# Even between two frames of a scene at rest the optical flow is not 0. The test therefore also measures the flow
+# between the reference frame and copies of it with fresh noise. A tile moves if its flow exceeds twice that, and a
+# twentieth of a pixel.
+
+# %% tags=["hide-input"]
+figure, axes = plt.subplots(2, 3, figsize=(12, 6), layout="constrained")
+for column, (name, inspection) in zip(axes.T, found.items()):
+    motion, light = inspection.verdicts["motion"], inspection.verdicts["photometric"]
+    picture = column[0].imshow(motion.map.values, vmin=0, vmax=0.5, cmap="viridis")
+    column[0].set_title(f"{name}: motion {motion.kind}", fontsize=10)
+    column[0].set(xticks=[], yticks=[])
+    for label, line in light.curve.lines.items():
+        column[1].plot(
+            light.curve.x, line, label=label, color={"gain": "k", "red": "#D55E00", "blue": "#0072B2"}[label]
+        )
+    column[1].set(ylim=(-12, 12), xlabel="time", title=f"light: {light.kind}")
+axes[1, 0].set_ylabel("percent")
+axes[1, 0].legend(fontsize=8)
+figure.colorbar(picture, ax=axes[0], label="flow, px")
+plt.show()
+
+# %%
+assert not found["still"].verdicts["motion"].present and not found["still"].verdicts["photometric"].present
+assert found["beating"].verdicts["motion"].present
+assert "gain" in found["light"].verdicts["photometric"].kind and not found["light"].verdicts["motion"].present
+
+# %% [markdown]
+# ## A camera that moves before a scene at rest
+#
+# The whole picture then flows. In a rigid scene one number a tile explains the flow to all frames: its inverse depth
+# $\rho$. With the pose $(R_k,\mathbf t_k)$ from the reference camera to camera $k$, a point at the place $\mathbf x$ of
+# the reference is seen at the projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and
+# what is left is motion of the tissue. Depth is not needed.
+
+
+# %% tags=["transcription"]
+def seen_at_text(camera, start, x, y, rho):
+    R = camera.rotation @ start.rotation.T
+    t = camera.translation - R @ start.translation
+    X, Y, Z = R @ np.array([(x - start.cx) / start.fx, (y - start.cy) / start.fy, 1.0]) + rho * t
+    return np.array([camera.fx * X / Z + camera.cx, camera.fy * Y / Z + camera.cy])
+
+
+# %%
+swing = simulate(settings_of(("noise", "camera_motion"), 7, 9, 5.0))
+clip = training_clip(swing.sequence)
+start, reference = clip.cameras[clip.reference], int(swing.sequence.train_index[clip.reference])
+row, column = 3 * TILE, 5 * TILE
+place = np.array([[column + 0.5], [row + 0.5]])
+flow = np.array([swing.true_flow(reference, int(i))[:, row, column] for i in swing.sequence.train_index])
+rho = inverse_depth(clip, place, flow[:, :, None])[0]
+np.testing.assert_allclose(rho, 1 / swing.truth.depth[reference, row, column], rtol=1e-6)
+for k, camera in enumerate(clip.cameras):
+    np.testing.assert_allclose(seen_at_text(camera, start, *place[:, 0], rho) - place[:, 0], flow[k], atol=1e-6)
+print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / rho:.3f} mm")
+
+# %% [markdown]
+# ## What the time stamps carry
+#
+# The Fourier components have the atoms
+#
+# $$
+# \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
+# $$
+#
+# A clip of $n$ frames carries at most $n/2$ cycles. Beyond, two atoms agree at all stamps, and the rank of the
+# dictionary over the stamps, centred and scaled to RMS 1, falls below $2F$. Before that, its condition grows: the
+# largest over the smallest singular value, by which noise in the frames becomes noise in the coefficients.
+
+
+# %% tags=["transcription"]
+def rank_and_condition_text(times, omega):
+    phi = np.concatenate([np.sin(2 * np.pi * omega * times[:, None]), np.cos(2 * np.pi * omega * times[:, None])], 1)
+    centred = phi - phi.mean(0)
+    atoms = centred / np.sqrt((centred**2).mean(0))
+    sizes = np.linalg.svd(atoms, compute_uv=False)
+    rank = np.linalg.matrix_rank(atoms)
+    return rank, sizes[0] / sizes[rank - 1]
+
+
+# %%
+omega = frequencies(PAPER.model.frequencies, PAPER.model.frequency_min, PAPER.model.frequency_max)
+lengths = np.arange(32, 80, 4) + 1
+reports = []
+for n in lengths:
+    stamps = np.array([i / n for i in range(n) if (i - 1) % 8])
+    report = report_atoms(stamps, omega)
+    rank, condition = rank_and_condition_text(stamps, omega)
+    assert rank == report.rank
+    np.testing.assert_allclose(condition, report.condition, rtol=1e-5)
+    reports.append(report)
+plan = make_plan(found["beating"], PAPER)
+carried = plan.dictionary
+print(f"{found['beating'].clip.count} stamps of {FRAMES} frames: {carried.frequencies} frequencies up to "
+      f"{carried.frequency_max:g} cycles, condition {carried.condition:.3g}")  # fmt: skip
+assert carried.frequency_max <= FRAMES / 2 and carried.rank == 2 * carried.frequencies
+
+# %% tags=["hide-input"]
+figure, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
+axis.semilogy(lengths, [report.condition for report in reports], "o-", color="#0072B2")
+axis.axhline(100, color="0.5", ls="--", lw=1)
+axis.annotate("most that a plan allows", (lengths[-1], 100), ha="right", va="bottom", color="0.4")
+axis.set(xlabel="frames of the clip", ylabel="condition", title="8 frequencies up to 16 cycles")
+plt.show()
+
+# %% [markdown]
+# ## The plan, and what it saves
+#
+# A Gaussian has 11 numbers whatever is on, three harmonic coefficients for each of the $(d+1)^2$ functions up to degree
+# $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier component. The
+# optimiser holds two more of each.
+
+
+# %% tags=["transcription"]
+def numbers_text(model):
+    harmonics = 3 * (model.harmonics_degree + 1) ** 2
+    bases = 10 * 3 * model.bases * model.deformation
+    fourier = 2 * 3 * model.frequencies * (model.appearance + model.spectral_motion)
+    return 11 + harmonics + bases + fourier
+
+
+# %%
+for name, inspection in found.items():
+    plan = make_plan(inspection, PAPER)
+    config, lines = apply_plan(plan, PAPER)
+    assert numbers_of_a_gaussian(config) == numbers_text(config.model)
+    np.testing.assert_allclose(plan.memory, 1 - numbers_text(config.model) / numbers_text(PAPER.model), rtol=1e-12)
+    np.testing.assert_allclose(plan.memory, 1 - memory_fraction(config), rtol=1e-12)
+    print(f"{name}: {numbers_text(config.model)} of {numbers_text(PAPER.model)} numbers a Gaussian")
+    print(*(f"  {line}" for line in lines), sep="\n")
+
+# %% [markdown]
+# ## Exercise
+#
+# A clip has 63 frames at 15 frames a second. The heart beats 72 times a minute, and the patient breathes 15 times. How
+# many cycles of both does the clip hold, and which of them can the test of rates and the dictionary find?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles of the dictionary, and
+# 63 frames carry 31.5 cycles. The test of rates asks for three cycles, so that it finds the beat and not the breath.
+from endotsr.effects.periodic import LEAST_CYCLES
+
+seconds = 63 / 15
+beats, breaths = 72 / 60 * seconds, 15 / 60 * seconds
+assert PAPER.model.frequency_min <= breaths < beats <= min(PAPER.model.frequency_max, 63 / 2)
+assert breaths < LEAST_CYCLES <= beats
+rate = found["beating"]._replace(clip=found["beating"].clip._replace(frames=63), frame_rate=15.0)
+np.testing.assert_allclose(rate.per_minute(beats), 72)

@@ -1,0 +1,73 @@
+"""The true motion of a sequence folder that `endotsr simulate` wrote, for the frames that a reader took from it.
+
+In: the folder and the `Sequence` read from it. Out: world positions as `SimulatedSequence.true_positions` gives them.
+The material point of every pixel comes from `truth/frames`, its place at another time from the formula of the surface,
+which the settings in `truth/truth.json` determine. All of it is user input and is checked.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.sequence import Sequence
+from endotsr.simulator.surface import Surface, make_surface, surface_point
+from endotsr.simulator.truth import TRUTH, SceneTruth, read_truth
+
+TOLERANCE = 1e-6  # mm, between the tracks in the file and the formula; both are float64
+
+
+def has_truth(folder: Path) -> bool:
+    """Whether a sequence folder holds the truth of a simulated scene."""
+    return (Path(folder) / TRUTH / "truth.json").is_file()
+
+
+def check_truth(folder: Path) -> tuple[SceneTruth, Surface]:
+    """The truth of a folder and its surface.
+
+    Raises:  InputError as `read_truth` does, or if the tracks are not those of the settings.
+    """
+    truth = read_truth(folder)
+    surface = make_surface(truth.settings)
+    for t, position in zip(truth.times, truth.tracks.position):
+        expected = surface_point(surface, truth.tracks.material, float(t))
+        if not np.allclose(position, expected, rtol=0, atol=TOLERANCE):
+            path = truth.folder / "tracks.npz"
+            raise InputError(
+                f"{path}: position at time {t:g} is not that of the settings; allowed: those of truth.json"
+            )
+    return truth, surface
+
+
+def recorded_positions(folder: Path, sequence: Sequence) -> Callable[[int, int], FloatArray] | None:
+    """(frame, other frame) of the sequence -> (3, H, W) world positions, mm, at the time of the other frame.
+
+    A position is NaN where the first frame shows a wound. The result is None without a truth, or if the sequence was
+    read at another size than that of the files.
+
+    Raises:  InputError if the truth is damaged or does not have the frames of the sequence. Files of single frames are
+             read, and checked, when they are asked for.
+    """
+    if not has_truth(folder):
+        return None
+    truth, surface = check_truth(folder)
+    settings, numbers = truth.settings, {f"{i:06d}": i for i in range(truth.settings.frames)}
+    unknown = [name for name in sequence.names if name not in numbers]
+    if unknown:
+        found = f"{truth.folder}: frame {unknown[0]!r} of the sequence is not in the scene"
+        raise InputError(f"{found}; allowed: 000000 to {settings.frames - 1:06d}")
+    if (settings.width, settings.height) != (sequence.width, sequence.height):
+        return None
+
+    @lru_cache(maxsize=1)  # one frame after another is asked for, each with all times
+    def material(frame: int) -> FloatArray:
+        return truth.frame(frame).material.astype(np.float64)
+
+    def positions(source: int, target: int) -> FloatArray:
+        frame, other = (numbers[sequence.names[i]] for i in (source, target))
+        return surface_point(surface, material(frame), float(truth.times[other]))
+
+    return positions
