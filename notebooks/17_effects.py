@@ -61,7 +61,9 @@ def noise_text(x, mask):
     estimates = []
     for t in range(1, len(x) - 1):
         seen = mask[t - 1] & mask[t] & mask[t + 1]
-        estimates.append(np.median(np.abs(x[t - 1] - 2 * x[t] + x[t + 1])[seen]) / (0.6745 * np.sqrt(6)))
+        estimates.append(
+            np.median(np.abs(x[t - 1] - 2 * x[t] + x[t + 1])[seen]) / (0.6745 * np.sqrt(6))
+        )
     return np.median(estimates)
 
 
@@ -71,7 +73,8 @@ run = slice(1, 8)  # frames 2 to 8: between two that are held out, at equal step
 part = whole._replace(images=whole.images[run], masks=whole.masks[run], times=whole.times[run])
 assert np.ptp(np.diff(part.times)) < 1e-12
 by_channel = [
-    noise_text(part.images[:, c].reshape(part.count, -1), part.masks.reshape(part.count, -1)) for c in range(3)
+    noise_text(part.images[:, c].reshape(part.count, -1), part.masks.reshape(part.count, -1))
+    for c in range(3)
 ]
 np.testing.assert_allclose(temporal_noise(part), by_channel, rtol=1e-5)
 sigma = made["still"].settings.noise.sigma
@@ -94,7 +97,10 @@ for column, (name, inspection) in zip(axes.T, found.items()):
     column[0].set(xticks=[], yticks=[])
     for label, line in light.curve.lines.items():
         column[1].plot(
-            light.curve.x, line, label=label, color={"gain": "k", "red": "#D55E00", "blue": "#0072B2"}[label]
+            light.curve.x,
+            line,
+            label=label,
+            color={"gain": "k", "red": "#D55E00", "blue": "#0072B2"}[label],
         )
     column[1].set(ylim=(-12, 12), xlabel="time", title=f"light: {light.kind}")
 axes[1, 0].set_ylabel("percent")
@@ -103,9 +109,15 @@ figure.colorbar(picture, ax=axes[0], label="flow, px")
 plt.show()
 
 # %%
-assert not found["still"].verdicts["motion"].present and not found["still"].verdicts["photometric"].present
+assert (
+    not found["still"].verdicts["motion"].present
+    and not found["still"].verdicts["photometric"].present
+)
 assert found["beating"].verdicts["motion"].present
-assert "gain" in found["light"].verdicts["photometric"].kind and not found["light"].verdicts["motion"].present
+assert (
+    "gain" in found["light"].verdicts["photometric"].kind
+    and not found["light"].verdicts["motion"].present
+)
 
 # %% [markdown]
 # ## A camera that moves before a scene at rest
@@ -120,7 +132,9 @@ assert "gain" in found["light"].verdicts["photometric"].kind and not found["ligh
 def seen_at_text(camera, start, x, y, rho):
     R = camera.rotation @ start.rotation.T
     t = camera.translation - R @ start.translation
-    X, Y, Z = R @ np.array([(x - start.cx) / start.fx, (y - start.cy) / start.fy, 1.0]) + rho * t
+    X, Y, Z = (
+        R @ np.array([(x - start.cx) / start.fx, (y - start.cy) / start.fy, 1.0]) + rho * t
+    )
     return np.array([camera.fx * X / Z + camera.cx, camera.fy * Y / Z + camera.cy])
 
 
@@ -130,11 +144,15 @@ clip = training_clip(swing.sequence)
 start, reference = clip.cameras[clip.reference], int(swing.sequence.train_index[clip.reference])
 row, column = 3 * TILE, 5 * TILE
 place = np.array([[column + 0.5], [row + 0.5]])
-flow = np.array([swing.true_flow(reference, int(i))[:, row, column] for i in swing.sequence.train_index])
+flow = np.array(
+    [swing.true_flow(reference, int(i))[:, row, column] for i in swing.sequence.train_index]
+)
 rho = inverse_depth(clip, place, flow[:, :, None])[0]
 np.testing.assert_allclose(rho, 1 / swing.truth.depth[reference, row, column], rtol=1e-6)
 for k, camera in enumerate(clip.cameras):
-    np.testing.assert_allclose(seen_at_text(camera, start, *place[:, 0], rho) - place[:, 0], flow[k], atol=1e-6)
+    np.testing.assert_allclose(
+        seen_at_text(camera, start, *place[:, 0], rho) - place[:, 0], flow[k], atol=1e-6
+    )
 print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / rho:.3f} mm")
 
 # %% [markdown]
@@ -153,7 +171,13 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 
 # %% tags=["transcription"]
 def rank_and_condition_text(times, omega):
-    phi = np.concatenate([np.sin(2 * np.pi * omega * times[:, None]), np.cos(2 * np.pi * omega * times[:, None])], 1)
+    phi = np.concatenate(
+        [
+            np.sin(2 * np.pi * omega * times[:, None]),
+            np.cos(2 * np.pi * omega * times[:, None]),
+        ],
+        1,
+    )
     centred = phi - phi.mean(0)
     atoms = centred / np.sqrt((centred**2).mean(0))
     sizes = np.linalg.svd(atoms, compute_uv=False)
@@ -162,7 +186,9 @@ def rank_and_condition_text(times, omega):
 
 
 # %%
-omega = frequencies(PAPER.model.frequencies, PAPER.model.frequency_min, PAPER.model.frequency_max)
+omega = frequencies(
+    PAPER.model.frequencies, PAPER.model.frequency_min, PAPER.model.frequency_max
+)
 lengths = np.arange(32, 80, 4) + 1
 reports = []
 for n in lengths:
@@ -182,7 +208,9 @@ assert carried.frequency_max <= FRAMES / 2 and carried.rank == 2 * carried.frequ
 figure, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
 axis.semilogy(lengths, [report.condition for report in reports], "o-", color="#0072B2")
 axis.axhline(100, color="0.5", ls="--", lw=1)
-axis.annotate("most that a plan allows", (lengths[-1], 100), ha="right", va="bottom", color="0.4")
+axis.annotate(
+    "most that a plan allows", (lengths[-1], 100), ha="right", va="bottom", color="0.4"
+)
 axis.set(xlabel="frames of the clip", ylabel="condition", title="8 frequencies up to 16 cycles")
 plt.show()
 
@@ -207,9 +235,13 @@ for name, inspection in found.items():
     plan = make_plan(inspection, PAPER)
     config, lines = apply_plan(plan, PAPER)
     assert numbers_of_a_gaussian(config) == numbers_text(config.model)
-    np.testing.assert_allclose(plan.memory, 1 - numbers_text(config.model) / numbers_text(PAPER.model), rtol=1e-12)
+    np.testing.assert_allclose(
+        plan.memory, 1 - numbers_text(config.model) / numbers_text(PAPER.model), rtol=1e-12
+    )
     np.testing.assert_allclose(plan.memory, 1 - memory_fraction(config), rtol=1e-12)
-    print(f"{name}: {numbers_text(config.model)} of {numbers_text(PAPER.model)} numbers a Gaussian")
+    print(
+        f"{name}: {numbers_text(config.model)} of {numbers_text(PAPER.model)} numbers a Gaussian"
+    )
     print(*(f"  {line}" for line in lines), sep="\n")
 
 # %% [markdown]
@@ -227,5 +259,7 @@ seconds = 63 / 15
 beats, breaths = 72 / 60 * seconds, 15 / 60 * seconds
 assert PAPER.model.frequency_min <= breaths < beats <= min(PAPER.model.frequency_max, 63 / 2)
 assert breaths < LEAST_CYCLES <= beats
-rate = found["beating"]._replace(clip=found["beating"].clip._replace(frames=63), frame_rate=15.0)
+rate = found["beating"]._replace(
+    clip=found["beating"].clip._replace(frames=63), frame_rate=15.0
+)
 np.testing.assert_allclose(rate.per_minute(beats), 72)

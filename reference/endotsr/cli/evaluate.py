@@ -12,7 +12,9 @@ from endotsr.runs.files import refuse_unwritable, replace_file, write_json
 from endotsr.runs.folder import RunFolder, open_run
 
 if TYPE_CHECKING:
+    from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
+    from endotsr.splatting.render import RenderOut
 
 
 @dataclass
@@ -127,14 +129,10 @@ def evaluate_run(
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.measures import MEASURES, measure_lines, measured
     from endotsr.evaluation.run import measure_run
-    from endotsr.export.scene import RECORD, MovingScene
-    from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.model import load_model
     from endotsr.runs.records import REPORTED
     from endotsr.runs.sources import run_source, true_positions_of
-    from endotsr.views.page import RUN_PAGE, write_run_page
-    from endotsr.views.preview import preview
 
     for name in measures:
         if name not in MEASURES:
@@ -145,11 +143,28 @@ def evaluate_run(
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
     if measures:
         metrics["measures"] = measured(measures, model, sequence, source or remembered)
-    scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
-    write_run_page(folder.path, scene, sequence if view else None)
-    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
+    _write(folder, model, sequence, metrics, held_out, view)
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
+
+
+def _write(
+    folder: RunFolder,
+    model: "Model",
+    sequence: "Sequence",
+    metrics: dict[str, Any],
+    held_out: "dict[int, RenderOut]",
+    view: bool,
+) -> None:
+    """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""
+    from endotsr.export.scene import RECORD, MovingScene
+    from endotsr.report.run_files import write_evaluation
+    from endotsr.views.page import RUN_PAGE, write_run_page
+    from endotsr.views.preview import preview
+
+    scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
+    write_run_page(folder.path, scene, sequence if view else None)
+    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
