@@ -95,7 +95,7 @@ def plot(found: dict[str, Any], path: Path) -> None:
     figure = Figure(figsize=(6, 3), layout="constrained")
     axes = figure.add_subplot()
     axes.plot(iterations, memory / 1e6)
-    axes.set(xlabel="iteration", ylabel="resident memory, MB", ylim=(0, None))
+    axes.set(xlabel="iteration", ylabel="resident memory, MB", ylim=(0, 1.2 * memory.max() / 1e6))
     figure.savefig(path, dpi=150)
 
 
