@@ -52,8 +52,8 @@ def soak(result: dict[str, Any]) -> str:
     run, guard = result["soak"], result["guard"]
     return "\n".join(
         [
-            f"Over {run['iterations']} iterations of a small scene, after the first quarter of them, the resident memory"
-            f" stays at {run['median_bytes'] / 1e6:.0f} MB, within {run['largest_deviation']:.2%} of it.",
+            f"Over {run['iterations']} iterations of a small scene, after the first quarter of them, the resident"
+            f" memory stays at {run['median_bytes'] / 1e6:.0f} MB, within {run['largest_deviation']:.2%} of it.",
             f"The check of the gradients of {guard['gaussians']} Gaussians takes {1e3 * guard['seconds']:.2f} ms an"
             " iteration.",
             made(result),
