@@ -3,8 +3,11 @@
 Its reverse pass follows its forward pass, so that every mistake is made in both.
 """
 
+from pathlib import Path
+
 Injected = tuple[str, tuple[tuple[str, str], ...]]
 
+SOURCE = Path(__file__).parents[3] / "golden" / "ports" / "torch" / "port.py"
 MISTAKES: list[Injected] = [
     (
         "atoms_interleaved",

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-SOURCE = Path(__file__).parents[3] / "golden" / "ports" / "torch" / "port.py"
+from autodiff import SOURCE
 
 
 def answer_of(changes):

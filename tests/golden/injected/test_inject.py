@@ -16,7 +16,6 @@ from endotsr.golden.vectors.registry import FAMILIES, all_wrong_ports, families
 
 sys.path.insert(0, str(Path(__file__).parent))
 import autodiff
-import autodiff_driver
 import c99
 import in_reference
 import inject
@@ -31,7 +30,7 @@ def test_every_mistake_fits_its_source():
         for module in {one.module for one in mistake.edits}:
             assert changed_text(module, [one for one in mistake.edits if one.module == module])
         assert mistake.edits != KNOWN[mistake.flag].edits, f"{mistake.flag} is the wrong port itself"
-    text = autodiff_driver.SOURCE.read_text()
+    text = autodiff.SOURCE.read_text()
     for flag, changes in autodiff.MISTAKES:
         assert [old for old, _ in changes if text.count(old) != 1] == [], flag
 
