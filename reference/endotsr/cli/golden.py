@@ -28,6 +28,10 @@ class _Reported:
     """also write the report as JSON"""
     html: Annotated[Path | None, Option("FILE")] = None
     """also write the report as one HTML page with difference images"""
+    only: Annotated[str, Option("FAMILY[/CASE]")] = ""
+    """judge this family or case alone; there is then no claim, and exit code 0 means that nothing was refused"""
+    all: bool = False
+    """list the cases that passed, too"""
 
 
 @dataclass
@@ -36,7 +40,7 @@ class JudgeOptions(_Reported):
 
     outdir: Outdir = Path()
     again: Annotated[Path | None, Option("DIR")] = None
-    """outputs of a second run: level 5 requires the same bits"""
+    """outputs of a second run: level 5 requires it, with the same bits"""
 
 
 @dataclass
@@ -125,14 +129,15 @@ def _judge(words: list[str]) -> int:
             raise InputError(f"{folder}: not a folder")
     refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
-    report = judge(golden, options.outdir, options.precision, level=options.level, again=options.again)
+    asked = {"level": options.level, "again": options.again, "only": options.only}
+    report = judge(golden, options.outdir, options.precision, **asked)
     return _tell(report, golden, options.outdir, options)
 
 
 def _run(words: list[str]) -> int:
     from endotsr.golden.judge.command import KEPT, clear_kept, refuse_command, run_port, write_requests
     from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.judge.verdict import judge, without_claim
+    from endotsr.golden.judge.verdict import judge, only_of, without_claim
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
@@ -142,11 +147,11 @@ def _run(words: list[str]) -> int:
         root = options.keep or Path(scratch)
         requests, *folders = (root / name for name in KEPT)
         clear_kept(root)
-        write_requests(golden, requests, options.precision, options.level)
+        write_requests(only_of(golden, options.only), requests, options.precision, options.level)
         calls = folders if options.level >= 5 else folders[:1]
         notes = [run_port(options.port, requests, folder, options.timeout) for folder in calls]
         again = folders[1] if options.level >= 5 else None
-        report = judge(golden, folders[0], options.precision, level=options.level, again=again)
+        report = judge(golden, folders[0], options.precision, level=options.level, again=again, only=options.only)
         if any(notes):
             without_claim(report, list(filter(None, notes)))
         return _tell(report, golden, folders[0], options)
@@ -155,12 +160,13 @@ def _run(words: list[str]) -> int:
 def _tell(report, golden, outdir: Path, options: _Reported) -> int:
     from endotsr.golden.judge.report import as_html, as_json, as_table
 
-    print(as_table(report))
+    print(as_table(report, everything=options.all))
     if options.json:
         options.json.write_bytes(as_json(report))
     if options.html:
         options.html.write_text(as_html(report, golden, outdir), encoding="utf-8")
-    return 0 if report.passed else 1
+    accepted = all(case.status in ("passed", "not ported") for case in report.cases) if options.only else report.passed
+    return 0 if accepted else 1
 
 
 def _generate(words: list[str]) -> int:

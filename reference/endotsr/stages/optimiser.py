@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.config import Config, DensityConfig, InitialisationConfig
 from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
@@ -118,16 +119,37 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
-    log = [training_step(state, shop) for _ in range(config.training.iterations)]
-    found: dict[str, Any] = {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
+    log = [training_step(state, shop) | _sizes(state) for _ in range(config.training.iterations)]
+    found: dict[str, Any] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
+    found |= {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
     return found | {
         "lambda_lap": weight,
-        "loss": np.array([entry["loss"] for entry in log]),
         "count": np.array([entry["gaussians"] for entry in log] + [state.gaussians.count], np.int64),
     }, None
 
 
+def _sizes(state: TrainingState) -> dict[str, float]:
+    """What a trajectory tells of its state after an iteration: sums over all entries, 0 of an array "
+    "that is not there."""
+    squares = {f"square_{name}": _total(array * array) for name, array in arrays(state.gaussians).items()}
+    return squares | {
+        "first_moments": sum(_total(abs(array)) for array in state.adam.first.values()),
+        "second_moments": sum(_total(array) for array in state.adam.second.values()),
+        "gradient_sum": _total(state.statistics.gradient_sum),
+        "visits": _total(state.statistics.visits),
+    }
+
+
+def _total(array: NDArray) -> float:
+    return float(array.sum(dtype=np.float64))
+
+
 EXACT = "exact"
+TERMS = {"term_l1": "l1", "term_ssim": "ssim", "term_depth": "depth", "term_laplacian": "laplacian",
+         "term_penalty": "matern_penalty"}  # fmt: skip
+SQUARES = tuple(f"square_{name}" for name in Gaussians._fields)
+STATE = ("first_moments", "second_moments", "gradient_sum", "visits")
+SERIES = TERMS | {name: name for name in ("loss", *SQUARES, *STATE)}  # output: entry of the log
 RATES = [
     "position", "quaternion", "log_scale", "opacity_logit", "harmonics_base", "harmonics_rest", "fdm_weight_position",
     "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
@@ -219,8 +241,11 @@ STAGES = [
         forward=_training,
         asked={
             "lambda_lap": Asked(4),
-            "loss": Asked(4, "loss"),
-            "count": Asked(4, scale=EXACT),
+            **{name: Asked(4, order="iteration") for name in TERMS},
+            "loss": Asked(4, "loss", order="iteration"),
+            "count": Asked(4, scale=EXACT, order="iteration"),
+            **{name: Asked(4, "raw parameter^2", order="iteration") for name in SQUARES},
+            **{name: Asked(4, order="iteration") for name in STATE},
             **{f"final_{name}": Asked(4, "raw parameter", "max") for name in Gaussians._fields},
         },
     ),

@@ -26,6 +26,7 @@ class Asked(NamedTuple):
     scale: str = "max"  # "exact", "max" or "last"
     oracle: str = ""  # "<file of tests/oracle>.<function>"; empty: the reference itself is the truth
     least32: float = 0.0  # least float32 tolerance: what another sound formula loses, beyond the measured spread
+    order: str = ""  # "iteration": entry k is of iteration k + 1
 
 
 def _always(settings: Settings) -> bool:

@@ -57,4 +57,4 @@ def test_a_mistake_in_its_source_is_named(tmp_path):
     report = judge(golden, outputs, "float64", level=1)
     refused = {case.name.split("/")[0] for case in report.cases if case.status == "refused"}
     assert refused == {"composite"} and report.level == 0
-    assert report.suspects[0].flag == "pixel_corner_sample"
+    assert report.suspects[0].flag == "pixel_corner_sample" and report.suspects[0].named

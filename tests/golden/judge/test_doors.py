@@ -38,7 +38,7 @@ def test_the_reference_passes_every_level(golden, answered):
 
 def test_single_precision_does_not_pass_as_double(golden, answered):
     precision, folder = answered
-    report = judge(golden, folder, "float64")
+    report = judge(golden, folder, "float64", again=folder)
     assert report.passed == (precision == "float64")
 
 
@@ -49,7 +49,7 @@ def test_the_claim_is_the_highest_complete_level(golden, answered, tmp_path):
     kept = path.read_bytes()
     try:
         path.write_bytes(npy_bytes(-read_plain(path)))
-        report = judge(golden, folder, precision)
+        report = judge(golden, folder, precision, level=4)
         assert report.level == 1 and not report.passed and judge(golden, folder, precision, level=1).passed
     finally:
         path.write_bytes(kept)
@@ -81,7 +81,7 @@ def test_bits_that_change_between_runs_stop_level_5(golden, answered, tmp_path):
 
 def test_exit_codes_and_report_files(golden, answered, tmp_path, capsys):
     precision, folder = answered
-    words = ["judge", str(folder), "--precision", precision]
+    words = ["judge", str(folder), "--precision", precision, "--again", str(folder)]
     page, data = tmp_path / "r.html", tmp_path / "r.json"
     assert run([*words, "--html", str(page), "--json", str(data)]) == 0
     assert f"level 5, {precision}" in capsys.readouterr().out
@@ -148,7 +148,7 @@ def test_a_refusal_like_no_known_mistake_says_so_and_shows_the_difference(golden
     off = golden.array(next(c for c in golden.cases if c.name == "motion/generic"), "expected/translation.npy").copy()
     off[1, 2] += 5e-12
     (folder / "translation.npy").write_bytes(npy_bytes(off))
-    lines = as_table(judge(golden, tmp_path, "float64", level=1)).splitlines()
+    lines = as_table(judge(golden, tmp_path, "float64", level=1, only="motion")).splitlines()
     assert next(s for s in lines if s.startswith("motion/generic")).endswith("looks like none of the known mistakes")
     assert not [line for line in lines if line == "looks like:" or "made for" in line]
     (line,) = [line for line in lines if "motion/generic/translation" in line]
@@ -168,3 +168,59 @@ def test_difference_images_stand_in_the_page(golden, answered, tmp_path):
         assert page.read_text().count("data:image/png;base64,") == 3
     finally:
         path.write_bytes(kept)
+
+
+def test_level_5_requires_a_second_run(golden, answered):
+    precision, folder = answered
+    report = judge(golden, folder, precision)
+    assert report.level == 4 and report.claim == f"golden {golden.short_version}, level 4, {precision}"
+    assert "second run: give it with --again" in as_table(report, everything=True) or "second run" in as_table(report)
+
+
+def test_one_family_or_case_is_judged_alone_and_without_a_claim(golden, answered, tmp_path, capsys):
+    precision, folder = answered
+    for only, count in (("motion", 1), ("masked_l1", 5), ("masked_l1/equal", 1)):
+        report = judge(golden, folder, precision, level=4, only=only)
+        assert len(report.cases) == count and report.claim == f"no claim: only {only} was judged"
+    words = ["judge", str(folder), "--precision", precision, "--level", "1", "--only"]
+    assert run([*words, "motion"]) == 0 and capsys.readouterr().out.endswith("no claim: only motion was judged\n")
+    with pytest.raises(InputError, match="no such case; allowed: reading, "):
+        run([*words, "no_family"])
+    port = f"{sys.executable} -m endotsr.cli.main golden reference {{outputs}} --requests {{requests}}"
+    assert run(["run", "--port", port, "--level", "2", "--only", "matern", "--keep", str(tmp_path / "kept")]) == 0
+    assert [p.name for p in (tmp_path / "kept" / "requests").iterdir() if p.is_dir()] == ["matern"]
+
+
+def test_failures_alone_are_listed_with_the_level_that_they_stop(golden, answered, tmp_path):
+    """A gradient is refused and two outputs are missing: the case stands in the way of level 2, of none below."""
+    precision, folder = answered
+    case = next(c for c in golden.cases if c.name == "matern/short")
+    target = tmp_path / case.name
+    target.mkdir(parents=True)
+    for name in ("rho", "penalty", "d_motion_coefficients"):
+        value = read_plain(folder / case.name / f"{name}.npy")
+        (target / f"{name}.npy").write_bytes(npy_bytes(value if name != "d_motion_coefficients" else 7 * value))
+    lines = as_table(judge(golden, tmp_path, precision, level=2, only="matern")).splitlines()
+    assert lines[1].split()[:3] == ["matern/published", "1", "0/3"] and "matern/short" in lines[2]
+    assert lines[2].split()[1:3] == ["2", "2/3"]
+    assert "  matern/published: rho, penalty, d_motion_coefficients" in lines
+    whole = as_table(judge(golden, folder, precision, level=2), everything=False)
+    assert "matern/short" not in whole and " cases passed" in whole
+    assert "matern/short" in as_table(judge(golden, folder, precision, level=2), everything=True)
+
+
+def test_a_trajectory_says_where_it_leaves_the_path(golden, answered, tmp_path):
+    precision, folder = answered
+    case = next(c for c in golden.cases if c.name == "training/twenty_iterations")
+    target = tmp_path / case.name
+    target.mkdir(parents=True)
+    for name in case.outputs:
+        value = read_plain(folder / case.name / f"{name}.npy").copy()
+        if name in ("loss", "term_ssim"):
+            value[4:] += np.linspace(0.001, 0.1, value[4:].size)
+        (target / f"{name}.npy").write_bytes(npy_bytes(value))
+    report = judge(golden, tmp_path, precision, level=4, only=case.name)
+    assert report.cases[0].first_wrong == "first wrong at iteration 5: term_ssim, loss"
+    (loss,) = [o for o in report.cases[0].outputs if o.name == "loss"]
+    assert loss.index == (4,)
+    assert "first wrong at iteration 5: term_ssim, loss" in as_table(report)

@@ -51,12 +51,20 @@ def largest(got: NDArray, expected: NDArray, kind: str) -> float:
 
 
 def fingerprint(name: str, array: NDArray) -> float:
-    """Sum of the entries in C order with the signs of the seed `name`."""
-    return float((signs(name, array.size) * array.reshape(-1).astype(np.float64)).sum())
+    """Sum of the entries in C order with the signs of the seed `name`.
+
+    If entries are not finite, these count as 1 and all others as 0.
+    """
+    flat = array.reshape(-1).astype(np.float64)
+    broken = ~np.isfinite(flat)
+    return float((signs(name, array.size) * (broken if broken.any() else flat)).sum())
 
 
-def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdict:
-    """Whether an output of the right shape and kind is allowed."""
+def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str, order: str = "") -> Verdict:
+    """Whether an output of the right shape and kind is allowed.
+
+    order   "iteration": the place of a refusal is the first wrong entry, otherwise the worst
+    """
     if rule.kind == "exact":
         unequal = np.argwhere(got != expected)
         if len(unequal):
@@ -66,9 +74,10 @@ def judged(got: NDArray, expected: NDArray, rule: Rule, precision: str) -> Verdi
     off = distances(got, expected, rule.scale)
     if not off.size:
         return Verdict(True, "empty", 0.0)
-    worst = np.unravel_index(int(off.argmax()), off.shape)
     found = float(off.max())
-    beyond = int((off > tolerance).sum())
+    wrong = off > tolerance
+    beyond = int(wrong.sum())
+    worst = np.unravel_index(int(wrong.argmax() if order else off.argmax()), off.shape)
     if beyond == 0:
         return Verdict(True, f"{found:.1e} <= {tolerance:.0e}", found)
     if not np.isfinite(found):

@@ -94,6 +94,8 @@ class Output(_Strict, frozen=True, kw_only=True):
     compare: Rule
     because: Because | None
     truth: Truth
+    order: Literal["", "iteration"] = ""
+    """iteration: entry k is of iteration k + 1, so that the first wrong entry is the one to look at"""
 
     def __post_init__(self) -> None:
         for file in (self.file, *self.compare.others):
@@ -104,20 +106,35 @@ class Output(_Strict, frozen=True, kw_only=True):
         return self.compare.others[number - 1] if number and self.compare.others else self.file
 
 
-class Mistake(_Strict, frozen=True, kw_only=True):
-    """What a known mistake does to the output that shows it best."""
+class Shown(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What a known mistake does to one output; in the files, a list of two."""
 
-    output: str
     distance: float | None
     """in units of the scale; null: the wrong output is not finite or has another shape"""
     fingerprint: float | None
-    """sum of +-entries of the wrong output, see README"""
+    """sum of +-entries of the wrong output, of its entries that are not finite (each as 1) if there are any; null: it
+    has another shape, or another mistake gives the same integers or booleans"""
+
+
+class Mistake(_Strict, frozen=True, kw_only=True):
+    """What a known mistake does to the outputs of a case."""
+
+    shows: dict[str, Shown]
+    """every output that it changes; empty: the mistake was examined on this case and leaves it right"""
+    rounding: bool = False
+    """it loses digits only: the size of the change identifies it, and `shows` is that of a port in float64"""
+    shows_float32: dict[str, Shown] = {}
+    """of a rounding mistake, in a port in float32"""
+
+    def shown(self, precision: str) -> dict[str, Shown]:
+        """What it does in a port of this precision."""
+        return self.shows_float32 if self.rounding and precision == "float32" else self.shows
 
 
 class Case(_Strict, frozen=True, kw_only=True):
     """case.json"""
 
-    format: Literal[1] = 1
+    format: Literal[2] = 2
     family: str
     case: str
     operation: str
@@ -130,6 +147,7 @@ class Case(_Strict, frozen=True, kw_only=True):
     inputs: dict[str, Array]
     outputs: dict[str, Output]
     mistakes: dict[str, Mistake]
+    """every mistake that was examined on this case"""
 
     def __post_init__(self) -> None:
         for name in (self.family, self.case, *self.outputs):

@@ -1,16 +1,58 @@
-"""From refused outputs to the mistakes that they resemble, by the fingerprints stored in each case."""
+"""From refused outputs to the mistakes that they resemble, by the fingerprints stored in each case.
 
-from collections.abc import Mapping
+A known mistake was made in a copy of the reference and examined on some cases. Every output of these cases is
+evidence: it agrees (refused, with the fingerprint of the mistake), fits (refused, as expected, but the wrong output is
+no sign of this mistake alone), differs (refused, but otherwise wrong), passes (although the mistake changes it), or is
+unexplained (refused, although the mistake leaves it right).
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.golden.judge.compare import fingerprint
-from endotsr.golden.judge.format import Case
+from endotsr.golden.judge.compare import fingerprint, largest, scale_of
+from endotsr.golden.judge.format import Case, Output, Rule, Shown
 from endotsr.golden.judge.store import Golden
 
-NEAR = 0.02  # fraction of the way from right to wrong within which a fingerprint counts as that of a mistake
+NEAR = 2e-3  # fraction of the way from right to wrong within which a fingerprint counts as that of a mistake
+ROUNDINGS = 4.0  # tolerances of one entry, per root of the number of entries, that a fingerprint may be off
+LIKE = 1.5  # decades within which the size of a rounding mistake is that of another port's
+NAMED = 0.5  # score from which a mistake is named
+MENTIONED = 0.2  # score from which it is listed as a partial resemblance
+
+
+class Taken(NamedTuple):
+    """An output of a port: its array, None where it could not be read or has another shape; its verdict; the answer."""
+
+    status: str
+    got: NDArray | None
+    expected: NDArray
+
+
+class Evidence(msgspec.Struct, kw_only=True):
+    """What the outputs of the examined cases say about a mistake, as lists of family/case/output."""
+
+    agrees: list[str] = []
+    fits: list[str] = []
+    differs: list[str] = []
+    passes: list[str] = []
+    unexplained: list[str] = []
+    unlike: float = 0.0
+    """of a mistake that loses digits: decades between the sizes of its changes and those found, added up"""
+
+    @property
+    def score(self) -> float:
+        """From 0 to 1: the part of the refusals that it explains, less if outputs pass that it would change."""
+        explained = len(self.agrees) + len(self.fits)
+        if not explained:
+            return 0.0
+        refused = explained + len(self.differs)
+        recall, precision = explained / (refused + len(self.unexplained)), explained / (refused + len(self.passes))
+        return recall * precision**0.25 * (1.0 if self.agrees else 0.6)
 
 
 class Suspect(msgspec.Struct, kw_only=True):
@@ -19,36 +61,105 @@ class Suspect(msgspec.Struct, kw_only=True):
     flag: str
     title: str
     wrong: str
-    matches: int
-    """refused cases with its fingerprint"""
-    contradicted: int
-    """passed cases that it would have spoiled"""
+    score: float
+    evidence: Evidence
+
+    @property
+    def named(self) -> bool:
+        """Whether it explains enough to be named."""
+        return self.score >= NAMED
 
 
-def recognise(case: Case, name: str, got: NDArray, expected: NDArray, looks: dict[str, float]) -> None:
-    """Mistakes of the case whose fingerprint this output has, with the distance from that fingerprint."""
-    finite = bool(np.isfinite(got.astype(np.float64)).all())
+def evidence_of(case: Case, taken: Mapping[str, Taken], precision: str) -> dict[str, Evidence]:
+    """Evidence of one case on every mistake that was examined on it."""
+    found, refused = {}, any(one.status == "refused" for one in taken.values())
     for flag, mistake in case.mistakes.items():
-        if mistake.output != name:
+        shown, evidence = mistake.shown(precision), Evidence()
+        if not (shown or refused):
             continue
-        if mistake.fingerprint is None:
-            if not finite:
-                looks[flag] = 0.0
-            continue
-        right = fingerprint(name, expected)
-        way = abs(mistake.fingerprint - right)
-        off = abs(fingerprint(name, got) - mistake.fingerprint) if finite else np.inf
-        if off <= NEAR * way or (case.outputs[name].compare.kind == "identical" and finite):
-            looks[flag] = float(off / way) if way else 0.0
+        for name, one in taken.items():
+            kind = _kind(name, one, case.outputs[name], shown.get(name), precision, mistake.rounding)
+            if kind:
+                getattr(evidence, kind).append(f"{case.name}/{name}")
+            if kind == "fits" and mistake.rounding:
+                evidence.unlike += _decades(one, case.outputs[name], shown[name])
+        found[flag] = evidence
+    return found
 
 
-def suspects_of(golden: Golden, verdicts: Mapping[str, tuple[str, list[str]]]) -> list[Suspect]:
-    """Mistakes that explain refusals, best first, from status and likely mistakes by case."""
-    passed = {name for name, (status, _) in verdicts.items() if status == "passed"}
-    found = []
-    for flag, note in golden.manifest.flags.items():
-        matches = sum(flag in looks for _, looks in verdicts.values())
-        if matches:
-            against = sum(c.name in passed for c in golden.cases if flag in c.mistakes)
-            found.append(Suspect(flag=flag, title=note.title, wrong=note.wrong, matches=matches, contradicted=against))
-    return sorted(found, key=lambda s: (s.contradicted - s.matches, s.contradicted))
+def _kind(name: str, one: Taken, asked: Output, shown: Shown | None, precision: str, rounding: bool) -> str:
+    """Which list of `Evidence` an output belongs to, "" for none."""
+    changes = _changes(shown, asked.compare, precision)
+    if one.status == "passed":
+        return "passes" if changes else ""
+    if one.status != "refused":
+        return ""
+    if changes is False or shown is None:
+        return "unexplained"
+    if changes is None:
+        return ""
+    if one.got is None:
+        return "fits" if shown.distance is None and shown.fingerprint is None else "differs"
+    if rounding:
+        return "fits" if _decades(one, asked, shown) <= LIKE else "differs"
+    if shown.fingerprint is None:
+        return "fits" if shown.distance is not None else "differs"
+    return _fingerprints(name, one, shown, asked.compare, precision)
+
+
+def _changes(shown: Shown | None, rule: Rule, precision: str) -> bool | None:
+    """Whether an output is refused because of the mistake; None: too close to the tolerance to say."""
+    if shown is None:
+        return False
+    tolerance = rule.float64 if precision == "float64" else rule.float32
+    if shown.distance is None or rule.kind not in ("relative", "either-of"):
+        return True
+    return True if shown.distance > 2 * tolerance else False if shown.distance < tolerance / 2 else None
+
+
+def _decades(one: Taken, asked: Output, shown: Shown) -> float:
+    """Decades between the size of a change and that of a mistake; infinite where one of them is not a number."""
+    size = 0.0 if one.got is None else largest(one.got, one.expected, asked.compare.scale)
+    known = 0 < size < math.inf and shown.distance is not None
+    return abs(math.log10(size / shown.distance)) if known else math.inf  # type: ignore[operator]
+
+
+def _fingerprints(name: str, one: Taken, shown: Shown, rule: Rule, precision: str) -> str:
+    assert one.got is not None and shown.fingerprint is not None
+    finite = bool(np.isfinite(one.got.astype(np.float64)).all())
+    if finite == (shown.distance is None):
+        return "differs"
+    own = fingerprint(name, one.got)
+    if not finite:
+        return "agrees" if own == shown.fingerprint else "differs"
+    way = abs(shown.fingerprint - fingerprint(name, one.expected))
+    tolerance = 0.0 if rule.kind == "exact" else rule.float64 if precision == "float64" else rule.float32
+    largest_unit = float(np.max(scale_of(one.expected, rule.scale or "max"))) if one.expected.size else 0.0
+    allowed = max(NEAR * way, ROUNDINGS * tolerance * largest_unit * np.sqrt(one.got.size))
+    near = abs(own - shown.fingerprint) <= allowed
+    if 4 * allowed > way:  # the signs cancel: right and wrong have one fingerprint, within rounding
+        return "fits" if near else "differs"
+    return "agrees" if near else "differs"
+
+
+def merged(parts: Iterable[Mapping[str, Evidence]]) -> dict[str, Evidence]:
+    """The evidence of several cases on every mistake that explains a refusal in one of them."""
+    parts = list(parts)
+    found = {flag: Evidence() for part in parts for flag, one in part.items() if one.agrees or one.fits}
+    for part in parts:
+        for flag in part.keys() & found.keys():
+            one, whole = part[flag], found[flag]
+            for field in ("agrees", "fits", "differs", "passes", "unexplained"):
+                getattr(whole, field).extend(getattr(one, field))
+            whole.unlike += one.unlike
+    return found
+
+
+def suspects_of(golden: Golden, evidence: Mapping[str, Evidence]) -> list[Suspect]:
+    """Mistakes that explain refusals, best first: by score, then by the number of outputs that agree, then by size."""
+    found = [
+        Suspect(flag=flag, title=note.title, wrong=note.wrong, score=evidence[flag].score, evidence=evidence[flag])
+        for flag, note in golden.manifest.flags.items()
+        if flag in evidence and evidence[flag].score >= MENTIONED
+    ]
+    return sorted(found, key=lambda s: (-round(s.score, 6), -len(s.evidence.agrees), s.evidence.unlike))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.golden.judge.format import LEVELS
 from endotsr.golden.judge.npy import Refused, read_plain
+from endotsr.golden.judge.recognise import Suspect
 from endotsr.golden.judge.store import Golden
 from endotsr.golden.judge.verdict import CaseReport, OutputReport, Report
 
@@ -22,39 +23,91 @@ UNKNOWN = "looks like none of the known mistakes"
 
 def as_json(report: Report) -> bytes:
     """The report as JSON."""
-    return msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n"
+    cases = [msgspec.structs.replace(case, evidence={}) for case in report.cases]
+    return msgspec.json.format(msgspec.json.encode(msgspec.structs.replace(report, cases=cases)), indent=1) + b"\n"
 
 
-def as_table(report: Report) -> str:
-    """The report for a terminal."""
-    lines = [f"{'case':<32} {'level':>5} {'outputs':>8}  verdict"]
-    for case in report.cases:
+def as_table(report: Report, *, everything: bool = False) -> str:
+    """The report for a terminal: the cases that did not pass, or all of them."""
+    shown = [case for case in report.cases if everything or case.status != "passed"]
+    lines = [f"{'case':<32} {'level':>5} {'outputs':>8}  verdict"] if shown else []
+    for case in shown:
         good = sum(o.status == "passed" for o in case.outputs)
-        lines.append(f"{case.name:<32} {case.level:>5} {good:>4}/{len(case.outputs):<3}  {_summary(case)}")
-    bad = [(c, o) for c in report.cases for o in c.outputs if o.status == "refused"]
-    if bad:
-        lines += ["", "refused outputs:"]
-        lines += [f"  {case.name}/{o.name}: {_line(o)}" for case, o in bad[:MOST_LINES]]
-        lines += [f"  ... and {len(bad) - MOST_LINES} more"] if len(bad) > MOST_LINES else []
-    if report.suspects:
-        lines += ["", "looks like:"]
-        for s in report.suspects[:5]:
-            against = f", but {s.contradicted} passed cases speak against it" if s.contradicted else ""
-            lines.append(f"  {s.flag}: {s.title} ({s.wrong}); in {s.matches} case{'s' * (s.matches > 1)}{against}")
-    elif bad:
-        lines += ["", UNKNOWN]
+        lines.append(f"{case.name:<32} {_level(case):>5} {good:>4}/{len(case.outputs):<3}  {_summary(case)}")
+    if len(shown) < len(report.cases):
+        lines.append(f"{len(report.cases) - len(shown)} of {len(report.cases)} cases passed")
+    lines += _listed("refused outputs:", [f"{c.name}/{o.name}: {_line(o)}" for c, o in _outputs(report, "refused")])
+    lines += _listed("missing outputs:", _missing(report))
+    lines += _suspects(report)
     lines += [""] + [
         f"level {k} ({LEVELS[k]}): {good} of {asked} outputs" for k, (good, asked) in report.levels.items()
     ]
     return "\n".join([*lines, *report.notes, report.claim])
 
 
+def _level(case: CaseReport) -> int:
+    """The lowest level that a case stands in the way of; that of the case if it passed."""
+    return min((o.level for o in case.outputs if o.status != "passed"), default=case.level)
+
+
+def _outputs(report: Report, status: str) -> list[tuple[CaseReport, OutputReport]]:
+    return [(case, o) for case in report.cases for o in case.outputs if o.status == status]
+
+
+def _missing(report: Report) -> list[str]:
+    """The names of missing outputs, one line a case."""
+    names: dict[str, list[str]] = {}
+    for case, output in _outputs(report, "missing"):
+        names.setdefault(case.name, []).append(output.name)
+    return [f"{case}: {', '.join(outputs)}" for case, outputs in names.items()]
+
+
+def _listed(title: str, lines: list[str]) -> list[str]:
+    if not lines:
+        return []
+    more = [f"  ... and {len(lines) - MOST_LINES} more"] if len(lines) > MOST_LINES else []
+    return ["", title, *(f"  {line}" for line in lines[:MOST_LINES]), *more]
+
+
+def _suspects(report: Report) -> list[str]:
+    """The mistakes that are named, with what speaks for and against each, and otherwise the partial resemblances."""
+    if not any(case.status == "refused" for case in report.cases):
+        return []
+    named = [s for s in report.suspects if s.named]
+    lines = ["", "looks like:"] if named else ["", UNKNOWN]
+    for suspect in named[:5]:
+        lines.append(f"  {suspect.flag}: {suspect.title} ({suspect.wrong})")
+        lines += [f"    {line}" for line in said(suspect)]
+    if not named and report.suspects:
+        names = ", ".join(f"{s.flag} ({s.score:.2f})" for s in report.suspects[:3])
+        lines.append(f"  resembles in part, of 1: {names}")
+    return lines
+
+
+def said(suspect: Suspect) -> list[str]:
+    """What speaks for a mistake, and what against it."""
+    e = suspect.evidence
+    cases = len({name.rpartition("/")[0] for name in e.agrees + e.fits})
+    lines = [f"for it: {len(e.agrees)} outputs agree, {len(e.fits)} more are refused as expected, in {cases} cases"]
+    for text, names in (
+        ("refused, but wrong in another way", e.differs),
+        ("passed, although it changes them", e.passes),
+        ("refused, although it leaves them right", e.unexplained),
+    ):
+        if names:
+            more = f" and {len(names) - 2} more" if len(names) > 2 else ""
+            lines.append(f"against it: {text}: {', '.join(names[:2])}{more}")
+    return lines
+
+
 def _summary(case: CaseReport) -> str:
     if case.status in ("passed", "not ported"):
         return case.status
+    first = f"; {case.first_wrong}" if case.first_wrong else ""
     if case.looks_like:
-        return f"{case.status}: looks like {', '.join(case.looks_like[:3])}"
-    return f"{case.status}: {UNKNOWN}" if any(o.expected is not None for o in case.outputs) else case.status
+        return f"{case.status}: looks like {', '.join(case.looks_like[:3])}{first}"
+    known = any(o.expected is not None for o in case.outputs)
+    return f"{case.status}: {UNKNOWN}{first}" if known else case.status
 
 
 def _line(output: OutputReport) -> str:
@@ -84,16 +137,16 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
             details.append(f"<li><b>{e(o.name)}</b> (level {o.level}) {e(_line(o))}{picture}</li>")
         body = f"<ul>{''.join(details)}</ul>" if details else ""
         rows.append(
-            f'<tr class="{case.status}"><td>{e(case.name)}</td><td>{case.level}</td><td>{e(case.title)}</td>'
+            f'<tr class="{case.status}"><td>{e(case.name)}</td><td>{_level(case)}</td><td>{e(case.title)}</td>'
             f"<td>{e(_summary(case))}{body}</td></tr>"
         )
     levels = "".join(
         f"<tr><td>{k}</td><td>{e(LEVELS[k])}</td><td>{a} of {b}</td></tr>" for k, (a, b) in report.levels.items()
     )
     suspects = "".join(
-        f"<li><b>{e(s.flag)}</b>: {e(s.title)}. {e(s.wrong)}. Cases with its fingerprint: {s.matches}; "
-        f"passed cases against it: {s.contradicted}</li>"
+        f"<li><b>{e(s.flag)}</b>: {e(s.title)}. {e(s.wrong)}. {e('; '.join(said(s)))}</li>"
         for s in report.suspects[:8]
+        if s.named
     )
     return _PAGE.format(
         claim=e(report.claim), levels=levels, rows="".join(rows), notes=e(" ".join(report.notes)),

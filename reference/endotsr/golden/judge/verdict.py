@@ -7,10 +7,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.errors import InputError
 from endotsr.golden.judge.compare import Verdict, judged, misses
 from endotsr.golden.judge.format import LEVELS, Case, Output, Precision
 from endotsr.golden.judge.npy import Refused, read_plain, read_text
-from endotsr.golden.judge.recognise import Suspect, recognise, suspects_of
+from endotsr.golden.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
 from endotsr.golden.judge.store import Golden
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
@@ -40,10 +41,14 @@ class CaseReport(msgspec.Struct, kw_only=True):
     status: Status
     outputs: list[OutputReport]
     looks_like: list[str]
-    """mistakes whose fingerprint the output has, best first"""
+    """mistakes that explain the refusals of this case, best first"""
     made_for: list[str]
     answer: int = 0
     """which of several legal answers it was held against"""
+    first_wrong: str = ""
+    """of a trajectory: the first wrong iteration, and the quantities that are wrong there"""
+    evidence: dict[str, Evidence] = {}
+    """by mistake; not part of the JSON report, whose suspects hold the sums"""
 
 
 class Report(msgspec.Struct, kw_only=True):
@@ -69,22 +74,37 @@ class Report(msgspec.Struct, kw_only=True):
         return self.level >= self.asked_level
 
 
-def judge(golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None) -> Report:
+def judge(
+    golden: Golden, outputs: Path, precision: Precision, *, level: int = 5, again: Path | None = None, only: str = ""
+) -> Report:
     """Compare OUTDIR/<family>/<case>/<name>.npy with the golden cases up to a level.
 
-    again   a second folder of the same port: level 5 then also requires the same bits everywhere
+    again   a second folder of the same port, whose bits must be the same; without it level 5 is not complete
+    only    a family, or family/case: no other case is judged, and there is no claim
     """
+    golden = only_of(golden, only)
     without, notes = declared(golden, outputs)
     reports = [
         _left_out(case) if case.operation in without else judge_case(golden, case, outputs, precision, level)
         for case in golden.cases
         if case.level <= level
     ]
-    if again is not None and level >= 5:
-        reports.append(_repeated(golden, outputs, again, without))
-    elif level >= 5:
-        notes.append("level 5: only the determinism cases; a second run (--again) compares all outputs bit by bit")
-    return conclude(golden, reports, precision, level, notes, without)
+    if level >= 5:
+        reports.append(_not_repeated() if again is None else _repeated(golden, outputs, again, without))
+    report = conclude(golden, reports, precision, level, notes, without)
+    if only:
+        report.claim = f"no claim: only {only} was judged"
+    return report
+
+
+def only_of(golden: Golden, only: str) -> Golden:
+    """The same with the cases of one family, or one family/case. Raises InputError if there is none."""
+    cases = [case for case in golden.cases if only in ("", case.family, case.name)]
+    if not cases:
+        raise InputError(
+            f"--only {only[:60]!a}: no such case; allowed: {', '.join(golden.manifest.families)}, or FAMILY/CASE"
+        )
+    return golden._replace(cases=cases)
 
 
 def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]:
@@ -119,7 +139,7 @@ def conclude(
     return Report(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
         claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
-        suspects=suspects_of(golden, {r.name: (r.status, r.looks_like) for r in reports}), notes=notes,
+        suspects=suspects_of(golden, merged(r.evidence for r in reports)), notes=notes,
     )  # fmt: skip
 
 
@@ -156,33 +176,46 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
                 taken[name] = refusal
     tries = [_held_against(golden, case, taken, precision, answer) for answer in range(case.answers)]
     best = min(range(case.answers), key=lambda k: misses((o.level, o.status == "passed") for o in tries[k][0]))
-    found, looks = tries[best]
+    found, seen = tries[best]
+    evidence = evidence_of(case, seen, precision)
+    scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
     return CaseReport(
         name=case.name, title=case.title, level=case.level, status=_together(found), outputs=found,
-        looks_like=sorted(looks, key=lambda flag: looks[flag]), made_for=list(case.flags), answer=best,
+        looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
+        made_for=list(case.flags), answer=best, first_wrong=_first_wrong(case, found), evidence=evidence,
     )  # fmt: skip
 
 
 def _held_against(
     golden: Golden, case: Case, taken: dict[str, NDArray | Refused], precision: Precision, answer: int
-) -> tuple[list[OutputReport], dict[str, float]]:
-    """Verdicts on all outputs against one of the legal answers, and the mistakes that they look like."""
+) -> tuple[list[OutputReport], dict[str, Taken]]:
+    """Verdicts on all outputs against one of the legal answers, and the outputs as evidence of mistakes."""
     found: list[OutputReport] = []
-    looks: dict[str, float] = {}
+    seen: dict[str, Taken] = {}
     for name, got in taken.items():
         asked = case.outputs[name]
+        expected = golden.array(case, asked.answer(answer))
         if isinstance(got, Refused):
             status: Status = "missing" if str(got) == "missing" else "refused"
             found.append(OutputReport(name=name, level=asked.level, status=status, reason=str(got)))
+            seen[name] = Taken(status, None, expected)
             continue
-        expected = golden.array(case, asked.answer(answer))
-        verdict = judged(got, expected, asked.compare, precision)
+        verdict = judged(got, expected, asked.compare, precision, asked.order)
         if verdict.passed and asked.compare.kind == "identical":
             verdict = _identical(got, taken.get(asked.compare.to), asked.compare.to)
         found.append(_report(name, asked, verdict))
-        if not verdict.passed:
-            recognise(case, name, got, expected, looks)
-    return found, looks
+        seen[name] = Taken(found[-1].status, got, expected)
+    return found, seen
+
+
+def _first_wrong(case: Case, found: list[OutputReport]) -> str:
+    """The first wrong iteration of a trajectory and what is wrong there, in the order of the outputs."""
+    wrong = {o.name: o.index[0] + 1 for o in found if o.index and case.outputs[o.name].order == "iteration"}
+    if not wrong:
+        return ""
+    first = min(wrong.values())
+    names = [name for name, iteration in wrong.items() if iteration == first]
+    return f"first wrong at iteration {first}: {', '.join(names)}"
 
 
 def _together(found: list[OutputReport]) -> Status:
@@ -222,6 +255,15 @@ def _report(name: str, asked: Output, verdict: Verdict) -> OutputReport:
 
 def _plain(value: float) -> float | None:
     return value if np.isfinite(value) else None
+
+
+def _not_repeated() -> CaseReport:
+    """Without a second run level 5 is not complete."""
+    missing = OutputReport(name="second run", level=5, status="missing", reason="no second run: give it with --again")
+    return CaseReport(
+        name="determinism/again", title="A second run gives the same bits", level=5, status="missing",
+        outputs=[missing], looks_like=[], made_for=["sums_in_any_order"],
+    )  # fmt: skip
 
 
 def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:

@@ -4,13 +4,8 @@ A parameter and one gradient a step come in. The cases fix the bias correction, 
 gradients, and that a second moment of 0 moves nothing.
 """
 
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed
-from endotsr.golden.vectors.wrong import Request, WrongPort
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("adam",)
 
@@ -25,7 +20,13 @@ def _three_steps() -> Spec:
     gradients = seeds.uniform("gradients", -1.0, 1.0, 3, 4, 5)
     gradients = changed(gradients, (slice(None), 0), gradients.array[:, 0] * 2.0**-24, "[:, 0] times 2^-24")
     gradients = changed(gradients, (slice(None), 3, 4), 0.0, "[:, 3, 4] is 0")
-    flags = ("adam_without_bias_correction", "adam_epsilon_in_root", "adam_epsilon_1e-8", "adam_first_step_zero")
+    flags = (
+        "adam_without_bias_correction",
+        "adam_epsilon_in_root",
+        "adam_epsilon_1e-8",
+        "adam_first_step_zero",
+        "adam_second_moment_uncorrected",
+    )
     return _spec("three_steps", "Bias correction, epsilon outside the root, a tiny gradient", flags,
                  seeds.uniform("parameter", -1.0, 1.0, 4, 5), gradients)  # fmt: skip
 
@@ -46,41 +47,58 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _adam_with(root=lambda v, eps: np.sqrt(v) + eps, corrected=True, epsilon=None):
-    def wrong(request: Request) -> dict[str, NDArray]:
-        p = request.inputs["parameter"].copy()
-        beta1, beta2 = request.settings["beta1"], request.settings["beta2"]
-        eps = request.settings["epsilon"] if epsilon is None else epsilon
-        m, v = np.zeros_like(p), np.zeros_like(p)
-        for k, g in enumerate(request.inputs["gradients"], start=1):
-            m, v = beta1 * m + (1 - beta1) * g, beta2 * v + (1 - beta2) * g * g
-            mm, vv = (m / (1 - beta1**k), v / (1 - beta2**k)) if corrected else (m, v)
-            p = p - request.settings["rate"] * mm / root(vv, eps)
-        return {"parameter_after": p}
-
-    return wrong
-
-
-def _late_adam(request: Request) -> dict[str, NDArray]:
-    inputs = dict(request.inputs) | {"gradients": request.inputs["gradients"][1:]}
-    return request.run(inputs, request.settings)
-
-
-def _zero_over_zero(request: Request) -> dict[str, Any] | None:
-    """An update m / sqrt(v) without epsilon."""
-    nothing = request.right["second"] == 0
-    return {"parameter_after": np.where(nothing, np.nan, request.right["parameter_after"])} if nothing.any() else None
-
+SOURCE = "fitting.adam"
 
 WRONG_PORTS = [
-    WrongPort("adam_without_bias_correction", "Adam without bias correction", "m / sqrt(v); right: corrected",
-              {"adam": _adam_with(corrected=False)}),
-    WrongPort("adam_epsilon_in_root", "Epsilon inside the root", "sqrt(v + eps); right: sqrt(v) + eps",
-              {"adam": _adam_with(lambda v, eps: np.sqrt(v + eps))}),
-    WrongPort("adam_epsilon_1e-8", "Adam's usual epsilon", "1e-8; right: 1e-15", {"adam": _adam_with(epsilon=1e-8)}),
-    WrongPort("adam_first_step_zero", "First gradient not stepped on", "one step late; right: k counts from 1",
-              {"adam": _late_adam}),
-    WrongPort("adam_zero_over_zero", "Step of a zero gradient", "0 / 0; right: 0 over epsilon",
-              {"adam": _zero_over_zero}),
-]  # fmt: skip
+    port(
+        "adam_without_bias_correction",
+        "Adam without bias correction",
+        "m / sqrt(v); right: corrected",
+        "adam",
+        edit(
+            SOURCE,
+            "return learning_rate / (1.0 - beta1**step), 1.0 / (1.0 - beta2**step) ** 0.5",
+            "return learning_rate, 1.0",
+        ),
+    ),
+    port(
+        "adam_second_moment_uncorrected",
+        "Bias correction of the first moment alone",
+        "v; right: v / (1 - beta2^k)",
+        "adam",
+        edit(SOURCE, "(1.0 - beta1**step), 1.0 / (1.0 - beta2**step) ** 0.5", "(1.0 - beta1**step), 1.0"),
+    ),
+    port(
+        "adam_epsilon_in_root",
+        "Epsilon inside the root",
+        "sqrt(v + eps); right: sqrt(v) + eps",
+        "adam",
+        edit(SOURCE, "(np.sqrt(v) * root + epsilon)", "np.sqrt(v * root * root + epsilon)"),
+    ),
+    port(
+        "adam_epsilon_1e-8",
+        "Adam's usual epsilon",
+        "1e-8; right: 1e-15",
+        "adam",
+        edit(SOURCE, "real(rate), real(root), real(epsilon)", "real(rate), real(root), real(1e-8)"),
+    ),
+    port(
+        "adam_first_step_zero",
+        "First gradient not stepped on",
+        "one step late; right: k counts from 1",
+        "adam",
+        edit(
+            SOURCE,
+            "        state.step[name] += 1\n        for part",
+            '        if not state.step.setdefault(f"{name} began", 0):\n            state.step[f"{name} began"] = 1\n'
+            "            continue\n        state.step[name] += 1\n        for part",
+        ),
+    ),
+    port(
+        "adam_zero_over_zero",
+        "Step of a zero gradient",
+        "0 / 0; right: 0 over epsilon",
+        "adam",
+        edit(SOURCE, "(np.sqrt(v) * root + epsilon)", "(np.sqrt(v) * root)"),
+    ),
+]

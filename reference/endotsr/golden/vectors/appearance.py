@@ -4,12 +4,8 @@ Coefficients A, normalised atoms and a gradient by the residual come in. The cas
 bound, show that zero coefficients still have a gradient, and saturate the tanh.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.making import Seeds, Spec
-from endotsr.golden.vectors.wrong import Request, WrongPort, scaled
-from endotsr.kernels.constants import Y00
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("appearance",)
 
@@ -21,7 +17,7 @@ def cases() -> list[Spec]:
         ("generic", 0.4, "beta tanh(A phi_bar) / Y00", ("missing_y00", "tanh_missing")),
         ("zero", 0.0, "Zero coefficients: no residual, but a gradient", ("zero_coefficients_zero_gradient",)),
         ("saturated", 4.0, "A saturated residual keeps its bound and its derivative",
-         ("tanh_missing", "missing_y00")),
+         ("tanh_missing", "missing_y00", "tanh_gradient_missing")),
     ):  # fmt: skip
         seeds = Seeds("appearance", case)
         inputs = {
@@ -35,25 +31,39 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _not_bounded(request: Request) -> dict[str, NDArray]:
-    a, atoms, d = (request.inputs[n] for n in ("appearance_coefficients", "phi_bar", "d_residual"))
-    scale = request.settings["beta"] / Y00
-    return {
-        "residual": scale * np.einsum("cai,a->ci", a, atoms),
-        "d_appearance_coefficients": scale * np.einsum("ci,a->cai", d, atoms),
-        "d_phi_bar": scale * np.einsum("ci,cai->a", d, a),
-    }
-
+SOURCE = "equations.appearance"
 
 WRONG_PORTS = [
-    WrongPort("missing_y00", "1 / Y00 missing in the colour residual", "beta tanh; right: beta tanh / Y00",
-              {"appearance": scaled(Y00, "residual", "d_appearance_coefficients", "d_phi_bar"),
-               "scene": scaled(Y00, "residual_at_t")}),
-    WrongPort("tanh_missing", "Colour residual not bounded", "beta A phi_bar; right: beta tanh(A phi_bar)",
-              {"appearance": _not_bounded}),
-    WrongPort("zero_coefficients_zero_gradient", "No gradient to zero coefficients",
-              "component skipped while it is 0; right: its gradient starts it",
-              {"appearance": lambda r: {"d_appearance_coefficients": 0 * r.right["d_appearance_coefficients"]}
-               if not r.inputs["appearance_coefficients"].any() else None}),
-]  # fmt: skip
+    port(
+        "missing_y00",
+        "1 / Y00 missing in the colour residual",
+        "beta tanh; right: beta tanh / Y00",
+        "appearance scene",
+        edit(SOURCE, "type(beta / Y00)", "type(beta)"),
+    ),
+    port(
+        "tanh_missing",
+        "Colour residual not bounded",
+        "beta A phi_bar; right: beta tanh(A phi_bar)",
+        "appearance scene",
+        edit(SOURCE, "v, d = _tanh_and_slope_kernel(x[k])", "v, d = x[k], type(x[k])(1)"),
+    ),
+    port(
+        "tanh_gradient_missing",
+        "Derivative of tanh left out",
+        "1; right: 1 - tanh^2",
+        "appearance",
+        edit(SOURCE, "derivative[k] = scale * d", "derivative[k] = scale"),
+    ),
+    port(
+        "zero_coefficients_zero_gradient",
+        "No gradient to zero coefficients",
+        "component skipped while it is 0; right: its gradient starts it",
+        "appearance",
+        edit(
+            SOURCE,
+            "    d_argument = argument_gradient(d_residual, saved)\n",
+            "    d_argument = argument_gradient(d_residual, saved) * saved.appearance_coefficients.any()\n",
+        ),
+    ),
+]

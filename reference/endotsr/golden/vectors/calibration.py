@@ -4,14 +4,10 @@ The gradient images of some views come in, photometric and Laplacian, so that th
 have an odd and an even number of views, a view without photometric gradient, and no valid view at all.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.golden.vectors.making import Seeds, Spec, changed
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("calibration",)
 
@@ -46,56 +42,64 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _weight(middle: Callable[[NDArray, NDArray], float]) -> dict[str, Wrong]:
-    """Another middle than the median over the valid views of g_lap / g_rgb."""
-
-    def wrong(request: Request) -> dict[str, Any] | None:
-        rgb, laplacian = request.right["g_rgb"], request.right["g_lap"]
-        if not (rgb > 0).any():
-            return None
-        return {"lambda_lap": request.settings["gradient_ratio"] / middle(rgb, laplacian)}
-
-    return {"calibration": wrong}
-
-
-def _lower_median(rgb: NDArray, laplacian: NDArray) -> float:
-    ratios = np.sort(_live(rgb, laplacian))
-    return ratios[(ratios.size - 1) // 2]
-
-
-def _with_dead_views(rgb: NDArray, laplacian: NDArray) -> float:
-    return float(np.median(np.where(rgb > 0, laplacian / np.where(rgb > 0, rgb, 1), np.inf)))
-
-
-def _live(rgb: NDArray, laplacian: NDArray) -> NDArray:
-    """Ratios of the views that have a photometric gradient."""
-    return (laplacian / rgb)[rgb > 0]
-
-
-def _over_tissue(request: Request) -> dict[str, Any]:
-    """RMS over the pixels that have a gradient."""
-    rgb, laplacian = request.inputs["d_photometric"], request.inputs["d_laplacian"]
-    g = np.array([np.sqrt((v[v != 0] ** 2).mean()) if v.any() else 0.0 for v in rgb])
-    h = np.sqrt((laplacian**2).mean(axis=(1, 2, 3)))
-    live = g > 0
-    if not live.any():
-        return {}
-    return {"g_rgb": g, "lambda_lap": request.settings["gradient_ratio"] / np.median(h[live] / g[live])}
-
+SOURCE = "equations.calibration"
+RATIOS, MEDIAN = "ratios.append(view.laplacian / view.photometric)", "float(np.median(ratios))"
+BOTH = "calibration training"
 
 WRONG_PORTS = [
-    WrongPort("calibration_mean", "Mean over the views", "mean; right: median",
-              _weight(lambda rgb, laplacian: _live(rgb, laplacian).mean())),
-    WrongPort("calibration_lower_median", "Lower of the middle two", "no interpolation; right: their mean",
-              _weight(_lower_median)),
-    WrongPort("calibration_inverted", "Ratio of the gradients inverted", "g_rgb / g_lap; right: g_lap / g_rgb",
-              _weight(lambda rgb, laplacian: float(np.median(1 / _live(rgb, laplacian))))),
-    WrongPort("calibration_over_tissue", "RMS over tissue pixels", "over pixels with a gradient; right: over all",
-              {"calibration": _over_tissue}),
-    WrongPort("calibration_keeps_dead_view", "View without photometric gradient kept",
-              "an infinite ratio moves the median; right: dropped", _weight(_with_dead_views)),
-    WrongPort("calibration_of_nothing", "Calibration without a valid view answered", "not a number; right: refused",
-              {"calibration": lambda r: {"refused": np.array(False), "lambda_lap": np.nan}
-               if r.right["refused"] else None}),
-]  # fmt: skip
+    port(
+        "calibration_mean",
+        "Mean over the views",
+        "mean; right: median",
+        BOTH,
+        edit(SOURCE, MEDIAN, "float(np.mean(ratios))"),
+    ),
+    port(
+        "calibration_lower_median",
+        "Lower of the middle two",
+        "no interpolation; right: their mean",
+        BOTH,
+        edit(SOURCE, MEDIAN, "sorted(ratios)[(len(ratios) - 1) // 2]"),
+    ),
+    port(
+        "calibration_inverted",
+        "Ratio of the gradients inverted",
+        "g_rgb / g_lap; right: g_lap / g_rgb",
+        BOTH,
+        edit(SOURCE, RATIOS, "ratios.append(view.photometric / view.laplacian)"),
+    ),
+    port(
+        "calibration_over_tissue",
+        "RMS over tissue pixels",
+        "over pixels with a gradient; right: over all",
+        BOTH,
+        edit(
+            SOURCE,
+            "    return math.sqrt(float(np.mean(flat * flat)))",
+            "    flat = flat[flat != 0]\n    return math.sqrt(float(np.mean(flat * flat)))",
+        ),
+    ),
+    port(
+        "calibration_keeps_dead_view",
+        "View without photometric gradient kept",
+        "an infinite ratio moves the median; right: dropped",
+        "calibration",
+        edit(SOURCE, 'return "no photometric gradient"', 'return ""'),
+        edit(
+            SOURCE,
+            "for view in (ViewRms(*v) for v in views)",
+            "for view in (ViewRms(n, np.float64(a), np.float64(b)) for n, a, b in views)",
+        ),
+    ),
+    port(
+        "calibration_of_nothing",
+        "Calibration without a valid view answered",
+        "not a number; right: refused",
+        "calibration",
+        edit(
+            SOURCE,
+            "    if not ratios:\n",
+            "    if not ratios:\n        return Calibration(math.nan, np.zeros(0), table)\n    if not ratios:\n",
+        ),
+    ),
+]

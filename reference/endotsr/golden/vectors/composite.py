@@ -5,25 +5,22 @@ cases fix the order (by depth, ties by index), the background, the place of pixe
 legacy, and gradients that need no division by 1 - alpha.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.golden.vectors.copies import Edit
 from endotsr.golden.vectors.making import Seeds, Spec, given
 from endotsr.golden.vectors.screens import flat_covariance, raster_settings, screen_inputs
 from endotsr.golden.vectors.views import PRESETS, logit_of
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, setting, swapped
-from endotsr.golden.vectors.wrong_raster import Screen, composited, deviating, opacity_of
+from endotsr.golden.vectors.wrong import edit, port, with_raster
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
-from endotsr.stages.requests import raster_of
 
 OPERATIONS = ("composite",)
 
 
 def _preset(name: str) -> Spec:
     flags = ("order_by_index", "order_reversed", "depth_over_opacity", "background_missing", "pixel_corner_sample",
-             "depth_gradient_dropped", "alpha_gradient_without_rest", "covariance_off_diagonal_half")  # fmt: skip
+             "depth_gradient_dropped", "alpha_gradient_without_rest", "covariance_off_diagonal_half",
+             "alpha_gradient_without_background", "opacity_gradient_without_sigmoid")  # fmt: skip
     if name == "legacy":
         flags = tuple(flag for flag in flags if flag != "depth_gradient_dropped")
     inputs = screen_inputs(Seeds("composite", name), 8, 4.0, 90.0)
@@ -42,10 +39,10 @@ def _equal_depths() -> Spec:
 
 def _opaque_exact() -> Spec:
     inputs = screen_inputs(Seeds("composite", "opaque_exact"), 4, 1.0, 4.0)
-    wide = np.array([[1e12, 9.0, 9.0, 9.0], [0.0] * 4, [1e12, 9.0, 9.0, 9.0]])
+    wide = np.array([[1e18, 9.0, 9.0, 9.0], [0.0] * 4, [1e18, 9.0, 9.0, 9.0]])
     inputs |= {
         "opacity_logit": given([40.0, -40.0, 2.0, 40.0], "40, -40, 2, 40"),
-        "covariance2d": given(wide, "a = c = 1e12, 9, 9, 9; b = 0", "px^2"),
+        "covariance2d": given(wide, "a = c = 1e18, 9, 9, 9; b = 0", "px^2"),
         "depth": given([4.0, 5.0, 3.0, 6.0], "4, 5, 3, 6", "scene unit"),
     }
     return Spec("composite", "opaque_exact", "composite", "Alpha of 1 in front: no division by 1 - alpha",
@@ -72,7 +69,8 @@ def _tile_ends() -> Spec:
     }
     settings = raster_settings(LEGACY) | {"width": width, "height": height}
     return Spec("composite", "tiles", "composite", "Where the tiles of a Gaussian end: centre less half a pixel, the "
-                "root at least 0.1", ("tiles_from_the_mean", "tiles_root_without_floor"), settings, inputs)  # fmt: skip
+                "root at least 0.1", ("tiles_from_the_mean", "tiles_root_without_floor", "tiles_unbounded"),
+                settings, inputs)  # fmt: skip
 
 
 def cases() -> list[Spec]:
@@ -82,141 +80,160 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _reordered(depth_of) -> Wrong:
-    """Composites in another order: other depths, and the depth image of the right ones left out."""
-
-    def wrong(request: Request) -> dict[str, NDArray]:
-        inputs = dict(request.inputs)
-        index = depth_of(inputs["depth"])
-        order = np.argsort(index, kind="stable")
-        names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth")
-        moved = inputs | {name: np.ascontiguousarray(inputs[name][..., order]) for name in names}
-        moved["depth"] = np.arange(1.0, order.size + 1.0).astype(inputs["depth"].dtype)
-        found = request.run(moved, request.settings)
-        found.pop("depth_image")
-        back = np.argsort(order)
-        return {
-            name: np.ascontiguousarray(a[..., back]) if name.startswith("d_") and name != "d_background" else a
-            for name, a in found.items()
-        }
-
-    return wrong
+SOURCE, RECORDS, BINNING = "splatting.compositing", "splatting.records", "splatting.binning"
+BOTH, ALL = "composite render", "composite render objective"
+ORDER = "return _radix_kernel(depth.view(np.uint32 if depth.dtype == np.float32 else np.uint64), visible)"
 
 
-def _ties_reversed(request: Request) -> dict[str, NDArray] | None:
-    """The last index of equal depths in front."""
-    names = [n for n in ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "position", "quaternion",
-                         "log_scale", "harmonics", "residual") if n in request.inputs]  # fmt: skip
-    inputs = dict(request.inputs) | {n: np.ascontiguousarray(request.inputs[n][..., ::-1]) for n in names}
-    found = request.run(inputs, request.settings)
-    whole = ("d_background", "d_rotation_matrix", "d_translation")
-    return {n: np.ascontiguousarray(a[..., ::-1]) if n.startswith(("d_", "visible")) and n not in whole else a
-            for n, a in found.items()}  # fmt: skip
+def _order(by: str) -> Edit:
+    """Another order, of the indices `seen` of the visible Gaussians."""
+    return edit(BINNING, ORDER, f"seen = np.flatnonzero(visible)\n    return seen[{by}].astype(np.int32)")
 
 
-def _depth_over_opacity(request: Request) -> dict[str, NDArray]:
-    opacity = request.right["opacity_image"]
-    return {"depth_image": request.right["depth_image"] / np.where(opacity > 0, opacity, 1.0)}
-
-
-def _no_background(request: Request) -> dict[str, NDArray]:
-    left = 1 - request.right["opacity_image"]
-    return {"colour_image": request.right["colour_image"] - left * request.inputs["background"][:, None, None]}
-
-
-def _own_colour_only(request: Request) -> dict[str, NDArray]:
-    """Gradient of alpha without the Gaussians behind, on a black background."""
-    count = request.inputs["opacity_logit"].size
-    gradient = np.zeros(count)
-    for i in range(count):
-        names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth")
-        inputs = dict(request.inputs)
-        nearer = np.flatnonzero((inputs["depth"] < inputs["depth"][i]) | (np.arange(count) == i))
-        inputs |= {n: np.ascontiguousarray(inputs[n][..., nearer]) for n in names}
-        inputs["background"] = np.zeros_like(inputs["background"])
-        found = request.run(inputs, request.settings)["d_opacity_logit"]
-        gradient[i] = found[np.flatnonzero(nearer == i)[0]]
-    return {"d_opacity_logit": gradient}
-
-
-def _half_off_diagonal(request: Request) -> dict[str, NDArray]:
-    if "d_covariance2d" not in request.right:
-        return {}
-    d = request.right["d_covariance2d"].copy()
-    d[1] *= 0.5
-    return {"d_covariance2d": d}
-
-
-def _division(request: Request) -> dict[str, NDArray] | None:
-    """The colour behind found by dividing by 1 - alpha."""
-    alpha = opacity_of(request.inputs["opacity_logit"])
-    if alpha.max() < 1:
-        return None
-    return {"d_opacity_logit": request.right["d_opacity_logit"] * np.where(alpha == 1, np.nan, 1.0)}
-
-
-def _without_deviations(request: Request) -> Any:
-    off = {name: False for name in request.settings["raster"]["deviations"]}
-    if request.settings["raster"]["deviations"] == off:
-        return None
-    return setting(raster__deviations=off)(request)
-
-
-def _tiles(half: float = 0.5, floor: float = 0.1) -> Wrong:
-    """Another end of the tiles in support `three_sigma_tiles`; the images only."""
-
-    def reach(screen: Screen, n: int) -> NDArray:
-        (a, _, c), det = screen.covariance2d[:, n], screen.determinant[n]
-        mean = (a + c) / 2
-        radius = np.ceil(3 * np.sqrt(mean + np.sqrt(max(floor, mean * mean - det))))
-        inside = []
-        for centre, pixels in zip(screen.mean2d[:, n] - half, (screen.width, screen.height)):
-            tile = np.arange(pixels) // 16
-            inside.append((tile >= int((centre - radius) / 16)) & (tile < int((centre + radius + 15) / 16)))
-        return inside[1][:, None] & inside[0]
-
-    def wrong(request: Request) -> dict[str, NDArray] | None:
-        raster, i = raster_of(request.settings), request.inputs
-        if raster.support != "three_sigma_tiles":
-            return None
-        a, b, c = i["covariance2d"]
-        size = request.settings["width"], request.settings["height"]
-        opacity = opacity_of(i["opacity_logit"])
-        screen = Screen(
-            i["mean2d"], i["covariance2d"], a * c - b * b, i["depth"], opacity, i["colour"], i["background"], *size
-        )
-        return composited(screen, raster, reach=reach)
-
-    return wrong
-
+NORMALISED = (
+    edit(SOURCE, "= z, total, t\n", "= (z / total if total > zero else z), total, t\n"),
+    edit(SOURCE, "                t, n = one, 0\n", "                t, n, far, covered = one, 0, zero, zero\n"),
+    edit(
+        SOURCE,
+        "                    hit[n] = p\n",
+        "                    hit[n] = p\n"
+        "                    far += alpha * t * records[ranks[first + p]][DEPTH]\n"
+        "                    covered += alpha * t\n",
+    ),
+    edit(
+        SOURCE,
+        "gz, go = d_depth[row, column], d_opacity[row, column]\n",
+        "gz, go = d_depth[row, column], d_opacity[row, column]\n"
+        "                if covered > zero:\n"
+        "                    gz, go = gz / covered, go - gz * far / (covered * covered)\n",
+    ),
+)
+DIVIDED = (
+    edit(
+        SOURCE,
+        "rest = g0 * background[0] + g1 * background[1] + g2 * background[2]",
+        "rest = t * (g0 * background[0] + g1 * background[1] + g2 * background[2])",
+    ),
+    edit(SOURCE, "(t * (own - rest))", "(t * own - rest / (one - alpha))"),
+    edit(SOURCE, "rest = alpha * own + (one - alpha) * rest", "rest = rest + alpha * t * own"),
+)
+HALF = "factor * (-half * total[SUM_SYY])\n"
 
 WRONG_PORTS = [
-    WrongPort("pixel_corner_sample", "Pixels sampled at their corner", "at i; right: at i + 1/2",
-              {"composite": swapped(lambda i: {"mean2d": i["mean2d"] + 0.5})}),
-    WrongPort("order_by_index", "Composited in index order", "index; right: view depth",
-              {"composite": _reordered(lambda z: np.arange(z.size))}),
-    WrongPort("order_reversed", "Composited back to front", "far first; right: near first",
-              {"composite": _reordered(lambda z: -z)}),
-    WrongPort("ties_reversed", "Equal depths in reverse order", "last index first; right: index order",
-              {"composite": _ties_reversed, "render": _ties_reversed}),
-    WrongPort("depth_over_opacity", "Depth divided by opacity", "normalised; right: the sum",
-              {"composite": _depth_over_opacity, "render": _depth_over_opacity}),
-    WrongPort("background_missing", "Background left out", "0; right: T times background",
-              {"composite": _no_background, "render": _no_background}),
-    WrongPort("alpha_gradient_without_rest", "Gradient of alpha without what stands behind",
-              "own colour only; right: own minus the rest", {"composite": _own_colour_only}),
-    WrongPort("covariance_off_diagonal_half", "Half the off-diagonal gradient", "d/db of one entry; right: of both",
-              {"composite": _half_off_diagonal}),
-    WrongPort("depth_gradient_dropped", "Depth image sends no gradient to z", "0; right: alpha T",
-              {"composite": deviating("drop_depth_to_z"), "render": deviating("drop_depth_to_z"),
-               "objective": deviating("drop_depth_to_z")}),
-    WrongPort("deviations_off", "Exact gradients in preset legacy", "exact; right: the released code's",
-              {"composite": _without_deviations, "render": _without_deviations, "objective": _without_deviations}),
-    WrongPort("divide_by_one_minus_alpha", "Reverse pass divides by 1 - alpha", "0 / 0 at alpha = 1; right: recursion",
-              {"composite": _division}),
-    WrongPort("tiles_from_the_mean", "Tiles counted from the mean", "u; right: u - 1/2",
-              {"composite": _tiles(half=0.0)}),
-    WrongPort("tiles_root_without_floor", "Radius of the tiles without its floor",
-              "max(0, .); right: max(0.1, .)", {"composite": _tiles(floor=0.0)}),
-]  # fmt: skip
+    port(
+        "pixel_corner_sample",
+        "Pixels sampled at their corner",
+        "at i; right: at i + 1/2",
+        BOTH,
+        edit(SOURCE, "real(column) + half, real(row) + half", "real(column), real(row)", 2),
+    ),
+    port("order_by_index", "Composited in index order", "index; right: view depth", ALL, _order(":")),
+    port(
+        "order_reversed",
+        "Composited back to front",
+        "far first; right: near first",
+        ALL,
+        _order('np.argsort(-depth[seen], kind="stable")'),
+    ),
+    port(
+        "ties_reversed",
+        "Equal depths in reverse order",
+        "last index first; right: index order",
+        ALL,
+        _order("np.lexsort((-seen, depth[seen]))"),
+    ),
+    port("depth_over_opacity", "Depth divided by opacity", "normalised; right: the sum", BOTH, *NORMALISED),
+    port(
+        "background_missing",
+        "Background left out",
+        "0; right: T times background",
+        BOTH,
+        *(edit(SOURCE, f"{name} + t * background[{k}]", name) for k, name in enumerate(("red", "green", "blue"))),
+        edit(SOURCE, "rest = g0 * background[0] + g1 * background[1] + g2 * background[2]", "rest = zero"),
+        edit(SOURCE, 'np.einsum("chw,hw->c", d_colour, transmittance)', "np.zeros(3, d_colour.dtype)"),
+    ),
+    port(
+        "alpha_gradient_without_rest",
+        "Gradient of alpha without what stands behind",
+        "own colour only; right: own minus the rest",
+        BOTH,
+        edit(SOURCE, "(t * (own - rest))", "(t * own)"),
+    ),
+    port(
+        "alpha_gradient_without_background",
+        "Gradient of alpha without the background",
+        "own minus the Gaussians behind; right: and minus the background",
+        BOTH,
+        edit(SOURCE, "rest = g0 * background[0] + g1 * background[1] + g2 * background[2]", "rest = zero"),
+    ),
+    port(
+        "covariance_off_diagonal_half",
+        "Half the off-diagonal gradient",
+        "d/db of one entry; right: of both",
+        BOTH,
+        edit(
+            RECORDS,
+            HALF,
+            HALF + "        g_b = (a * a + a * a) * m * d_footprint[0, i] + r * d_footprint[1, i]\n"
+            "        d_footprint[1, i] -= half * g_b / r\n"
+            "        d_footprint[2, i] += half * m * g_b / (r * r)\n",
+        ),
+    ),
+    port(
+        "depth_gradient_dropped",
+        "Depth image sends no gradient to z",
+        "0; right: alpha T",
+        ALL,
+        with_raster("deviations=found.deviations._replace(drop_depth_to_z=True)"),
+    ),
+    port(
+        "opacity_gradient_without_sigmoid",
+        "Gradient by the opacity, not by its logit",
+        "g; right: o (1 - o) g",
+        BOTH,
+        edit(
+            RECORDS,
+            "d_logit[i] = total[SUM_S] / (one + math.exp(min(opacity_logit[i], largest)))",
+            "d_logit[i] = total[SUM_S] * (one + math.exp(-opacity_logit[i]))",
+        ),
+    ),
+    port(
+        "deviations_off",
+        "Exact gradients in preset legacy",
+        "exact; right: the released code's",
+        "projection composite render objective",
+        edit("stages.requests", 'LegacyDeviations(**fields["deviations"])', "LegacyDeviations()"),
+    ),
+    port(
+        "divide_by_one_minus_alpha",
+        "Reverse pass divides by 1 - alpha",
+        "0 / 0 at alpha = 1; right: recursion",
+        "composite",
+        *DIVIDED,
+    ),
+    port(
+        "tiles_from_the_mean",
+        "Tiles counted from the mean",
+        "u; right: u - 1/2",
+        BOTH,
+        *(edit(BINNING, f"({name} - half {sign} radius", f"({name} {sign} radius") for name in "xy" for sign in "+-"),
+    ),
+    port(
+        "tiles_root_without_floor",
+        "Radius of the tiles without its floor",
+        "max(0, .); right: max(0.1, .)",
+        BOTH,
+        edit(BINNING, "max(tenth, middle", "max(zero, middle"),
+    ),
+    port(
+        "tiles_unbounded",
+        "Every Gaussian at every pixel in preset legacy",
+        "no tiles; right: tiles of three sigma",
+        BOTH,
+        edit(
+            BINNING,
+            "support = settings.support if",
+            'support = settings.support.replace("three_sigma_tiles", "everywhere") if',
+        ),
+    ),
+]

@@ -6,16 +6,12 @@ the other, image and gradient have to take the same decision.
 """
 
 import math
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from endotsr.golden.vectors.copies import Edit
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.screens import flat_covariance, raster_settings, screen_inputs
 from endotsr.golden.vectors.views import logit_of
-from endotsr.golden.vectors.wrong import Request, WrongPort, setting, within
-from endotsr.golden.vectors.wrong_raster import deviating, opacity_of
+from endotsr.golden.vectors.wrong import edit, port, with_raster
 from endotsr.splatting.settings import LEGACY, PAPER
 
 OPERATIONS = ("composite",)
@@ -23,8 +19,8 @@ CUTOFF = 1 / 255
 
 
 def _flat(case: str, opacity: list[float], depth: list[float]) -> dict[str, Made]:
-    inputs = screen_inputs(Seeds("composite", case), 5, 4.0, 90.0)
-    inputs |= {"covariance2d": flat_covariance(5), "opacity_logit": logit_of(opacity)}
+    inputs = screen_inputs(Seeds("composite", case), len(opacity), 4.0, 90.0)
+    inputs |= {"covariance2d": flat_covariance(len(opacity)), "opacity_logit": logit_of(opacity)}
     return inputs | {"depth": given(depth, ", ".join(map(str, depth)), "scene unit")}
 
 
@@ -39,7 +35,7 @@ def _around_thresholds() -> list[Spec]:
              _flat("alpha_clamp", [0.9895, 0.99002, 0.9985, 0.5, 0.9999], [7.0, 6.0, 5.0, 3.0, 4.0])),
         Spec("composite", "transmittance_stop", "composite", "Stop before T falls below 1e-4, not after",
              ("stop_missing", "stop_after", "stop_at_1e-3"), paper,
-             _flat("transmittance_stop", [0.98, 0.98, 0.7, 0.1, 0.9], near),
+             _flat("transmittance_stop", [0.98, 0.98, 0.7, 0.1, 0.9, 0.6], [*near, 8.0]),
              without=("d_mean2d", "d_covariance2d")),
         _stop_ends_pixel(),
         _legacy_clamp(),
@@ -51,7 +47,8 @@ def _stop_ends_pixel() -> Spec:
     inputs = _flat("stop_ends_pixel", [0.98, 0.98, 0.9, 0.5, 0.1], [3.0, 4.0, 5.0, 6.0, 7.0])
     inputs["depth"] = given([3.0, 4.0, 5.0, 6.0, 7.0], "3, 4, 5, 6, 7", "scene unit")
     title = "A weak Gaussian behind the one that stops is not drawn"
-    return Spec("composite", "stop_ends_pixel", "composite", title, ("stop_skips",), raster_settings(PAPER), inputs,
+    return Spec("composite", "stop_ends_pixel", "composite", title, ("stop_skips", "stop_after"),
+                raster_settings(PAPER), inputs,
                 without=("d_mean2d", "d_covariance2d"))  # fmt: skip
 
 
@@ -95,79 +92,119 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _decided_twice(request: Request) -> dict[str, NDArray] | None:
-    """A Gaussian on the cutoff is in the image, but has no gradient."""
-    image, gradient = (setting(raster__alpha_cutoff=lambda v, s=s: v * s)(request)
-                       for s in (1 - 1e-5, 1 + 1e-5))  # fmt: skip
-    if image is None or gradient is None:
-        return None
-    return {**image, **{name: a for name, a in gradient.items() if name.startswith("d_")}}
+SOURCE = "splatting.compositing"
+BOTH = "composite render objective"
+STOP = "                    if behind < stop:\n                        break\n"
+AFTER = "                    {0} = behind\n"
 
 
-def _stop_after(request: Request) -> dict[str, NDArray] | None:
-    """The Gaussian that brings T below the limit is still blended: flat images only."""
-    if request.inputs["covariance2d"].min(axis=1)[0] < 1e5:
-        return None
-    alpha = np.minimum(opacity_of(request.inputs["opacity_logit"]), request.settings["raster"]["alpha_max"])
-    stop, t, total, depth = request.settings["raster"]["transmittance_stop"], 1.0, 0.0, 0.0
-    colour = np.zeros(3)
-    for i in np.argsort(request.inputs["depth"], kind="stable"):
-        if alpha[i] < request.settings["raster"]["alpha_cutoff"]:
-            continue
-        colour += alpha[i] * t * request.inputs["colour"][:, i]
-        total, depth, t = total + alpha[i] * t, depth + alpha[i] * t * request.inputs["depth"][i], t * (1 - alpha[i])
-        if t < stop:
-            break
-    plane = np.ones_like(request.right["depth_image"])
-    colour = colour + t * request.inputs["background"]
-    return {"colour_image": colour[:, None, None] * plane, "depth_image": depth * plane, "opacity_image": total * plane}
-
-
-def _skips(request: Request) -> dict[str, NDArray] | None:
-    """Leaves out the Gaussian that would stop the pixel and continues; flat images only."""
-    raster, i = request.settings["raster"], request.inputs
-    if i["covariance2d"].min(axis=1)[0] < 1e5:
-        return None
-    alpha, left, logit = np.minimum(opacity_of(i["opacity_logit"]), raster["alpha_max"]), 1.0, i["opacity_logit"].copy()
-    for n in np.argsort(i["depth"], kind="stable"):
-        if alpha[n] < raster["alpha_cutoff"] or left * (1 - alpha[n]) < raster["transmittance_stop"]:
-            logit[n] = -40.0
-        else:
-            left *= 1 - alpha[n]
-    return request.run(dict(i) | {"opacity_logit": logit}, request.settings)
-
-
-def _blocked(request: Request) -> Any:
-    """The exact derivative of the clamp where the released code passes the gradient."""
-    if not request.settings["raster"]["deviations"]["pass_clamped_alpha"]:
-        return None
-    return setting(raster__deviations__pass_clamped_alpha=False)(request)
+def _deviation(name: str, value: bool) -> Edit:
+    return with_raster(f"deviations=found.deviations._replace({name}={value})")
 
 
 WRONG_PORTS = [
-    WrongPort("clamped_alpha_gradient", "Gradient passes the clamp of alpha", "passed; right: 0 where clamped",
-              {"composite": deviating("pass_clamped_alpha"), "render": deviating("pass_clamped_alpha")}),
-    WrongPort("cutoff_missing", "No alpha cutoff", "every alpha; right: from 1/255 on",
-              within("raster", ("composite", "render", "objective"), alpha_cutoff=lambda v: 1e-9 if v > 0 else v)),
-    WrongPort("cutoff_1_over_256", "Alpha cutoff of 1/256", "1/256; right: 1/255",
-              within("raster", ("composite",), alpha_cutoff=lambda v: 1 / 256 if v > 0 else v)),
-    WrongPort("cutoff_decided_twice", "Cutoff decided anew in the reverse pass", "in the image, but without gradient; "
-              "right: one decision", {"composite": _decided_twice}),
-    WrongPort("cutoff_added", "Alpha cutoff in preset exact", "1/255; right: none",
-              within("raster", ("composite", "render", "objective"), alpha_cutoff=lambda v: v if v > 0 else 1 / 255)),
-    WrongPort("alpha_clamp_999", "Alpha clamped at 0.999", "0.999; right: 0.99",
-              within("raster", ("composite", "render"), alpha_max=lambda v: 0.999 if v < 1 else v)),
-    WrongPort("alpha_clamp_missing", "Alpha not clamped", "up to 1; right: 0.99",
-              within("raster", ("composite", "render"), alpha_max=lambda v: 1.0)),
-    WrongPort("stop_missing", "No stop at small transmittance", "all Gaussians; right: stop before T < 1e-4",
-              within("raster", ("composite", "render"), transmittance_stop=0.0)),
-    WrongPort("stop_at_1e-3", "Stop at a transmittance of 1e-3", "1e-3; right: 1e-4",
-              within("raster", ("composite",), transmittance_stop=lambda v: 1e-3 if v > 0 else v)),
-    WrongPort("stop_after", "Stop after T fell below 1e-4", "one Gaussian too many; right: stop before",
-              {"composite": _stop_after}),
-    WrongPort("stop_skips", "The Gaussian that stops a pixel skipped", "goes on behind it; right: the pixel ends",
-              {"composite": _skips}),
-    WrongPort("clamp_blocks_legacy", "Clamp of alpha blocks the gradient in preset legacy", "0; right: passed",
-              {"composite": _blocked, "render": _blocked, "objective": _blocked}),
-]  # fmt: skip
+    port(
+        "clamped_alpha_gradient",
+        "Gradient passes the clamp of alpha",
+        "passed; right: 0 where clamped",
+        BOTH,
+        _deviation("pass_clamped_alpha", True),
+    ),
+    port(
+        "cutoff_missing",
+        "No alpha cutoff",
+        "every alpha; right: from 1/255 on",
+        BOTH,
+        with_raster("alpha_cutoff=1e-9 if found.alpha_cutoff > 0 else 0.0"),
+    ),
+    port(
+        "cutoff_1_over_256",
+        "Alpha cutoff of 1/256",
+        "1/256; right: 1/255",
+        BOTH,
+        with_raster("alpha_cutoff=1 / 256 if found.alpha_cutoff > 0 else 0.0"),
+    ),
+    port(
+        "cutoff_decided_twice",
+        "Cutoff decided anew in the reverse pass",
+        "in the image, but without gradient; right: one decision",
+        "composite",
+        edit(
+            "splatting.binning", "math.log(settings.alpha_cutoff) if", "math.log(settings.alpha_cutoff * (1 - 1e-4)) if"
+        ),
+        edit(
+            SOURCE,
+            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff:",
+            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff * decided:",
+            2,
+        ),
+        edit(
+            SOURCE,
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = depth.shape\n",
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 - 1e-5\n "
+            "   height, width = depth.shape\n",
+        ),
+        edit(
+            SOURCE,
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = d_depth.shape\n",
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 + 1e-5\n "
+            "   height, width = d_depth.shape\n",
+        ),
+    ),
+    port(
+        "cutoff_added",
+        "Alpha cutoff in preset exact",
+        "1/255; right: none",
+        BOTH,
+        with_raster("alpha_cutoff=found.alpha_cutoff or 1 / 255"),
+    ),
+    port(
+        "alpha_clamp_999",
+        "Alpha clamped at 0.999",
+        "0.999; right: 0.99",
+        BOTH,
+        with_raster("alpha_max=0.999 if found.alpha_max < 1 else 1.0"),
+    ),
+    port("alpha_clamp_missing", "Alpha not clamped", "up to 1; right: 0.99", BOTH, with_raster("alpha_max=1.0")),
+    port(
+        "stop_missing",
+        "No stop at small transmittance",
+        "all Gaussians; right: stop before T < 1e-4",
+        BOTH,
+        with_raster("transmittance_stop=0.0"),
+    ),
+    port(
+        "stop_at_1e-3",
+        "Stop at a transmittance of 1e-3",
+        "1e-3; right: 1e-4",
+        BOTH,
+        with_raster("transmittance_stop=10 * found.transmittance_stop"),
+    ),
+    port(
+        "stop_after",
+        "Stop after T fell below 1e-4",
+        "one Gaussian too many; right: stop before",
+        "composite render",
+        edit(SOURCE, STOP, "", 2),
+        edit(
+            SOURCE,
+            "                    t = behind\n",
+            "                    t = behind\n                    if t < stop:\n                        break\n",
+            2,
+        ),
+    ),
+    port(
+        "stop_skips",
+        "The Gaussian that stops a pixel skipped",
+        "goes on behind it; right: the pixel ends",
+        "composite render",
+        edit(SOURCE, STOP, STOP.replace("break", "continue"), 2),
+    ),
+    port(
+        "clamp_blocks_legacy",
+        "Clamp of alpha blocks the gradient in preset legacy",
+        "0; right: passed",
+        BOTH,
+        _deviation("pass_clamped_alpha", False),
+    ),
+]

@@ -5,10 +5,9 @@ width matters to its gradient only, and the floor of a squared width.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.golden.vectors.making import Seeds, Spec, changed, given, scalar
-from endotsr.golden.vectors.wrong import Request, WrongPort, output, setting
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("deformation",)
 
@@ -28,7 +27,8 @@ def cases() -> list[Spec]:
             "t": scalar(t),
             "d_offsets": seeds.uniform("d_offsets", -1.0, 1.0, 10, 5),
         }  # fmt: skip
-        flags = ("basis_swapped", "width_without_floor", "width_gradient_of_size", "time_gradient_sign")
+        flags = ("basis_swapped", "width_without_floor", "width_gradient_of_size", "time_gradient_sign",
+                 *(("basis_gaussian_without_half",) if basis == "gaussian" else ()))  # fmt: skip
         title = f"The {basis} time basis; the sign of a width does not matter, its gradient has it"
         out.append(Spec("deformation", basis, "deformation", title, flags, {"basis": basis}, inputs))
     seeds = Seeds("deformation", "width_zero")
@@ -46,31 +46,47 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _without_floor(request: Request) -> dict[str, NDArray]:
-    weight, centre, width = (request.inputs[f"fdm_{name}"] for name in ("weight", "centre", "width"))
-    u = (float(request.inputs["t"]) - centre) ** 2
-    quartic = request.settings["basis"] == "quartic"
-    value = np.exp(-((u / width**2) ** 2)) if quartic else np.exp(-u / (2 * width**2))
-    return {"offsets": (weight * value).sum(axis=1), "d_fdm_weight": request.inputs["d_offsets"][:, None] * value}
-
-
-def _other_basis(old: str) -> str:
-    return "gaussian" if old == "quartic" else "quartic"
-
-
-def _of_size(request: Request) -> dict[str, NDArray]:
-    sign = np.where(request.inputs["fdm_width"] < 0, -1.0, 1.0)
-    return {"d_fdm_width": request.right["d_fdm_width"] * sign}
-
+SOURCE = "equations.deformation"
+BOTH = "deformation scene"
 
 WRONG_PORTS = [
-    WrongPort("basis_swapped", "The other time basis", "Gaussian for quartic or back",
-              {"deformation": setting(basis=_other_basis), "scene": setting(model__basis=_other_basis)}),
-    WrongPort("width_without_floor", "Squared width without its floor", "s^2; right: s^2 + 1e-4",
-              {"deformation": _without_floor}),
-    WrongPort("width_gradient_of_size", "Gradient by the size of the width", "sign lost; right: that of the width",
-              {"deformation": _of_size}),
-    WrongPort("time_gradient_sign", "Gradient by time with the sign of the centre", "+; right: minus the sum",
-              {"deformation": output(d_t=lambda a: -a)}),
-]  # fmt: skip
+    port(
+        "basis_swapped",
+        "The other time basis",
+        "Gaussian for quartic or back",
+        BOTH,
+        edit(SOURCE, 'basis == "quartic"', 'basis != "quartic"', 2),
+    ),
+    port(
+        "basis_gaussian_without_half",
+        "Gaussian basis without its 1/2",
+        "exp(-x^2 / S); right: exp(-x^2 / (2 S))",
+        BOTH,
+        edit(
+            SOURCE,
+            "return real(-0.5 * LOG2_E), real(0), real(1), real(2 * LARGEST_U), real(1)",
+            "return real(-LOG2_E), real(0), real(1), real(LARGEST_U), real(2)",
+        ),
+    ),
+    port(
+        "width_without_floor",
+        "Squared width without its floor",
+        "s^2; right: s^2 + 1e-4",
+        BOTH,
+        edit(SOURCE, "WIDTH_FLOOR = 1e-4", "WIDTH_FLOOR = 0.0"),
+    ),
+    port(
+        "width_gradient_of_size",
+        "Gradient by the size of the width",
+        "sign lost; right: that of the width",
+        "deformation",
+        edit(SOURCE, "common * u * (width[i] * inverse)", "common * u * (abs(width[i]) * inverse)"),
+    ),
+    port(
+        "time_gradient_sign",
+        "Gradient by time with the sign of the centre",
+        "+; right: minus the sum",
+        "deformation",
+        edit(SOURCE, "-float(row_sums.sum())", "float(row_sums.sum())"),
+    ),
+]

@@ -9,12 +9,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import DensityConfig
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given, permutation
 from endotsr.golden.vectors.views import pose
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, output, setting, within
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("density",)
 VIEWS, COUNT = 3, 12
@@ -73,9 +72,11 @@ def _decisions() -> list[Spec]:
     def faint(inputs: dict[str, Made]) -> None:
         inputs["opacity_logit"] = changed(inputs["opacity_logit"], ..., -7.0, "all -7")
 
-    flags = ("densify_threshold_in_pixels", "density_over_all_views", "density_sum_of_views", "clone_and_split_swapped",
+    flags = ("density_over_all_views", "density_sum_of_views", "clone_and_split_swapped",
              "faint_ones_densified", "split_parent_kept", "children_not_smaller", "children_interleaved",
-             "children_inherit_moments")  # fmt: skip
+             "children_inherit_moments", "children_not_turned", "densify_threshold_in_pixels",
+             "screen_gradient_without_half",
+             "density_norm_of_sum")  # fmt: skip
     return [
         spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand", flags),
         spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",), change=tie,
@@ -118,114 +119,152 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _statistics(divide) -> Wrong:
-    """Another mean of the screen gradients, with the decisions that were made from the right one."""
-
-    def wrong(request: Request) -> dict[str, NDArray]:
-        seen = request.inputs["visible"].sum(axis=0)
-        return {"mean_gradient": request.right["mean_gradient"] * np.maximum(seen, 1) / divide(seen)}
-
-    return wrong
-
-
-def _swapped_masks(request: Request) -> dict[str, NDArray]:
-    return {"cloned": request.right["split"], "split": request.right["cloned"]}
-
-
-def _faint_kept(request: Request) -> dict[str, NDArray]:
-    """Gaussians that are to be densified are not pruned."""
-    pruned = request.right["pruned"]
-    steep = request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"]
-    kept = pruned & steep
-    return {"pruned": pruned & ~steep, "cloned": request.right["cloned"] | kept,
-            "count": request.right["count"] + 2 * kept.sum()}  # fmt: skip
-
-
-def _parents_kept(request: Request) -> dict[str, NDArray]:
-    return {"count": request.right["count"] + request.right["split"].sum()}
-
-
-def _children(request: Request) -> slice:
-    """Columns of the children of splits."""
-    return slice(request.right["count"] - 2 * int(request.right["split"].sum()), None)
-
-
-def _large_children(request: Request) -> dict[str, NDArray]:
-    scale = request.right["log_scale_after"].copy()
-    scale[:, _children(request)] += np.log(1.6)
-    return {"log_scale_after": scale}
-
-
-def _interleaved(request: Request) -> dict[str, NDArray]:
-    """First and second child of a parent side by side."""
-    found = {}
-    for name in ("parent", "position_after", "log_scale_after"):
-        a = request.right[name].copy()
-        two = a[..., _children(request)]
-        a[..., _children(request)] = np.swapaxes(two.reshape(*two.shape[:-1], 2, -1), -1, -2).reshape(two.shape)
-        found[name] = a
-    return found
-
-
-def _first_candidates(request: Request) -> dict[str, NDArray] | None:
-    """The first candidates are densified, independent of their gradient."""
-    alive = ~request.right["pruned"]
-    candidates = alive & (request.right["mean_gradient"] >= request.settings["density"]["gradient_threshold"])
-    room = request.settings["density"]["maximum"] - alive.sum()
-    if candidates.sum() <= room:
-        return None
-    won = candidates & (np.cumsum(candidates) <= room)
-    limit = request.right["extent"] * request.settings["density"]["dense_fraction"]
-    large = np.exp(request.inputs["log_scale"].max(axis=0)) > limit
-    return {"cloned": won & ~large, "split": won & large}
-
-
-def _no_margin(request: Request) -> dict[str, NDArray] | None:
-    return {"extent": request.right["extent"] / 1.1} if request.settings["density"]["extent"] == "cameras" else None
-
-
-def _width_for_height(request: Request) -> dict[str, Any] | None:
-    s, visible = request.settings, request.inputs["visible"]
-    if s["width"] == s["height"]:
-        return None
-    norm = s["width"] / 2 * np.sqrt((request.inputs["d_mean2d"] ** 2).sum(axis=1))
-    return {"mean_gradient": (norm * visible).sum(axis=0) / np.maximum(visible.sum(axis=0), 1)}
-
-
-def _nudged(name: str, factor: float) -> Wrong:
-    """A threshold moved by so little that only values exactly on it change sides."""
-    return setting(**{f"density__{name}": lambda v: v * factor})
-
+SOURCE, STAGE = "scene.density_control", "stages.optimiser"
+BOTH = "density training"
+MEAN = "statistics.gradient_sum / np.maximum(statistics.visits, 1)"
+HALVES = "d_mean[0] * np.float64(0.5 * width), d_mean[1] * np.float64(0.5 * height)"
+OFFSET = "offset = np.stack([(rotation[row] * local).sum(axis=0) for row in range(3)])"
 
 WRONG_PORTS = [
-    WrongPort("densify_threshold_in_pixels", "Screen gradient in pixels", "per px; right: times half the image size",
-              within("config", ("training", "schedule"), density__gradient_threshold=lambda v: v * 12.0)
-              | {"density": setting(width=2, height=2)}),
-    WrongPort("density_over_all_views", "Screen gradient averaged over all views", "over views; right: visible ones",
-              {"density": lambda r: _statistics(lambda seen: len(r.inputs["visible"]))(r)}),
-    WrongPort("density_sum_of_views", "Screen gradients added, not averaged", "sum; right: mean over visible views",
-              {"density": _statistics(lambda seen: 1)}),
-    WrongPort("density_width_for_height", "Screen gradient scaled by W / 2 on both axes", "W; right: W of x, H of y",
-              {"density": _width_for_height}),
-    WrongPort("clone_and_split_swapped", "Large ones cloned, small ones split", "swapped; right: small ones cloned",
-              {"density": _swapped_masks}),
-    WrongPort("faint_ones_densified", "Faint Gaussians densified, not pruned", "gradient first; right: pruned first",
-              {"density": _faint_kept}),
-    WrongPort("split_parent_kept", "Parent of a split kept", "three Gaussians; right: two children",
-              {"density": _parents_kept}),
-    WrongPort("children_not_smaller", "Children as large as their parent", "s; right: s - ln 1.6",
-              {"density": _large_children}),
-    WrongPort("children_interleaved", "Children of one parent side by side",
-              "first, second, first, ...; right: all first children, then all second", {"density": _interleaved}),
-    WrongPort("children_inherit_moments", "Children keep the moments of their parent", "copied; right: zero",
-              {"density": output(moments_kept=lambda a: np.ones_like(a))}),
-    WrongPort("first_candidates_win", "First candidates take the room", "by index; right: steepest first",
-              {"density": _first_candidates}),
-    WrongPort("extent_without_margin", "Extent of the cameras without its margin", "radius; right: 1.1 times",
-              {"density": _no_margin}),
-    WrongPort("prune_at_the_threshold", "Pruned on the threshold", "<=; right: <",
-              {"density": _nudged("prune_opacity", 1 + 1e-9)}),
-    WrongPort("split_at_the_limit", "Split on the size limit", ">=; right: >",
-              {"density": _nudged("dense_fraction", 1 - 1e-9)}),
-]  # fmt: skip
+    port(
+        "densify_threshold_in_pixels",
+        "Screen gradient in pixels",
+        "per px; right: times half the image size",
+        BOTH,
+        edit(SOURCE, HALVES, "d_mean[0], d_mean[1]"),
+    ),
+    port(
+        "screen_gradient_without_half",
+        "Screen gradient times the whole image size",
+        "g_u W, g_v H; right: g_u W / 2, g_v H / 2",
+        BOTH,
+        edit(SOURCE, HALVES, "d_mean[0] * width, d_mean[1] * height"),
+    ),
+    port(
+        "density_width_for_height",
+        "Screen gradient scaled by W / 2 on both axes",
+        "W; right: W of x, H of y",
+        BOTH,
+        edit(SOURCE, "np.float64(0.5 * height)", "np.float64(0.5 * width)"),
+    ),
+    port(
+        "density_over_all_views",
+        "Screen gradient averaged over all views",
+        "over views; right: visible ones",
+        BOTH,
+        edit(SOURCE, "statistics.visits[:] += visible", "statistics.visits[:] += 1"),
+    ),
+    port(
+        "density_sum_of_views",
+        "Screen gradients added, not averaged",
+        "sum; right: mean over visible views",
+        BOTH,
+        edit(SOURCE, MEAN, "statistics.gradient_sum"),
+        edit(STAGE, MEAN, "statistics.gradient_sum"),
+    ),
+    port(
+        "density_norm_of_sum",
+        "Norm of the summed screen gradient",
+        "|sum g|; right: sum |g|",
+        "density",
+        edit(
+            SOURCE, "np.where(visible, np.sqrt(g_x * g_x + g_y * g_y), 0.0)", "np.where(visible, g_x + 1j * g_y, 0.0)"
+        ),
+        edit(
+            SOURCE, "DensityStatistics(np.zeros(count, np.float64)", "DensityStatistics(np.zeros(count, np.complex128)"
+        ),
+        edit(SOURCE, MEAN, "abs(statistics.gradient_sum) / np.maximum(statistics.visits, 1)"),
+        edit(STAGE, MEAN, "abs(statistics.gradient_sum) / np.maximum(statistics.visits, 1)"),
+    ),
+    port(
+        "clone_and_split_swapped",
+        "Large ones cloned, small ones split",
+        "swapped; right: small ones cloned",
+        BOTH,
+        edit(SOURCE, "candidates[small], candidates[~small]", "candidates[~small], candidates[small]"),
+    ),
+    port(
+        "faint_ones_densified",
+        "Faint Gaussians densified, not pruned",
+        "gradient first; right: pruned first",
+        BOTH,
+        edit(
+            SOURCE,
+            "    candidates = np.flatnonzero(alive",
+            "    alive |= steepness >= config.gradient_threshold\n    candidates = np.flatnonzero(alive",
+        ),
+    ),
+    port(
+        "split_parent_kept",
+        "Parent of a split kept",
+        "three Gaussians; right: two children",
+        BOTH,
+        edit(SOURCE, "    keep[split] = False\n", ""),
+    ),
+    port(
+        "children_not_smaller",
+        "Children as large as their parent",
+        "s; right: s - ln 1.6",
+        BOTH,
+        edit(SOURCE, "log_scale - np.log(SHRINK)", "log_scale"),
+    ),
+    port(
+        "children_not_turned",
+        "Children placed without the rotation of their parent",
+        "exp(s) n; right: R exp(s) n",
+        BOTH,
+        edit(SOURCE, OFFSET, "offset = local"),
+    ),
+    port(
+        "children_interleaved",
+        "Children of one parent side by side",
+        "first, second, first, ...; right: all first children, then all second",
+        BOTH,
+        edit(SOURCE, "*[split] * CHILDREN]", "np.repeat(split, CHILDREN)]"),
+        edit(
+            SOURCE,
+            "slice(first + child * split.size, first + (child + 1) * split.size)",
+            "slice(first + child, None, CHILDREN)",
+        ),
+    ),
+    port(
+        "children_inherit_moments",
+        "Children keep the moments of their parent",
+        "copied; right: zero",
+        BOTH,
+        edit(STAGE, "made.plan.source, made.plan.survivors)", "made.plan.source, made.plan.source.size)"),
+        edit(
+            "fitting.trainer",
+            "result.plan.source, result.plan.survivors)",
+            "result.plan.source, result.plan.source.size)",
+        ),
+    ),
+    port(
+        "first_candidates_win",
+        "First candidates take the room",
+        "by index; right: steepest first",
+        BOTH,
+        edit(SOURCE, 'np.argsort(-steepness[candidates], kind="stable")[:room]', "np.arange(room)"),
+    ),
+    port(
+        "extent_without_margin",
+        "Extent of the cameras without its margin",
+        "radius; right: 1.1 times",
+        BOTH,
+        edit(SOURCE, "CAMERA_MARGIN = 1.1", "CAMERA_MARGIN = 1.0"),
+    ),
+    port(
+        "prune_at_the_threshold",
+        "Pruned on the threshold",
+        "<=; right: <",
+        BOTH,
+        edit(SOURCE, "astype(np.float64) < bound", "astype(np.float64) <= bound"),
+    ),
+    port(
+        "split_at_the_limit",
+        "Split on the size limit",
+        ">=; right: >",
+        BOTH,
+        edit(SOURCE, "largest[candidates] <= config", "largest[candidates] < config"),
+    ),
+]

@@ -5,13 +5,11 @@ above 0, under the mask), which pixels give the largest value, that this value h
 that fewer than ten priors give no loss.
 """
 
-from typing import Any
-
 import numpy as np
 
 from endotsr.golden.vectors.images import HEIGHT, WIDTH, spoiled, tool_mask
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given, scalar
-from endotsr.golden.vectors.wrong import Request, WrongPort
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("normalised_depth",)
 
@@ -64,7 +62,8 @@ def cases() -> list[Spec]:
         _spec("generic", "Both depths over their largest value, without holes; gradient to the maximum",
               ("depth_holes_count", "depth_maximum_constant", "depth_maximum_of_tissue", "depth_not_normalised"),
               _with_holes(Seeds("normalised_depth", "generic"))),
-        _spec("two_maxima", "The gradient of the maximum is split evenly over ties", ("depth_first_maximum",), ties,
+        _spec("two_maxima", "The gradient of the maximum is split evenly over ties",
+              ("depth_first_maximum", "depth_every_maximum"), ties,
               "rendered_depth"),
         _spec("few_priors", "Fewer than ten priors say nothing", ("depth_few_priors",), few),
         _spec("not_finite", "Priors that are not finite are none; the largest depth is that of finite values",
@@ -76,70 +75,95 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _depth(request: Request, *, holes=False, constant=False, tissue_maximum=False, normalise=True, first=False,
-           few=False) -> dict[str, Any]:  # fmt: skip
-    depth, prior, mask = (request.inputs[n].astype(float) for n in ("rendered_depth", "prior_depth", "mask"))
-    mask = mask > 0
-    valid = mask if holes else mask & np.isfinite(prior) & (prior > 0)
-    count = int(valid.sum())
-    if count < 10 and not few:
-        return {}
-    inside = mask if tissue_maximum else np.ones(mask.shape, bool)
-    top, top_prior = (a[inside & np.isfinite(a)].max() if normalise else 1.0 for a in (depth, prior))
-    if top == 0:
-        return {}
-    residual = np.where(valid, depth / top - prior / top_prior, 0.0)
-    up = float(request.inputs["d_loss"])
-    gradient = up * np.sign(residual) / (count * top)
-    if normalise and not constant:
-        holders = (depth == top) & inside
-        to_maximum = -up * (np.sign(residual) * np.where(valid, depth, 0.0)).sum() / (count * top**2)
-        if first:
-            gradient[tuple(np.argwhere(holders)[0])] += to_maximum
-        else:
-            gradient[holders] += to_maximum / holders.sum()
-    return {"loss": np.abs(residual).sum() / count, "d_rendered_depth": gradient}
-
-
-def _infinite_prior(request: Request) -> dict[str, Any] | None:
-    if not np.isinf(request.inputs["prior_depth"]).any():
-        return None
-    return {"loss": np.nan, "d_rendered_depth": request.right["d_rendered_depth"] * np.nan}
-
-
-def _priors(request: Request) -> int:
-    prior = request.inputs["prior_depth"]
-    return int((request.inputs["mask"] & np.isfinite(prior) & (prior > 0)).sum())
-
-
-def _ten_ignored(request: Request) -> dict[str, Any] | None:
-    return {name: 0 * a for name, a in request.right.items()} if _priors(request) == 10 else None
-
-
-def _over_zero(request: Request) -> dict[str, Any] | None:
-    if request.inputs["rendered_depth"].any():
-        return None
-    return {name: a * np.nan for name, a in request.right.items()}
-
+SOURCE = "losses.depth"
+LARGEST_PRIOR = "largest = np.max(prior_depth, where=known, initial=0)"
 
 WRONG_PORTS = [
-    WrongPort("depth_holes_count", "Pixels without prior take part", "prior 0 as depth; right: excluded",
-              {"normalised_depth": lambda r: _depth(r, holes=True)}),
-    WrongPort("depth_maximum_constant", "Largest depth taken as constant", "no gradient to it; right: it has one",
-              {"normalised_depth": lambda r: _depth(r, constant=True)}),
-    WrongPort("depth_maximum_of_tissue", "Largest depth over tissue", "over tissue; right: over the whole image",
-              {"normalised_depth": lambda r: _depth(r, tissue_maximum=True)}),
-    WrongPort("depth_not_normalised", "Depths compared in scene units", "no division; right: each over its largest",
-              {"normalised_depth": lambda r: _depth(r, normalise=False)}),
-    WrongPort("depth_first_maximum", "First of equal maxima takes the gradient", "first; right: split evenly",
-              {"normalised_depth": lambda r: _depth(r, first=True)}),
-    WrongPort("depth_few_priors", "Depth loss of fewer than ten pixels", "evaluated; right: 0",
-              {"normalised_depth": lambda r: _depth(r, few=True)}),
-    WrongPort("infinite_prior_counts", "Infinite prior taken as a depth", "D > 0; right: D > 0 and finite",
-              {"normalised_depth": _infinite_prior}),
-    WrongPort("ten_priors_ignored", "Depth loss of ten pixels left out", "n <= 10; right: n < 10",
-              {"normalised_depth": _ten_ignored}),
-    WrongPort("depth_over_zero", "Division by a largest depth of 0", "not a number; right: 0",
-              {"normalised_depth": _over_zero}),
-]  # fmt: skip
+    port(
+        "depth_holes_count",
+        "Pixels without prior take part",
+        "prior 0 as depth; right: excluded",
+        "normalised_depth",
+        edit(SOURCE, "valid = known & mask", "valid = mask.copy()"),
+    ),
+    port(
+        "depth_maximum_constant",
+        "Largest depth taken as constant",
+        "no gradient to it; right: it has one",
+        "normalised_depth",
+        edit(SOURCE, "-step * saved.signed_sum / saved.largest", "0.0"),
+    ),
+    port(
+        "depth_maximum_of_tissue",
+        "Largest depth over tissue",
+        "over tissue; right: over the whole image",
+        "normalised_depth",
+        edit(SOURCE, "where=known, initial=0)\n    normalised", "where=known & mask, initial=0)\n    normalised"),
+        edit(SOURCE, "    count: int  # valid pixels\n", "    count: int  # valid pixels\n    tissue: object = None\n"),
+        edit(SOURCE, "int(np.count_nonzero(valid)))", "int(np.count_nonzero(valid)), mask)"),
+        edit(
+            SOURCE,
+            "_largest_finite(rendered_depth) if",
+            "_largest_finite(np.where(target.tissue, rendered_depth, 0)) if",
+        ),
+    ),
+    port(
+        "depth_not_normalised",
+        "Depths compared in scene units",
+        "no division; right: each over its largest",
+        "normalised_depth",
+        edit(SOURCE, LARGEST_PRIOR, "largest = 1.0"),
+        edit(SOURCE, "_largest_finite(rendered_depth) if", "1.0 if"),
+        edit(SOURCE, "real(d_largest / ties)", "real(0.0)"),
+    ),
+    port(
+        "depth_first_maximum",
+        "First of equal maxima takes the gradient",
+        "first; right: split evenly",
+        "normalised_depth",
+        edit(
+            SOURCE,
+            "        _residual_reverse_kernel(depth, normalised, target.valid, peak, real(step), "
+            "real(d_largest / ties), d_depth)\n",
+            "        _residual_reverse_kernel(depth, normalised, target.valid, peak, real(step), real(0), d_depth)\n"
+            "        d_depth.reshape(-1)[np.argmax(depth == peak)] += d_largest\n",
+        ),
+    ),
+    port(
+        "depth_every_maximum",
+        "Each of equal maxima takes the whole gradient",
+        "all of it; right: split evenly",
+        "normalised_depth",
+        edit(SOURCE, "real(d_largest / ties)", "real(d_largest)"),
+    ),
+    port(
+        "depth_few_priors",
+        "Depth loss of fewer than ten pixels",
+        "evaluated; right: 0",
+        "normalised_depth",
+        edit(SOURCE, "FEWEST_VALID = 10", "FEWEST_VALID = 1"),
+    ),
+    port(
+        "infinite_prior_counts",
+        "Infinite prior taken as a depth",
+        "D > 0; right: D > 0 and finite",
+        "normalised_depth",
+        edit(SOURCE, "np.isfinite(prior_depth) & (prior_depth > 0)", "prior_depth > 0"),
+    ),
+    port(
+        "ten_priors_ignored",
+        "Depth loss of ten pixels left out",
+        "n <= 10; right: n < 10",
+        "normalised_depth",
+        edit(SOURCE, "FEWEST_VALID = 10", "FEWEST_VALID = 11"),
+    ),
+    port(
+        "depth_over_zero",
+        "Division by a largest depth of 0",
+        "not a number; right: 0",
+        "normalised_depth",
+        edit(SOURCE, "    if largest <= 0:", "    if target.count < FEWEST_VALID:"),
+        edit(SOURCE, "    if saved.largest > 0:", "    if target.count >= FEWEST_VALID:"),
+        edit(SOURCE, "step = float(d_loss) /", "step = np.float64(d_loss) /"),
+    ),
+]

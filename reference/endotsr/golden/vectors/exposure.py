@@ -4,11 +4,8 @@ Colours, logarithmic gains, biases and a gradient by the exposed colours come in
 colours leave the range [0, 1], so that a clamp shows.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.making import Seeds, Spec
-from endotsr.golden.vectors.wrong import Request, WrongPort
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("exposure",)
 
@@ -29,51 +26,46 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _with_gain(request: Request, gain: NDArray, d_gain: NDArray, bias_gain: NDArray) -> dict[str, NDArray]:
-    """Exposed colours gain colour + bias_gain bias, and their derivatives; d_gain is that of the gain by log_gain."""
-    colour, bias, up = (request.inputs[name] for name in ("colour", "bias", "d_exposed"))
-    column = lambda a: a[:, None, None]
-    return {
-        "exposed": column(gain) * colour + column(bias_gain * bias),
-        "d_colour": column(gain) * up,
-        "d_log_gain": d_gain * (up * (colour + column((bias_gain != 1) * bias))).sum(axis=(1, 2)),
-        "d_bias": bias_gain * up.sum(axis=(1, 2)),
-    }
-
-
-def _linear_gain(request: Request) -> dict[str, NDArray]:
-    """1 + log_gain in place of its exponential."""
-    ones = np.ones(3)
-    return _with_gain(request, 1 + request.inputs["log_gain"], ones, ones)
-
-
-def _bias_first(request: Request) -> dict[str, NDArray]:
-    """exp(log_gain) (colour + bias)."""
-    gain = np.exp(request.inputs["log_gain"])
-    return _with_gain(request, gain, gain, gain)
-
-
-def _clamped(request: Request) -> dict[str, NDArray]:
-    """The exposed colours limited to [0, 1], in value and gradient."""
-    inside = (request.right["exposed"] >= 0) & (request.right["exposed"] <= 1)
-    inputs = dict(request.inputs) | {"d_exposed": np.where(inside, request.inputs["d_exposed"], 0)}
-    return request.run(inputs, request.settings) | {"exposed": np.clip(request.right["exposed"], 0, 1)}
-
-
-def _by_gain(request: Request) -> dict[str, NDArray]:
-    """The chain rule stops at the gain."""
-    return {"d_log_gain": request.right["d_log_gain"] / np.exp(request.inputs["log_gain"])}
-
+SOURCE = "equations.exposure"
+GAIN, BIAS = "gain = np.exp(log_gain.astype(np.float64))", "    exposed += bias.astype(colour.dtype)[:, None, None]\n"
 
 WRONG_PORTS = [
-    WrongPort("gain_not_exponential", "Gain taken for its logarithm", "1 + log_gain; right: exp(log_gain)",
-              {"exposure": _linear_gain}),
-    WrongPort("bias_before_gain", "Bias added before the gain", "gain (colour + bias); right: gain colour + bias",
-              {"exposure": _bias_first}),
-    WrongPort("exposure_clamped", "Exposed colours clamped", "limited to [0, 1]; right: no clamp",
-              {"exposure": _clamped}),
-    WrongPort("log_gain_gradient_by_gain", "Gradient by the gain, not by its logarithm",
-              "sum(g colour); right: times the gain",
-              {"exposure": _by_gain}),
-]  # fmt: skip
+    port(
+        "gain_not_exponential",
+        "Gain taken for its logarithm",
+        "1 + log_gain; right: exp(log_gain)",
+        "exposure",
+        edit(SOURCE, GAIN, "gain = 1 + log_gain.astype(np.float64)"),
+        edit(SOURCE, "(saved.gain * d_gain)", "d_gain"),
+    ),
+    port(
+        "bias_before_gain",
+        "Bias added before the gain",
+        "gain (colour + bias); right: gain colour + bias",
+        "exposure",
+        edit(SOURCE, GAIN, GAIN + "\n    colour = colour + bias.astype(colour.dtype)[:, None, None]"),
+        edit(SOURCE, BIAS, ""),
+        edit(SOURCE, "d_bias.astype(dtype)", "(saved.gain * d_bias).astype(dtype)"),
+    ),
+    port(
+        "exposure_clamped",
+        "Exposed colours clamped",
+        "limited to [0, 1]; right: no clamp",
+        "exposure",
+        edit(SOURCE, BIAS, BIAS + "    inside, exposed = (exposed >= 0) & (exposed <= 1), np.clip(exposed, 0, 1)\n"),
+        edit(SOURCE, "ExposureSaved(colour, gain)", "ExposureSaved(colour, gain, inside)"),
+        edit(SOURCE, "exp(log_gain), float64\n", "exp(log_gain), float64\n    inside: object = None\n"),
+        edit(
+            SOURCE,
+            "    dtype = saved.colour.dtype\n",
+            "    dtype = saved.colour.dtype\n    d_exposed = np.where(saved.inside, d_exposed, 0)\n",
+        ),
+    ),
+    port(
+        "log_gain_gradient_by_gain",
+        "Gradient by the gain, not by its logarithm",
+        "sum(g colour); right: times the gain",
+        "exposure",
+        edit(SOURCE, "(saved.gain * d_gain)", "d_gain"),
+    ),
+]

@@ -78,10 +78,14 @@ def _flags_text(solved: list[Solved], wrong_ports: dict[str, WrongPort]) -> str:
     rows = []
     for flag, wrong_port in wrong_ports.items():
         made_for = [one.case.name for one in solved if flag in one.case.flags]
-        shown = [one.case.name for one in solved if flag in one.case.mistakes and flag not in one.case.flags]
+        shown = [one.case.name for one in solved if _shows(one, flag) and flag not in one.case.flags]
         rows.append({"flag": flag, "title": wrong_port.title, "wrong": wrong_port.wrong, "made_for": made_for,
                      "also_shown_by": shown})  # fmt: skip
     return json.dumps(rows, indent=1) + "\n"
+
+
+def _shows(one: Solved, flag: str) -> bool:
+    return flag in one.case.mistakes and bool(one.case.mistakes[flag].shows)
 
 
 def _entry(path: str, data: bytes) -> FileEntry:

@@ -5,12 +5,8 @@ order of the coefficients, the clamp at 0 (none at 1), the gradient through the 
 optical centre, which has no direction.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.making import Seeds, Spec, changed
-from endotsr.golden.vectors.wrong import Request, WrongPort, output, swapped
-from endotsr.kernels.constants import Y00
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("harmonics",)
 
@@ -27,9 +23,22 @@ def _degree(degree: int) -> Spec:
         "centre": seeds.uniform("centre", -0.3, 0.3, 3, unit="scene unit"),
         "d_colour": seeds.uniform("d_colour", -1.0, 1.0, 3, 9),
     }
-    flags = ["colour_not_clamped", "colour_clamped_above", "offset_half_missing", "residual_not_scaled"]
+    flags = [
+        "colour_not_clamped",
+        "colour_clamped_above",
+        "offset_half_missing",
+        "residual_not_scaled",
+        "colour_clamp_gradient_passed",
+    ]
     if degree > 0:
-        flags += ["harmonics_sign_y", "direction_gradient_dropped", "direction_inverted", "bands_channel_first"]
+        flags += [
+            "harmonics_sign_y",
+            "direction_gradient_dropped",
+            "direction_inverted",
+            "bands_channel_first",
+            "harmonics_x_and_y_swapped",
+            "direction_gradient_not_projected",
+        ]
     title = f"Real harmonics of degree {degree}; residual on the first coefficient, clamp at 0, none above"
     return Spec("harmonics", f"degree_{degree}", "harmonics", title, tuple(flags), {"degree": degree}, inputs)
 
@@ -56,71 +65,118 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _unclamped(request: Request) -> dict[str, NDArray]:
-    """No clamp at 0: the same with 8 added to the first coefficient, and the 8 taken out again."""
-    lifted = request.inputs["harmonics"].copy()
-    lifted[0] += 8.0
-    found = request.run(dict(request.inputs) | {"harmonics": lifted}, request.settings)
-    return found | {"colour": found["colour"] - 8.0 * Y00}
-
-
-def _no_half(request: Request) -> dict[str, NDArray]:
-    lowered = request.inputs["harmonics"].copy()
-    lowered[0] -= 0.5 / Y00
-    return request.run(dict(request.inputs) | {"harmonics": lowered}, request.settings)
-
-
-def _bands(request: Request) -> dict[str, NDArray] | None:
-    h = request.inputs["harmonics"]
-    if h.shape[0] == 1:
-        return None
-    wrong = np.ascontiguousarray(h.reshape(3, h.shape[0], -1).transpose(1, 0, 2))
-    return request.run(dict(request.inputs) | {"harmonics": wrong}, request.settings)
-
-
-def _mirrored(request: Request) -> dict[str, NDArray] | None:
-    h = request.inputs["harmonics"].copy()
-    if h.shape[0] < 4:
-        return None
-    h[1] *= -1
-    return {"colour": request.run(dict(request.inputs) | {"harmonics": h}, request.settings)["colour"]}
-
-
-def _inverted_direction(request: Request) -> dict[str, NDArray] | None:
-    if request.settings["degree"] == 0:
-        return None
-    swap = {"position": np.tile(request.inputs["centre"][:, None], request.inputs["position"].shape[1])}
-    mirrored = 2 * swap["position"] - request.inputs["position"]
-    found = request.run(dict(request.inputs) | {"position": mirrored}, request.settings)
-    return {"colour": found["colour"], "d_harmonics": found["d_harmonics"]}
-
-
-def _nowhere(request: Request) -> dict[str, NDArray] | None:
-    """The direction 0 / 0."""
-    at = (request.inputs["position"] == request.inputs["centre"][:, None]).all(axis=0)
-    if not at.any() or request.settings["degree"] == 0:
-        return None
-    names = ("colour", "d_position")
-    return {name: np.where(at, np.nan, request.right[name]) for name in names}
-
+SOURCE, FORMULAS = "splatting.harmonics", "splatting.harmonics_formulas"
+BOTH = "harmonics render"
+DIFFERENCE = "position[0] - centre[0], position[1] - centre[1], position[2] - centre[2]"
+ORDER = "np.ascontiguousarray(harmonics.reshape(3, len(harmonics), -1).transpose(1, 0, 2))"
 
 WRONG_PORTS = [
-    WrongPort("harmonics_sign_y", "Sign of the first harmonic", "+y; right: -y", {"harmonics": _mirrored}),
-    WrongPort("direction_inverted", "Direction from Gaussian to camera", "inverted; right: camera to Gaussian",
-              {"harmonics": _inverted_direction}),
-    WrongPort("direction_gradient_dropped", "No gradient through the view direction", "0; right: kept",
-              {"harmonics": lambda r: {n: 0 * r.right[n] for n in ("d_position", "d_centre")}
-               if r.settings["degree"] else None}),
-    WrongPort("bands_channel_first", "Harmonics as [channel, band]", "(3, K); right: (K, 3)", {"harmonics": _bands}),
-    WrongPort("colour_not_clamped", "Colour not clamped at 0", "negative colours; right: max(0, .)",
-              {"harmonics": _unclamped}),
-    WrongPort("colour_clamped_above", "Colour clamped at 1", "min(1, .); right: no upper clamp",
-              {"harmonics": output(colour=lambda a: np.minimum(a, 1.0))}),
-    WrongPort("offset_half_missing", "1/2 left out of the colour", "sum Y h; right: 1/2 + sum Y h",
-              {"harmonics": _no_half}),
-    WrongPort("residual_not_scaled", "Residual added to the colour", "colour + r; right: Y00 (h_0 + r)",
-              {"harmonics": swapped(lambda i: {"residual": i["residual"] / i["residual"].dtype.type(Y00)})}),
-    WrongPort("direction_of_nothing", "Direction to a Gaussian at the optical centre", "0 / 0; right: first band only",
-              {"harmonics": _nowhere}),
-]  # fmt: skip
+    port(
+        "harmonics_sign_y",
+        "Sign of the first harmonic",
+        "+y; right: -y",
+        BOTH,
+        edit(FORMULAS, "        -c1 * y,\n        c1 * z", "        c1 * y,\n        c1 * z"),
+        edit(FORMULAS, "-c1 * g3, -c1 * g1, c1 * g2", "-c1 * g3, c1 * g1, c1 * g2"),
+    ),
+    port(
+        "harmonics_x_and_y_swapped",
+        "First band in the order x, z, y",
+        "x, z, y; right: y, z, x",
+        BOTH,
+        edit(
+            FORMULAS,
+            "        -c1 * y,\n        c1 * z,\n        -c1 * x,",
+            "        -c1 * x,\n        c1 * z,\n        -c1 * y,",
+        ),
+        edit(FORMULAS, "-c1 * g3, -c1 * g1, c1 * g2", "-c1 * g1, -c1 * g3, c1 * g2"),
+    ),
+    port(
+        "direction_inverted",
+        "Direction from Gaussian to camera",
+        "inverted; right: camera to Gaussian",
+        BOTH,
+        edit(FORMULAS, DIFFERENCE, "centre[0] - position[0], centre[1] - position[1], centre[2] - position[2]"),
+        edit(
+            FORMULAS, "g_x, g_y, g_z = d_direction", "g_x, g_y, g_z = -d_direction[0], -d_direction[1], -d_direction[2]"
+        ),
+    ),
+    port(
+        "direction_gradient_dropped",
+        "No gradient through the view direction",
+        "0; right: kept",
+        BOTH,
+        edit(FORMULAS, "g_x, g_y, g_z = d_direction", "g_x, g_y, g_z = (0 * g for g in d_direction)"),
+    ),
+    port(
+        "direction_gradient_not_projected",
+        "Gradient of the direction without its projection",
+        "g / distance; right: less its part along the direction",
+        BOTH,
+        edit(FORMULAS, "along = g_x * x + g_y * y + g_z * z", "along = 0 * g_x"),
+    ),
+    port(
+        "bands_channel_first",
+        "Harmonics as [channel, band]",
+        "(3, K); right: (K, 3)",
+        BOTH,
+        edit(
+            SOURCE,
+            "    centre = np.ascontiguousarray(centre, dtype)\n",
+            f"    harmonics = {ORDER}\n    centre = np.ascontiguousarray(centre, dtype)\n",
+        ),
+        edit(
+            SOURCE,
+            "    residual = None if saved.residual is None else d_residual\n",
+            "    residual = None if saved.residual is None else d_residual\n"
+            "    d_harmonics = np.ascontiguousarray(d_harmonics.transpose(1, 0, 2)).reshape(d_harmonics.shape)\n",
+        ),
+    ),
+    port(
+        "colour_not_clamped",
+        "Colour not clamped at 0",
+        "negative colours; right: max(0, .)",
+        BOTH,
+        edit(SOURCE, "= sums[_U64(item)] < zero", "= False"),
+        edit(SOURCE, "max(sums[_U64(item)], zero)", "sums[_U64(item)]"),
+    ),
+    port(
+        "colour_clamp_gradient_passed",
+        "Gradient passes the clamp of the colour",
+        "passed; right: 0 below 0",
+        BOTH,
+        edit(SOURCE, "= sums[_U64(item)] < zero", "= False"),
+    ),
+    port(
+        "colour_clamped_above",
+        "Colour clamped at 1",
+        "min(1, .); right: no upper clamp",
+        BOTH,
+        edit(SOURCE, "= sums[_U64(item)] < zero", "= sums[_U64(item)] < zero or sums[_U64(item)] > 1"),
+        edit(SOURCE, "max(sums[_U64(item)], zero)", "min(max(sums[_U64(item)], zero), 1)"),
+    ),
+    port(
+        "offset_half_missing",
+        "1/2 left out of the colour",
+        "sum Y h; right: 1/2 + sum Y h",
+        BOTH,
+        edit(SOURCE, "half + y00 * sums", "y00 * sums"),
+    ),
+    port(
+        "residual_not_scaled",
+        "Residual added to the colour",
+        "colour + r; right: Y00 (h_0 + r)",
+        BOTH,
+        edit(SOURCE, "+= residual[channel, _U64(start + item)]", "+= residual[channel, _U64(start + item)] / y00"),
+        edit(SOURCE, "d_residual[channel, _U64(start + item)] = y00 *", "d_residual[channel, _U64(start + item)] ="),
+    ),
+    port(
+        "direction_of_nothing",
+        "Direction to a Gaussian at the optical centre",
+        "0 / 0; right: first band only",
+        "harmonics",
+        edit(
+            FORMULAS, "one / distance if distance > zero else zero", "one / distance if distance > zero else math.inf"
+        ),
+    ),
+]

@@ -1,12 +1,8 @@
-"""Masks and image pairs, and the mistakes that every masked mean over an image can make."""
-
-from typing import Any
+"""Masks and image pairs, and the cases that every masked mean over an image has."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given, scalar
-from endotsr.golden.vectors.wrong import Request, Wrong
 
 HEIGHT, WIDTH = 9, 14
 NOT_FINITE = "not_finite_under_mask"
@@ -95,56 +91,3 @@ def masked_mean(
         spec(NOT_FINITE, "NaN and infinity under the mask change nothing", ("mask_multiplied",),
              not_finite_images(seeds[NOT_FINITE]), tool_mask()),
     ]  # fmt: skip
-
-
-# ---- wrong means ----
-
-
-def over_all_pixels(mean: str) -> Wrong:
-    """Averaged over all pixels in place of tissue pixels."""
-
-    def wrong(request: Request) -> dict[str, Any] | None:
-        fraction = float(request.inputs["mask"].mean())
-        if fraction in (0.0, 1.0):
-            return None
-        return {mean: request.right[mean] * fraction, "d_rendered": request.right["d_rendered"] * fraction}
-
-    return wrong
-
-
-def nan_without_tissue(*names: str) -> Wrong:
-    """0 / 0 where there is no tissue."""
-
-    def wrong(request: Request) -> dict[str, NDArray] | None:
-        if request.inputs["mask"].any():
-            return None
-        return {name: np.full_like(request.right[name], np.nan) for name in names if name in request.right}
-
-    return wrong
-
-
-def multiplied(one: str, other: str, loss: str) -> Wrong:
-    """Difference times mask in place of a selection: 0 times a number that is not finite is none."""
-
-    def wrong(request: Request) -> dict[str, Any] | None:
-        total = ((request.inputs[one] - request.inputs[other]) * request.inputs["mask"]).sum()
-        return None if np.isfinite(total) else {loss: total}
-
-    return wrong
-
-
-def sign_of_zero(request: Request) -> dict[str, NDArray] | None:
-    """sign(0) = 1: a gradient between equal images."""
-    if not np.array_equal(request.inputs["rendered"], request.inputs["observed"]):
-        return None
-    mask = request.inputs["mask"]
-    step = float(request.inputs["d_loss"]) / (3 * mask.sum())
-    return {"d_rendered": np.where(mask, step, 0.0) * np.ones_like(request.right["d_rendered"])}
-
-
-def inverted_mask(request: Request) -> dict[str, NDArray] | None:
-    """Over the instrument in place of the tissue."""
-    mask = request.inputs["mask"]
-    if not mask.any():
-        return None
-    return request.run(dict(request.inputs) | {"mask": ~mask}, request.settings)

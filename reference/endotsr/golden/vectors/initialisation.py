@@ -6,13 +6,11 @@ cases are three training frames of six, a clip long enough that frames are skipp
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.views import pose
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, output, setting, swapped
-from endotsr.kernels.constants import Y00
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("initialisation",)
 LENS = {"fx": 7.0, "fy": 9.0, "cx": 2.75, "cy": 2.25, "width": 6, "height": 5}
@@ -63,7 +61,7 @@ def cases() -> list[Spec]:
     long["masks"] = given(kept, f"{long['masks'].recipe} and (6 y + x) % 7 = 0")
     flags = ("backprojected_at_corner", "initialised_from_test_frames", "moved_pixels_ignored", "holes_initialised",
              "points_left_in_camera", "mean_distance_for_scale", "neighbours_count_itself",
-             "initial_colour_without_y00")  # fmt: skip
+             "initial_colour_without_y00", "initial_opacity_as_logit")  # fmt: skip
     frames = _frames(Seeds("initialisation", "frames"), 6, [2, 3, 5])
     return [
         spec("frames", "Depth maps of three training frames of six, lifted with their own cameras", flags, frames),
@@ -74,75 +72,98 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _no_floor(request: Request) -> dict[str, NDArray] | None:
-    return {"log_scale": np.full((3, 1), -np.inf)} if request.right["count"] == 1 else None
-
-
-def _every_frame(request: Request) -> dict[str, NDArray] | None:
-    """No skipping in a long clip; only the number of points is wrong."""
-    train = request.inputs["train_index"]
-    if len(request.inputs["images"]) <= 150:
-        return None
-    return {"count": request.right["count"] + _new_pixels(request, [k for k in train[1:] if (k - train[0]) % 2 == 0])}
-
-
-def _new_pixels(request: Request, frames: list[int]) -> int:
-    depth, first = request.inputs["prior_depths"], int(request.inputs["train_index"][0])
-    usable = request.inputs["masks"] & (depth > 0)
-    far = np.abs(depth - depth[first]) > request.settings["initialisation"]["motion_threshold"]
-    return sum(int((usable[k] & (~usable[first] | far[k])).sum()) for k in frames)
-
-
-def _holes(inputs: dict[str, NDArray]) -> dict[str, NDArray]:
-    depth = inputs["prior_depths"]
-    return {"prior_depths": np.where(depth > 0, depth, depth[depth > 0].min())}
-
-
-def _in_camera(inputs: dict[str, NDArray]) -> dict[str, NDArray]:
-    turned = inputs["rotation_matrices"]
-    return {"rotation_matrices": np.broadcast_to(np.eye(3), turned.shape).astype(turned.dtype),
-            "translations": 0 * inputs["translations"]}  # fmt: skip
-
-
-def _corner(request: Request) -> dict[str, NDArray]:
-    lens = request.settings["camera"]
-    half = {"camera": lens | {"cx": lens["cx"] + 0.5, "cy": lens["cy"] + 0.5}}
-    return {"position": request.run(request.inputs, dict(request.settings) | half)["position"]}
-
-
-def _scales(reduce) -> Wrong:
-    """Log-scales from the sorted distances (N, N) of every point to all, itself first."""
-
-    def wrong(request: Request) -> dict[str, NDArray] | None:
-        points = request.right["position"]
-        if points.shape[1] < 5:
-            return None
-        distance = np.sort(np.sqrt(((points[:, :, None] - points[:, None]) ** 2).sum(axis=0)), axis=1)
-        return {"log_scale": np.tile(np.log(reduce(distance)), (3, 1))}
-
-    return wrong
-
+SOURCE, CAMERA = "scene.initialisation", "splatting.camera"
+ONE = "initialisation"
 
 WRONG_PORTS = [
-    WrongPort("backprojected_at_corner", "Pixels lifted at their corner", "i - cx; right: i + 1/2 - cx",
-              {"initialisation": _corner}),
-    WrongPort("initialised_from_test_frames", "Held-out frames initialise too", "all frames; right: training frames",
-              {"initialisation": swapped(lambda i: {"train_index": np.arange(len(i["images"]))})}),
-    WrongPort("moved_pixels_ignored", "Pixels that moved are not candidates", "new ones only; right: or moved ones",
-              {"initialisation": setting(initialisation__motion_threshold=1e9)}),
-    WrongPort("holes_initialised", "Pixels without depth initialised", "at the least depth; right: left out",
-              {"initialisation": swapped(_holes)}),
-    WrongPort("points_left_in_camera", "Points left in camera axes", "x; right: W^T (x - d)",
-              {"initialisation": lambda r: {"position": swapped(_in_camera)(r)["position"]}}),  # type: ignore[index],
-    WrongPort("mean_distance_for_scale", "Scale from the mean distance", "mean d; right: sqrt(mean d^2)",
-              {"initialisation": _scales(lambda d: d[:, 1:4].mean(axis=1))}),
-    WrongPort("neighbours_count_itself", "Point counted among its neighbours", "itself and two; right: three others",
-              {"initialisation": _scales(lambda d: np.sqrt((d[:, :3] ** 2).mean(axis=1)))}),
-    WrongPort("initial_colour_without_y00", "First harmonic set to the colour", "rgb - 1/2; right: over Y00",
-              {"initialisation": output(harmonics=lambda a: a * Y00)}),
-    WrongPort("long_clip_every_frame", "No frame skipped in a long clip", "all; right: every second beyond 150",
-              {"initialisation": _every_frame}),
-    WrongPort("single_point_without_floor", "Scale of a single point without floor", "log 0; right: 1e-7",
-              {"initialisation": _no_floor}),
-]  # fmt: skip
+    port(
+        "backprojected_at_corner",
+        "Pixels lifted at their corner",
+        "i - cx; right: i + 1/2 - cx",
+        ONE,
+        edit(CAMERA, "(column + 0.5 - camera.cx)", "(column - camera.cx)"),
+        edit(CAMERA, "(row + 0.5 - camera.cy)", "(row - camera.cy)"),
+    ),
+    port(
+        "initialised_from_test_frames",
+        "Held-out frames initialise too",
+        "all frames; right: training frames",
+        ONE,
+        edit(SOURCE, "train = [int(k) for k in sequence.train_index]", "train = list(range(sequence.count))"),
+    ),
+    port(
+        "moved_pixels_ignored",
+        "Pixels that moved are not candidates",
+        "new ones only; right: or moved ones",
+        ONE,
+        edit(SOURCE, "(~seen | moved)", "~seen"),
+    ),
+    port(
+        "holes_initialised",
+        "Pixels without depth initialised",
+        "at the least depth; right: left out",
+        ONE,
+        edit(
+            SOURCE,
+            "    return sequence.masks[k] & (depth > 0) & np.isfinite(depth)",
+            "    depth[depth <= 0] = depth[depth > 0].min()\n    return sequence.masks[k] & np.isfinite(depth)",
+        ),
+    ),
+    port(
+        "points_left_in_camera",
+        "Points left in camera axes",
+        "x; right: W^T (x - d)",
+        ONE,
+        edit(
+            CAMERA,
+            "camera.rotation.T @ (np.stack([x, y, depth]) - camera.translation[:, None])",
+            "np.stack([x, y, depth])",
+        ),
+    ),
+    port(
+        "mean_distance_for_scale",
+        "Scale from the mean distance",
+        "mean d; right: sqrt(mean d^2)",
+        ONE,
+        edit(SOURCE, "(distance**2).mean(axis=1)", "distance.mean(axis=1) ** 2"),
+    ),
+    port(
+        "neighbours_count_itself",
+        "Point counted among its neighbours",
+        "itself and two; right: three others",
+        ONE,
+        edit(SOURCE, "k=others + 1)[0][:, 1:]", "k=others + 1)[0][:, :-1]"),
+    ),
+    port(
+        "initial_colour_without_y00",
+        "First harmonic set to the colour",
+        "rgb - 1/2; right: over Y00",
+        ONE,
+        edit(SOURCE, "(colour - 0.5) / Y00", "colour - 0.5"),
+    ),
+    port(
+        "initial_opacity_as_logit",
+        "Initial opacity taken for its logit",
+        "0.1; right: logit of 0.1",
+        ONE,
+        edit(SOURCE, "np.log(START_OPACITY / (1.0 - START_OPACITY))", "START_OPACITY"),
+    ),
+    port(
+        "long_clip_every_frame",
+        "No frame skipped in a long clip",
+        "all; right: every second beyond 150",
+        ONE,
+        edit(SOURCE, "stride = 2 if count > LONG_CLIP else 1", "stride = 1"),
+    ),
+    port(
+        "single_point_without_floor",
+        "Scale of a single point without floor",
+        "log 0; right: 1e-7",
+        ONE,
+        edit(
+            SOURCE,
+            "np.maximum(squared_neighbour_distance(position), SQUARED_DISTANCE_FLOOR)",
+            "squared_neighbour_distance(position)",
+        ),
+    ),
+]

@@ -4,14 +4,12 @@ A rendered and an observed image, a tissue mask and an up-sampling rule come in.
 a level without valid pixels, an image without tissue, equal images, and numbers under the mask that are not finite.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from endotsr.golden.vectors.copies import Edit
 from endotsr.golden.vectors.images import spoiled, tissue
 from endotsr.golden.vectors.making import Made, Seeds, Spec, given, scalar
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, setting
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("laplacian",)
 
@@ -23,7 +21,8 @@ def _images(case: str, shape: tuple[int, int]) -> dict[str, Made]:
 
 def _generic() -> list[Spec]:
     loss_flags = ("mask_before_pyramid", "pyramid_zero_border", "laplacian_over_all_pixels", "upsampling_swapped",
-                  "upsampling_nearest", "levels_not_averaged")  # fmt: skip
+                  "upsampling_nearest", "levels_not_averaged", "support_not_expanded", "support_subsampled",
+                  "pyramid_replicated_border")  # fmt: skip
     rows = [
         ("co_sited", "co_sited", (19, 22), tissue(19, 22, 2, 3), "Odd and even sizes, co-sited", loss_flags),
         ("half_pixel", "half_pixel", (19, 22), tissue(19, 22, 2, 3), "Odd and even sizes, half-pixel", loss_flags),
@@ -61,86 +60,117 @@ def cases() -> list[Spec]:
     return [*_generic(), _equal(), _not_finite()]
 
 
-# ---- mistakes: equation (5) by dense matrices, with switches ----
+# ---- mistakes ----
+
+SOURCE, PYRAMID = "equations.laplacian", "equations.pyramid"
+LOSS, WHOLE = "laplacian", "laplacian objective"
+ZERO_BORDER = (
+    *(
+        edit(
+            PYRAMID,
+            f"{name} = fine[reflect({row}, h)]\n",
+            f"{name} = fine[max(min({row}, h - 1), 0)] * real(0 <= {row} < h)\n",
+        )
+        for name, row in (("a", "2 * y - 2"), ("b", "2 * y - 1"), ("d", "2 * y + 1"), ("e", "2 * y + 2"))
+    ),
+    edit(
+        PYRAMID,
+        "padded[0] = inside[reflect(-2, w)]\n    padded[1] = inside[reflect(-1, w)]",
+        "padded[0] = real(0.0)\n    padded[1] = real(0.0)",
+    ),
+    edit(PYRAMID, "inside[x] = inside[reflect(x, w)]", "inside[x] = real(0.0)"),
+    edit(PYRAMID, "    inside[reflect(-2, w)] += padded[0]\n    inside[reflect(-1, w)] += padded[1]\n", ""),
+    edit(PYRAMID, "inside[reflect(x, w)] += inside[x]", "inside[x] += real(0.0)"),
+    edit(
+        PYRAMID,
+        "entries[key] = entries.get(key, 0.0) + tap",
+        "entries[key] = entries.get(key, 0.0) + tap * (0 <= 2 * k + offset < n)",
+    ),
+)
 
 
-def _filter(n: int, border: str) -> NDArray:
-    out = np.zeros(((n + 1) // 2, n))
-    for row in range(out.shape[0]):
-        for tap, weight in zip(range(-2, 3), (1, 4, 6, 4, 1)):
-            k = 2 * row + tap
-            if border == "mirror":
-                period = max(2 * (n - 1), 1)
-                k = abs(k) % period
-                k = min(k, period - k) if n > 1 else 0
-            if 0 <= k < n:
-                out[row, k] += weight / 16
-    return out
+def _weights(co_sited: str, half_pixel: str) -> Edit:
+    return edit(
+        PYRAMID,
+        '{"co_sited": (1.0, 0.5), "half_pixel": (0.75, 0.75)}',
+        f'{{"co_sited": {co_sited}, "half_pixel": {half_pixel}}}',
+    )
 
 
-def _expand(n: int, rule: str) -> NDArray:
-    m = (n + 1) // 2
-    fine = {"co_sited": np.arange(n) / 2, "half_pixel": (np.arange(n) + 0.5) / 2 - 0.5}.get(rule, np.arange(n) // 2)
-    return np.stack([np.interp(fine, np.arange(m), row) for row in np.eye(m)], axis=1)
-
-
-def _laplacian_with(request: Request, *, border="mirror", rule=None, masks="support", divide="valid",
-                   levels_mean=True, rescale=False) -> dict[str, Any]:  # fmt: skip
-    """Equation (5) by dense matrices, one thing different."""
-    rule = rule or request.settings["upsampling"]
-    mask = request.inputs["mask"]
-    difference = np.where(mask, request.inputs["rendered"] - request.inputs["observed"], 0.0)
-    observed = request.inputs["observed"].astype(float)
-    up = float(request.inputs["d_loss"])
-    height, width = mask.shape
-    down_y, down_x = np.eye(height), np.eye(width)
-    out: dict[str, Any] = {}
-    parts, gradients = [], []
-    shrunk = mask
-    for level in range(request.settings["levels"]):
-        h, w = down_y.shape[0], down_x.shape[0]
-        ry, rx, ey, ex = _filter(h, border), _filter(w, border), _expand(h, rule), _expand(w, rule)
-        next_y, next_x = ry @ down_y, rx @ down_x
-
-        smooth_y, smooth_x = ey @ next_y, ex @ next_x
-        band_of = [down_y @ i @ down_x.T - smooth_y @ i @ smooth_x.T for i in (difference, observed)]
-        valid = request.right[f"valid_{level + 1}"] if masks == "support" else shrunk
-        sign = np.sign(band_of[0]) * valid
-        count = 3 * (valid.sum() if divide == "valid" else valid.size)
-        parts.append(np.abs(band_of[0] * valid).sum() / count if count else None)
-        g = down_y.T @ sign @ down_x - smooth_y.T @ sign @ smooth_x
-        gradients.append(g / max(count, 1))
-        out[f"band_{level + 1}"], out[f"valid_{level + 1}"] = band_of[1], valid
-        down_y, down_x, shrunk = next_y, next_x, shrunk[::2, ::2]
-    present = [p for p in parts if p is not None]
-    fraction = 1.0 if not levels_mean else 1.0 / (len(present) if rescale and present else len(parts))
-    out["loss"] = fraction * sum(present)
-    out["d_rendered"] = np.where(mask, up * fraction * sum(gradients), 0.0)
-    return out
-
-
-def _by_matrices(**switches: Any) -> dict[str, Wrong]:
-    return {"laplacian": lambda request: _laplacian_with(request, **switches)}
+def _count(new: str) -> Edit:
+    return edit(SOURCE, "1.0 / (len(masks.bands) * channels * count) if count else 0.0", new)
 
 
 WRONG_PORTS = [
-    WrongPort("mask_before_pyramid", "Mask applied to the images instead of the support",
-              "all band pixels under the subsampled mask; right: those whose whole footprint is tissue",
-              _by_matrices(masks="image")),
-    WrongPort("pyramid_zero_border", "Zero border in the binomial filter", "zeros outside; right: reflect-101",
-              _by_matrices(border="zero")),
-    WrongPort("laplacian_over_all_pixels", "Detail loss averaged over all band pixels", "over all; right: valid ones",
-              _by_matrices(divide="all")),
-    WrongPort("upsampling_swapped", "The other up-sampling rule", "half-pixel for co-sited or back",
-              {"laplacian": lambda r: _laplacian_with(r, rule="half_pixel" if r.settings["upsampling"] == "co_sited"
-                                                     else "co_sited"),
-               "objective": setting(loss__upsampling=lambda old: "half_pixel" if old == "co_sited" else "co_sited")}),
-    WrongPort("upsampling_nearest", "Nearest-neighbour up-sampling", "repeats samples; right: linear interpolation",
-              _by_matrices(rule="nearest")),
-    WrongPort("levels_not_averaged", "Levels added, not averaged", "sum; right: 1/3 of it",
-              _by_matrices(levels_mean=False)),
-    WrongPort("empty_level_rescaled", "Average over the levels that are not empty", "1/2; right: the 1/3 stays",
-              {"laplacian": lambda r: _laplacian_with(r, rescale=True),
-               "objective": lambda r: setting(loss__lambda_lap=lambda old: old * 1.5)(r)
-               if r.inputs["mask"].mean() < 0.8 else None}),
-]  # fmt: skip
+    port(
+        "mask_before_pyramid",
+        "Mask applied to the images instead of the support",
+        "all band pixels under the subsampled mask; right: those whose whole footprint is tissue",
+        LOSS,
+        edit(SOURCE, "coarse = _reduce_support(valid)", "coarse = valid[::2, ::2]"),
+        edit(SOURCE, "valid & _expand_support(coarse, valid.shape, upsampling)", "valid"),
+    ),
+    port(
+        "support_subsampled",
+        "Mask subsampled instead of eroded",
+        "the even pixels of the mask; right: all pixels that the filter reads",
+        LOSS,
+        edit(SOURCE, "coarse = _reduce_support(valid)", "coarse = valid[::2, ::2]"),
+    ),
+    port(
+        "support_not_expanded",
+        "Support of a band from its own level alone",
+        "the reduced mask; right: and the coarse samples that the up-sampling reads",
+        LOSS,
+        edit(SOURCE, "valid & _expand_support(coarse, valid.shape, upsampling)", "valid"),
+    ),
+    port(
+        "pyramid_zero_border",
+        "Zero border in the binomial filter",
+        "zeros outside; right: reflect-101",
+        LOSS,
+        *ZERO_BORDER,
+    ),
+    port(
+        "pyramid_replicated_border",
+        "Replicated border in the binomial filter",
+        "edge repeated; right: reflect-101",
+        LOSS,
+        edit(PYRAMID, "    if n == 1:\n        return 0\n    period", "    return min(max(i, 0), n - 1)\n    period"),
+    ),
+    port(
+        "laplacian_over_all_pixels",
+        "Detail loss averaged over all band pixels",
+        "over all; right: valid ones",
+        LOSS,
+        _count("1.0 / (len(masks.bands) * channels * valid.size)"),
+    ),
+    port(
+        "upsampling_swapped",
+        "The other up-sampling rule",
+        "half-pixel for co-sited or back",
+        WHOLE,
+        _weights("(0.75, 0.75)", "(1.0, 0.5)"),
+    ),
+    port(
+        "upsampling_nearest",
+        "Nearest-neighbour up-sampling",
+        "repeats samples; right: linear interpolation",
+        LOSS,
+        _weights("(1.0, 1.0)", "(1.0, 1.0)"),
+    ),
+    port(
+        "levels_not_averaged",
+        "Levels added, not averaged",
+        "sum; right: 1/3 of it",
+        LOSS,
+        _count("1.0 / (channels * count) if count else 0.0"),
+    ),
+    port(
+        "empty_level_rescaled",
+        "Average over the levels that are not empty",
+        "1/2; right: the 1/3 stays",
+        WHOLE,
+        _count("1.0 / (sum(n > 0 for n in masks.counts) * channels * count) if count else 0.0"),
+    ),
+]

@@ -4,16 +4,9 @@ A rendered and an observed image and a tissue mask come in. The cases are an ins
 equal images, and numbers under the mask that are not finite: excluded values must never be read.
 """
 
-from endotsr.golden.vectors.images import (
-    inverted_mask,
-    masked_mean,
-    multiplied,
-    nan_without_tissue,
-    over_all_pixels,
-    sign_of_zero,
-)
+from endotsr.golden.vectors.images import masked_mean
 from endotsr.golden.vectors.making import Spec
-from endotsr.golden.vectors.wrong import WrongPort, scaled
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("masked_l1",)
 
@@ -31,22 +24,78 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
+SOURCE, SSIM, DETAIL, DEPTH = "losses.masked_l1", "losses.masked_ssim", "equations.laplacian", "losses.depth"
+COUNT = "rendered.shape[0] * int(np.count_nonzero(mask))"
+
 WRONG_PORTS = [
-    WrongPort("l1_over_all_pixels", "L1 averaged over all pixels", "over H W; right: over tissue pixels",
-              {"masked_l1": over_all_pixels("loss")}),
-    WrongPort("l1_sum_over_channels", "L1 summed over channels", "3 times too large; right: mean",
-              {"masked_l1": scaled(3.0, "loss", "d_rendered")}),
-    WrongPort("mask_inverted_loss", "Loss over the instrument", "mask inverted; right: over tissue",
-              {"masked_l1": inverted_mask, "masked_ssim": inverted_mask}),
-    WrongPort("mean_of_nothing", "Mean over no pixels", "0 / 0; right: a defined value",
-              {"laplacian": nan_without_tissue("loss", "d_rendered"),
-               "masked_l1": nan_without_tissue("loss", "d_rendered"),
-               "masked_ssim": nan_without_tissue("ssim", "d_rendered")}),
-    WrongPort("sign_of_zero", "sign(0) = 1", "a pull between equal images; right: none",
-              {"laplacian": sign_of_zero, "masked_l1": sign_of_zero}),
-    WrongPort("mask_multiplied", "Mask multiplied, not selected", "0 times NaN; right: excluded values are not read",
-              {"masked_l1": multiplied("rendered", "observed", "loss"),
-               "masked_ssim": multiplied("rendered", "observed", "ssim"),
-               "laplacian": multiplied("rendered", "observed", "loss"),
-               "normalised_depth": multiplied("rendered_depth", "prior_depth", "loss")}),
-]  # fmt: skip
+    port(
+        "l1_over_all_pixels",
+        "L1 averaged over all pixels",
+        "over H W; right: over tissue pixels",
+        "masked_l1",
+        edit(SOURCE, COUNT, "rendered.size"),
+    ),
+    port(
+        "l1_sum_over_channels",
+        "L1 summed over channels",
+        "3 times too large; right: mean",
+        "masked_l1",
+        edit(SOURCE, COUNT, "int(np.count_nonzero(mask))"),
+    ),
+    port(
+        "mask_inverted_loss",
+        "Loss over the instrument",
+        "mask inverted; right: over tissue",
+        "masked_l1 masked_ssim",
+        edit(SOURCE, "mask = np.ascontiguousarray(mask)", "mask = np.ascontiguousarray(~mask)"),
+        edit(
+            SSIM,
+            '    observed = check_image("observed", observed, mask)\n    image',
+            '    mask = ~mask\n    observed = check_image("observed", observed, mask)\n    image',
+        ),
+    ),
+    port(
+        "mean_of_nothing",
+        "Mean over no pixels",
+        "0 / 0; right: a defined value",
+        "laplacian masked_l1 masked_ssim",
+        edit(DETAIL, "count) if count else 0.0", "count) if count else np.nan"),
+        edit(SOURCE, "return 0.0, saved", "return np.nan, saved"),
+        edit(SOURCE, "return np.zeros_like(saved.rendered)", "return np.full_like(saved.rendered, np.nan)"),
+        edit(SSIM, "return 1.0, saved", "return np.nan, saved"),
+        edit(
+            SSIM,
+            "return np.zeros(target.image.shape, saved.difference.dtype)",
+            "return np.full(target.image.shape, np.nan, saved.difference.dtype)",
+        ),
+    ),
+    port(
+        "sign_of_zero",
+        "sign(0) = 1",
+        "a pull between equal images; right: none",
+        "laplacian masked_l1",
+        edit(
+            DETAIL,
+            "sign[x] = np.int8(band > real(0.0)) - np.int8(band < real(0.0))",
+            "sign[x] = (1 if band >= real(0.0) else -1) if keep[x] else 0",
+        ),
+        edit(SOURCE, "slope = step if difference > zero", "slope = step if difference >= zero"),
+    ),
+    port(
+        "mask_multiplied",
+        "Mask multiplied, not selected",
+        "0 times NaN; right: excluded values are not read",
+        "masked_l1 masked_ssim laplacian normalised_depth",
+        edit(SOURCE, "abs(seen[i] - wanted[i]) if tissue[i] else zero", "abs(seen[i] - wanted[i]) * tissue[i]"),
+        edit(SSIM, "np.where(mask, observed, observed.dtype.type(0))", "observed * mask"),
+        edit(SSIM, "seen[i] - wanted[i] if tissue[i] else zero", "seen[i] * tissue[i] - wanted[i]"),
+        edit(SSIM, "seen[i] + wanted[i] if tissue[i] else zero", "seen[i] * tissue[i] + wanted[i]"),
+        edit(
+            DETAIL,
+            "target[x] = d if keep[x] else real(0.0)\n\n\ndef _band",
+            "target[x] = d * real(keep[x])\n\n\ndef _band",
+        ),
+        edit(DETAIL, "band = band if keep[x] else real(0.0)", "band = band * real(keep[x])"),
+        edit(DEPTH, "abs(residual) if use[i] else zero", "abs(residual) * use[i]"),
+    ),
+]

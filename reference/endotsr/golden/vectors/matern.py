@@ -5,15 +5,10 @@ a long one (weights like omega^6); they fix the mean 1 of the weights, the facto
 weights along the atoms.
 """
 
-from collections.abc import Callable
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.clock import omegas
+from endotsr.golden.vectors.copies import Edit
 from endotsr.golden.vectors.making import Seeds, Spec, scalar
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, scaled
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("matern",)
 
@@ -21,7 +16,7 @@ OPERATIONS = ("matern",)
 def cases() -> list[Spec]:
     """Three correlation lengths."""
     everything = ("matern_sum_one", "matern_inverted", "matern_without_two_pi", "matern_wrong_power",
-                  "penalty_over_two", "penalty_interleaved")  # fmt: skip
+                  "penalty_over_two", "penalty_gradient_without_two", "penalty_interleaved")  # fmt: skip
     out = []
     for case, length, count, title, flags in (
         ("published", 0.2, 8, "Weights of mean 1, penalty over 6 N F", everything),
@@ -41,51 +36,62 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _weighted(density: Callable[[float, NDArray], NDArray]) -> Wrong:
-    """Answers with weights rho(l, angular frequency) of any normalisation."""
-
-    def wrong(request: Request) -> dict[str, Any]:
-        length, omega = request.settings["correlation_length"], request.inputs["omega"].astype(float)
-        rho = density(length, omega)
-        c, up = request.inputs["motion_coefficients"], float(request.inputs["d_penalty"])
-        both = np.concatenate([rho, rho])[None, :, None]
-        norm = c.size  # 3 * 2F * N
-        return {
-            "rho": rho,
-            "penalty": (both * c**2).sum() / norm,
-            "d_motion_coefficients": up * 2 * both * c / norm,
-        }
-
-    return wrong
+SOURCE = "equations.matern"
 
 
-def _raw(length: float, angular: NDArray, power: float = 3.0) -> NDArray:
-    return (5 + (length * angular) ** 2) ** power
-
-
-def _mean_one(rho: NDArray) -> NDArray:
-    return rho / rho.mean()
-
-
-def _interleaved_penalty(request: Request) -> dict[str, Any]:
-    c, rho, up = request.inputs["motion_coefficients"], request.right["rho"], float(request.inputs["d_penalty"])
-    both = np.repeat(rho, 2)[None, :, None]
-    return {"penalty": (both * c**2).sum() / c.size, "d_motion_coefficients": up * 2 * both * c / c.size}
+def _power(power: str) -> tuple[Edit, ...]:
+    return (
+        edit(SOURCE, "(1.0 + small)) ** 3", f"(1.0 + small)) ** {power}"),
+        edit(SOURCE, "(5.0 + scaled**2)) ** 3", f"(5.0 + scaled**2)) ** {power}"),
+    )
 
 
 WRONG_PORTS = [
-    WrongPort("matern_sum_one", "Matern weights scaled to sum 1", "sum; right: mean 1",
-              {"matern": _weighted(lambda l, w: _mean_one(_raw(l, 2 * np.pi * w)) / w.size)}),
-    WrongPort("matern_inverted", "Spectral density itself as weight", "low frequencies pay; right: high ones",
-              {"matern": _weighted(lambda l, w: _mean_one(_raw(l, 2 * np.pi * w, -3.0)))}),
-    WrongPort("matern_without_two_pi", "Matern weights of w in place of 2 pi w", "5/l^2 + w^2; right: (2 pi w)^2",
-              {"matern": _weighted(lambda l, w: _mean_one(_raw(l, w)))}),
-    WrongPort("matern_wrong_power", "Power of Matern-3/2 or 5/2 in place of 3", "^(5/2); right: ^3",
-              {"matern": _weighted(lambda l, w: _mean_one(_raw(l, 2 * np.pi * w, 2.5)))}),
-    WrongPort("penalty_over_two", "Penalty over 2 N F", "sum over axes; right: 1 / (6 N F)",
-              {"matern": scaled(3.0, "penalty", "d_motion_coefficients")}),
-    WrongPort("penalty_interleaved", "Weights of interleaved atoms in the penalty",
-              "rho repeated pairwise; right: rho for the sines, then for the cosines",
-              {"matern": _interleaved_penalty}),
-]  # fmt: skip
+    port(
+        "matern_sum_one",
+        "Matern weights scaled to sum 1",
+        "sum; right: mean 1",
+        "matern",
+        edit(SOURCE, "(math.fsum(density) / density.size)", "math.fsum(density)"),
+    ),
+    port(
+        "matern_inverted",
+        "Spectral density itself as weight",
+        "low frequencies pay; right: high ones",
+        "matern",
+        *_power("-3"),
+    ),
+    port(
+        "matern_without_two_pi",
+        "Matern weights of w in place of 2 pi w",
+        "5/l^2 + w^2; right: (2 pi w)^2",
+        "matern",
+        edit(SOURCE, "length * (2.0 * np.pi * float(wide.max()))", "length * float(wide.max())"),
+    ),
+    port(
+        "matern_wrong_power", "Power of Matern-3/2 or 5/2 in place of 3", "^(5/2); right: ^3", "matern", *_power("2.5")
+    ),
+    port(
+        "penalty_over_two",
+        "Penalty over 2 N F",
+        "sum over axes; right: 1 / (6 N F)",
+        "matern",
+        edit(SOURCE, "(6.0 * n * count)", "(2.0 * n * count)"),
+        edit(SOURCE, "(3.0 * max(count, 1) * rho.size)", "(1.0 * max(count, 1) * rho.size)"),
+    ),
+    port(
+        "penalty_gradient_without_two",
+        "Gradient of the penalty without its 2",
+        "rho C; right: 2 rho C",
+        "matern",
+        edit(SOURCE, "(3.0 * max(count, 1) * rho.size)", "(6.0 * max(count, 1) * rho.size)"),
+    ),
+    port(
+        "penalty_interleaved",
+        "Weights of interleaved atoms in the penalty",
+        "rho repeated pairwise; right: rho for the sines, then for the cosines",
+        "matern",
+        edit(SOURCE, "sums.reshape(axes, 2, count).sum(axis=(0, 1))", "sums.reshape(axes, count, 2).sum(axis=(0, 2))"),
+        edit(SOURCE, "np.tile(factor, 2)", "np.repeat(factor, 2)"),
+    ),
+]

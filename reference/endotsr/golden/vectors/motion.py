@@ -4,10 +4,8 @@ Coefficients C, raw atoms and a gradient by the translation come in. One case: t
 is that sines and cosines both take part.
 """
 
-from numpy.typing import NDArray
-
 from endotsr.golden.vectors.making import Seeds, Spec
-from endotsr.golden.vectors.wrong import Request, WrongPort
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("motion",)
 
@@ -25,14 +23,22 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _no_cosines(request: Request) -> dict[str, NDArray]:
-    phi = request.inputs["phi"].copy()
-    phi[phi.size // 2 :] = 0
-    return request.run(dict(request.inputs) | {"phi": phi}, request.settings)
-
-
 WRONG_PORTS = [
-    WrongPort("motion_cosines_dropped", "Cosines left out of the motion", "sines only; right: both",
-              {"motion": _no_cosines}),
-]  # fmt: skip
+    port(
+        "motion_cosines_dropped",
+        "Cosines left out of the motion",
+        "sines only; right: both",
+        "motion scene objective training",
+        edit(
+            "equations.motion",
+            "    return combine(motion_coefficients, phi), MotionSaved",
+            "    phi = np.where(np.arange(phi.size) < phi.size // 2, phi, 0 * phi)\n"
+            "    return combine(motion_coefficients, phi), MotionSaved",
+        ),
+        edit(
+            "equations.motion",
+            "from typing import NamedTuple\n",
+            "from typing import NamedTuple\n\nimport numpy as np\n",
+        ),
+    ),
+]

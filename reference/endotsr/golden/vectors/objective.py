@@ -5,18 +5,15 @@ the presets, the other up-sampling rule, a pyramid level without valid pixels, a
 `determinism` requests the same objective twice: the bits must be equal.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.golden.vectors.images import tissue
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.moving import LENS, TIME, model_settings, moving_inputs
 from endotsr.golden.vectors.views import PRESETS
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, swapped, within
-from endotsr.kernels.constants import Y00
+from endotsr.golden.vectors.wrong import edit, port
 from endotsr.stages.requests import raster_dict
 
 OPERATIONS = ("objective", "determinism")
@@ -60,6 +57,7 @@ def _spec(
         "t": TIME,
         "degree": degree,
         "camera": LENS,
+        "preset": preset,
         "raster": raster_dict(PRESETS[preset]),
         "model": model_settings(basis=basis),
         "loss": WEIGHTS | {"upsampling": upsampling},
@@ -86,8 +84,8 @@ def cases() -> list[Spec]:
     terms = ("depth_term_dropped", "laplacian_term_dropped", "penalty_dropped", "ssim_term_dropped",
              "ssim_sign", "smoothness_dropped", "upsampling_swapped", "photometric_of_clamped_render",
              "laplacian_gradient_dropped", "depth_loss_gradient_dropped", "penalty_gradient_dropped",
-             "deformation_of_position_only", "residual_gradient_unscaled", "statistics_over_test_frames_in_training",
-             "pixel_corner_camera")  # fmt: skip
+             "deformation_of_position_only", "residual_gradient_unscaled", "statistics_over_all_frames",
+             "pixel_corner_camera", "l1_not_reduced", "motion_gradient_dropped")  # fmt: skip
     dim = tuple(term for term in terms if term != "photometric_of_clamped_render")
     return [
         _spec("paper", "paper", "Preset paper, every component, moving camera", terms, change=_bright),
@@ -105,82 +103,151 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _without(**changes: float) -> dict[str, Wrong]:
-    """A weight of the loss set to 0, in values and gradients."""
-    return within("loss", ("objective",), **changes)
-
-
-def _ssim_sign(request: Request) -> dict[str, NDArray]:
-    """w SSIM in place of w (1 - SSIM)."""
-    w, ssim = request.settings["loss"]["ssim_weight"], request.right["term_ssim"]
-    return {"objective": request.right["objective"] - w * (1 - ssim) + w * ssim}
-
-
-def _clamped_render(request: Request) -> dict[str, NDArray] | None:
-    """Loss of the render cut to [0, 1]."""
-    colour, mask = request.right["colour_image"], request.inputs["mask"]
-    if colour.max() <= 1:
-        return None
-    w, old = request.settings["loss"]["ssim_weight"], request.right["term_l1"]
-    new = np.abs(np.clip(colour, 0, 1) - request.inputs["observed"])[:, mask].mean()
-    return {"term_l1": new, "objective": request.right["objective"] + (1 - w) * (new - old)}
-
-
-def _gradients_without(**changes: float) -> dict[str, Wrong]:
-    """Right values, but gradients as if a term had no weight."""
-    wrong = _without(**changes)["objective"]
-
-    def limited(request: Request) -> Mapping[str, Any] | None:
-        found = wrong(request)
-        return None if found is None else {name: a for name, a in found.items() if name.startswith("d_")}
-
-    return {"objective": limited}
-
-
-def _position_offsets_only(request: Request) -> dict[str, NDArray]:
-    """Rotation and scale offsets of the deformation receive no gradient."""
-    out = {}
-    for name in ("d_fdm_weight", "d_fdm_centre", "d_fdm_width"):
-        if name in request.right:
-            out[name] = request.right[name].copy()
-            out[name][3:] = 0
-    return out
-
-
-def _unscaled_residual(request: Request) -> dict[str, NDArray]:
-    name = "d_appearance_coefficients"
-    return {name: request.right[name] * Y00} if name in request.right else {}
-
-
-def _other_bits(request: Request) -> dict[str, NDArray]:
-    """The second answer differs in the last bit of float32."""
-    d = request.right["d_position_2"]
-    return {"d_position_2": d * (1 + 1.2e-7)}
+SOURCE, VIEW, SCENE = "fitting.objective", "fitting.view", "stages.scene"
+BOTH = "objective training"
 
 
 WRONG_PORTS = [
-    WrongPort("depth_term_dropped", "Depth term left out", "0; right: weight 1", _without(depth_weight=0.0)),
-    WrongPort("laplacian_term_dropped", "Laplacian term left out", "0; right: lambda_lap", _without(lambda_lap=0.0)),
-    WrongPort("penalty_dropped", "Matern penalty left out", "0; right: lambda_msp", _without(lambda_msp=0.0)),
-    WrongPort("ssim_term_dropped", "L1 alone", "w = 0; right: (1 - w) L1 + w (1 - SSIM)", _without(ssim_weight=0.0)),
-    WrongPort("ssim_sign", "SSIM with the wrong sign", "w SSIM; right: w (1 - SSIM)", {"objective": _ssim_sign}),
-    WrongPort("smoothness_dropped", "Smoothness left out", "0; right: its weight", _without(smoothness_weight=0.0)),
-    WrongPort("photometric_of_clamped_render", "Loss of the clamped render", "clip(render); right: as it is",
-              {"objective": _clamped_render}),
-    WrongPort("laplacian_gradient_dropped", "Laplacian loss without gradient", "value only; right: its adjoint too",
-              _gradients_without(lambda_lap=0.0)),
-    WrongPort("depth_loss_gradient_dropped", "Depth loss without gradient", "value only; right: by the depth image",
-              _gradients_without(depth_weight=0.0)),
-    WrongPort("penalty_gradient_dropped", "Matern penalty without gradient", "value only; right: added to that of C",
-              _gradients_without(lambda_msp=0.0)),
-    WrongPort("deformation_of_position_only", "No gradient to rotation and scale offsets", "0; right: all ten channels",
-              {"objective": _position_offsets_only}),
-    WrongPort("residual_gradient_unscaled", "1 / Y00 missing in the gradient of the residual", "Y00 times too small",
-              {"objective": _unscaled_residual}),
-    WrongPort("statistics_over_test_frames_in_training", "Training statistics over test frames too",
-              "all stamps; right: training stamps", {"objective": swapped(
-                  lambda i: {"train_index": np.arange(i["times"].size)})}),
-    WrongPort("sums_in_any_order", "Sums in an order that changes", "other bits each time; right: the same bits",
-              {"determinism": _other_bits}),
-]  # fmt: skip
+    port(
+        "depth_term_dropped",
+        "Depth term left out",
+        "0; right: weight 1",
+        BOTH,
+        edit(SOURCE, "if weights.depth > 0 and depth is not None:", "if False and depth is not None:"),
+    ),
+    port(
+        "laplacian_term_dropped",
+        "Laplacian term left out",
+        "0; right: lambda_lap",
+        BOTH,
+        edit(SOURCE, "if weights.laplacian > 0 and", "if False and"),
+    ),
+    port(
+        "penalty_dropped",
+        "Matern penalty left out",
+        "0; right: lambda_msp",
+        "objective",
+        edit(VIEW, "config.loss.lambda_msp * penalty", "0 * penalty"),
+        edit(
+            VIEW,
+            "matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)",
+            "matern_penalty_reverse(0.0, penalty_saved)",
+        ),
+    ),
+    port(
+        "ssim_term_dropped",
+        "L1 alone",
+        "w = 0; right: (1 - w) L1 + w (1 - SSIM)",
+        BOTH,
+        edit(SOURCE, "l1, l1_saved = masked_l1", "ssim_weight = 0.0\n    l1, l1_saved = masked_l1"),
+    ),
+    port(
+        "ssim_sign",
+        "SSIM with the wrong sign",
+        "w SSIM; right: w (1 - SSIM)",
+        BOTH,
+        edit(SOURCE, "ssim_weight * (1.0 - ssim)", "ssim_weight * ssim"),
+        edit(SOURCE, "masked_ssim_reverse(-ssim_weight, ssim_saved)", "masked_ssim_reverse(ssim_weight, ssim_saved)"),
+    ),
+    port(
+        "l1_not_reduced",
+        "L1 with weight 1 beside SSIM",
+        "L1 + w (1 - SSIM); right: (1 - w) L1 + w (1 - SSIM)",
+        BOTH,
+        edit(SOURCE, "loss, terms = (1.0 - ssim_weight) * l1", "loss, terms = l1"),
+        edit(SOURCE, "masked_l1_reverse(1.0 - ssim_weight, l1_saved)", "masked_l1_reverse(1.0, l1_saved)"),
+    ),
+    port(
+        "smoothness_dropped",
+        "Smoothness left out",
+        "0; right: its weight",
+        BOTH,
+        edit(SOURCE, "if weights.smoothness > 0:", "if False:"),
+    ),
+    port(
+        "photometric_of_clamped_render",
+        "Loss of the clamped render",
+        "clip(render); right: as it is",
+        "objective",
+        edit(
+            SOURCE,
+            "    l1, l1_saved = masked_l1_forward(colour,",
+            "    inside, colour = (colour >= 0) & (colour <= 1), np.clip(colour, 0, 1)\n"
+            "    l1, l1_saved = masked_l1_forward(colour,",
+        ),
+        edit(
+            SOURCE,
+            "    return ImageLoss(loss, terms, d_colour, np.zeros",
+            "    d_colour = np.where(inside, d_colour, 0)\n    return ImageLoss(loss, terms, d_colour, np.zeros",
+        ),
+    ),
+    port(
+        "laplacian_gradient_dropped",
+        "Laplacian loss without gradient",
+        "value only; right: its adjoint too",
+        BOTH,
+        edit(SOURCE, "Term(value, laplacian_loss_reverse(weight, saved), None)", "Term(value, None, None)"),
+    ),
+    port(
+        "depth_loss_gradient_dropped",
+        "Depth loss without gradient",
+        "value only; right: by the depth image",
+        BOTH,
+        edit(SOURCE, "Term(value, None, normalised_depth_reverse(weight, saved))", "Term(value, None, None)"),
+    ),
+    port(
+        "penalty_gradient_dropped",
+        "Matern penalty without gradient",
+        "value only; right: added to that of C",
+        "objective",
+        edit(
+            VIEW,
+            "matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)",
+            "matern_penalty_reverse(0.0, penalty_saved)",
+        ),
+    ),
+    port(
+        "motion_gradient_dropped",
+        "Motion coefficients without the gradient of the position",
+        "that of the penalty alone; right: and that of the position",
+        "objective",
+        edit(
+            "fitting.model",
+            'by_field["motion_coefficients"] = motion.d_motion_coefficients',
+            'by_field["motion_coefficients"] = 0 * motion.d_motion_coefficients',
+        ),
+    ),
+    port(
+        "deformation_of_position_only",
+        "No gradient to rotation and scale offsets",
+        "0; right: all ten channels",
+        "objective",
+        edit(
+            "fitting.model",
+            "[grads.d_position, grads.d_quaternion, grads.d_log_scale]",
+            "[grads.d_position, 0 * grads.d_quaternion, 0 * grads.d_log_scale]",
+        ),
+    ),
+    port(
+        "residual_gradient_unscaled",
+        "1 / Y00 missing in the gradient of the residual",
+        "Y00 times too small",
+        "objective",
+        edit(
+            "fitting.model",
+            'by_field["appearance_coefficients"] = appearance.d_appearance_coefficients',
+            'by_field["appearance_coefficients"] = 0.28209479177387814 * appearance.d_appearance_coefficients',
+        ),
+    ),
+    port(
+        "sums_in_any_order",
+        "Sums in an order that changes",
+        "other bits each time; right: the same bits",
+        "determinism",
+        edit(
+            SCENE,
+            "(OBJECTIVE.compute(inputs, settings) for _ in range(2))",
+            '(OBJECTIVE.compute(inputs, dict(settings) | {"_compositor": way}) for way in ("definition", "blocks"))',
+        ),
+    ),
+]

@@ -5,11 +5,9 @@ pixel centres is refused here, before its equations are judged.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endotsr.golden.judge.words import GAMMA, MIX_1, MIX_2, fnv1a
 from endotsr.golden.vectors.making import Spec, given, scalar
-from endotsr.golden.vectors.wrong import Request, WrongPort, output
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("reading", "generator")
 
@@ -39,29 +37,49 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _signed_words(request: Request) -> dict[str, NDArray]:
-    """A signed right shift smears the sign bit."""
-    count = request.settings["count"]
-    with np.errstate(over="ignore"):
-        z = np.uint64(fnv1a(request.settings["seed"])) + np.arange(1, count + 1, dtype=np.uint64) * np.uint64(GAMMA)
-        signed = z.astype(np.int64)
-        signed = (signed ^ (signed >> 30)) * np.uint64(MIX_1).astype(np.int64)
-        signed = (signed ^ (signed >> 27)) * np.uint64(MIX_2).astype(np.int64)
-        found = (signed ^ (signed >> 31)).astype(np.uint64)
-    return {"words": found, "unit_numbers": (found >> np.uint64(40)).astype(np.float64) / 2.0**24}
-
+CONTRACT, WORDS = "golden.vectors.contract", "golden.judge.words"
 
 WRONG_PORTS = [
-    WrongPort("fortran_order", "Array read in Fortran order", "first index fastest; right: last index fastest",
-              {"reading": output(flat=lambda a: a.reshape(4, 3, 5).reshape(-1, order="F"))}),
-    WrongPort("gaussian_first", "Gaussian index taken as the first axis", "[n, ...]; right: [..., n]",
-              {"reading": lambda r: {"column": r.inputs["harmonics"].reshape(5, 4, 3)[3]}}),
-    WrongPort("mask_inverted", "Mask read the wrong way round", "True = instrument; right: True = tissue",
-              {"reading": lambda r: {"tissue_pixels": (~r.inputs["mask"]).sum(),
-                                     "tissue_row": np.flatnonzero(r.inputs["mask"][1])}}),
-    WrongPort("pixel_corner", "Pixels sampled at their corner", "column i at i; right: at i + 1/2",
-              {"reading": output(sample_x=lambda a: a - 0.5, sample_y=lambda a: a - 0.5)}),
-    WrongPort("signed_shift", "Generator with signed right shifts", "shifts copy the sign; right: shift in zeros",
-              {"generator": _signed_words}),
-]  # fmt: skip
+    port(
+        "fortran_order",
+        "Array read in Fortran order",
+        "first index fastest; right: last index fastest",
+        "reading",
+        edit(CONTRACT, "array.reshape(-1)", 'array.reshape(-1, order="F")'),
+    ),
+    port(
+        "gaussian_first",
+        "Gaussian index taken as the first axis",
+        "[n, ...]; right: [..., n]",
+        "reading",
+        edit(
+            CONTRACT,
+            'array[..., settings["gaussian"]]',
+            'array.reshape(array.shape[-1], *array.shape[:-1])[settings["gaussian"]]',
+        ),
+    ),
+    port(
+        "mask_inverted",
+        "Mask read the wrong way round",
+        "True = instrument; right: True = tissue",
+        "reading",
+        edit(CONTRACT, 'inputs["harmonics"], inputs["mask"]', 'inputs["harmonics"], ~inputs["mask"]'),
+    ),
+    port(
+        "pixel_corner",
+        "Pixels sampled at their corner",
+        "column i at i; right: at i + 1/2",
+        "reading",
+        edit(CONTRACT, ") + 0.5).astype", ")).astype", 2),
+    ),
+    port(
+        "signed_shift",
+        "Generator with signed right shifts",
+        "shifts copy the sign; right: shift in zeros",
+        "generator",
+        *(
+            edit(WORDS, f"z ^ (z >> np.uint64({bits}))", f"z ^ (z.view(np.int64) >> {bits}).view(np.uint64)")
+            for bits in (30, 27, 31)
+        ),
+    ),
+]

@@ -12,8 +12,7 @@ from endotsr.golden.judge.format import Precision, Request, Requests, read_struc
 from endotsr.golden.judge.npy import Refused, read_plain, write_npy
 from endotsr.golden.judge.store import Golden, in_precision
 from endotsr.golden.vectors.registry import all_operations
-from endotsr.golden.vectors.wrong import Request as WrongRequest
-from endotsr.golden.vectors.wrong import WrongPort, answer
+from endotsr.golden.vectors.wrong import Question, WrongPort, answers
 from endotsr.splatting.render import Compositor
 from endotsr.stages.stage import Inputs, Outputs, Stage
 
@@ -54,25 +53,24 @@ def answer_all(golden: Golden, outputs: Path, precision: Precision) -> int:
 
 
 def answer_wrongly(golden: Golden, outputs: Path, wrong_port: WrongPort, *, spoiled_only: bool = False) -> int:
-    """Write the outputs of a wrong port in float64; returns the number of spoiled cases. All others are as expected.
+    """Write the outputs of a wrong port in float64; returns the number of cases on which its mistake is examined.
 
-    spoiled_only   write only the cases that the mistake changes
+    All other cases are as expected; with `spoiled_only` they are not written.
     """
-    operations, spoiled = all_operations(), 0
+    questions = [
+        Question(case.name, case.operation, golden.inputs(case), case.settings, case.flags) for case in golden.cases
+    ]
+    made = answers(wrong_port, questions)
     for case in golden.cases:
-        operation, inputs = operations[case.operation], golden.inputs(case)
-        right: Outputs = {name: golden.array(case, o.file) for name, o in case.outputs.items()}
-
-        def run(arrays, settings, operation=operation) -> Outputs:
-            return reference(operation, arrays, dict(settings), "float64", "definition")
-
-        wrong = answer(wrong_port, case.operation, WrongRequest(inputs, case.settings, run, right))
-        spoiled += wrong is not None
-        if wrong is None and spoiled_only:
+        if case.name in made:
+            found = {name: stored(array) for name, array in made[case.name].double.items() if name in case.outputs}
+        elif spoiled_only:
             continue
-        for name, value in (wrong or right).items():
+        else:
+            found = {name: golden.array(case, output.file) for name, output in case.outputs.items()}
+        for name, value in found.items():
             write_npy(outputs / case.name / f"{name}.npy", value)
-    return spoiled
+    return len(made)
 
 
 def _answer(operation: str, inputs: dict, settings: dict[str, Any], precision: str) -> Outputs:

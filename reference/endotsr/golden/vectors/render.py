@@ -8,17 +8,11 @@ image, no Gaussian at all, and which Gaussians count as visible.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
-from endotsr.golden.vectors.wrong import Request, Wrong, WrongPort, within
-from endotsr.golden.vectors.wrong_raster import Screen, composited, opacity_of, sum_of_squares
-from endotsr.splatting.covariance import covariance_forward
-from endotsr.splatting.harmonics import harmonics_forward
-from endotsr.splatting.projection import projection_forward
+from endotsr.golden.vectors.wrong import edit, port
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
-from endotsr.stages.requests import camera_of, raster_of
 
 OPERATIONS = ("render",)
 
@@ -35,7 +29,9 @@ def _presets() -> list[Spec]:
     rows: list[tuple[str, RasterSettings, int, bool, str, tuple[str, ...]]] = [
         ("exact", EXACT, 3, False, "The definition: every Gaussian at every pixel", (*moving, "cutoff_added")),
         ("paper", PAPER, 3, False, "The shared semantics, moving camera",
-         (*moving, "cutoff_missing", "depth_gradient_dropped", "screen_gradient_in_ndc")),
+         (*moving, "cutoff_missing", "depth_gradient_dropped", "screen_gradient_in_ndc",
+          "optical_centre_is_translation",
+          "view_direction_not_to_position", "view_direction_not_to_pose")),
         ("legacy", LEGACY, 3, False, "The released code's support and gradients", (*moving, "deviations_off")),
         *((f"paper_degree_{d}", PAPER, d, True, f"Degree {d}, static camera at the origin", shared) for d in range(3)),
     ]  # fmt: skip
@@ -100,10 +96,10 @@ def _long_needles() -> Spec:
         "opacity_logit": given([2.0, 1.0, 0.5], "2, 1, 1/2"),
     }  # fmt: skip
     flags = ("determinant_cancels", "distance_cancels")
-    shape = ("d_position", "d_quaternion", "d_log_scale", "d_mean2d", "d_rotation_matrix", "d_translation")
+    still = ("position", "quaternion", "log_scale", "rotation_matrix", "translation")
     return Spec("render", "long_needle", "render", "Needles of 3000 px keep their digits in float32", flags,
-                lens_settings(PAPER, degree=0), inputs,
-                without=("visible", *shape))  # fmt: skip
+                lens_settings(PAPER, degree=0), inputs, still,
+                without=("visible", "d_position", "d_mean2d", "d_rotation_matrix", "d_translation"))  # fmt: skip
 
 
 def _out_of_view() -> Spec:
@@ -142,58 +138,91 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-
-def _inverse_matrix(screen: Screen, n: int, dx: NDArray, dy: NDArray) -> NDArray:
-    """The same distance as a quadratic form, whose terms cancel."""
-    (a, b, c), det = screen.covariance2d[:, n], screen.determinant[n]
-    return (c * dx * dx - 2 * b * dx * dy + a * dy * dy) / det
-
-
-def _single_precision(textbook_determinant: bool) -> Wrong:
-    """Composites in float32 and loses digits; its inputs are rounded, so that all machines lose the same digits."""
-
-    def wrong(request: Request) -> dict[str, NDArray] | None:
-        raster, i = raster_of(request.settings), request.inputs
-        if raster.support != "ellipse" or not i["position"].size:
-            return None
-        camera, degree = camera_of(i, request.settings), request.settings["degree"]
-        shape = covariance_forward(i["quaternion"], i["log_scale"])[0]
-        projected = projection_forward(i["position"], shape, camera, raster)[0]
-        centre = -(i["rotation_matrix"].T @ i["translation"])
-        colour = harmonics_forward(i["harmonics"], i["residual"], i["position"], centre, degree)[0]
-        rounded = (projected.mean2d, projected.covariance2d, projected.determinant, projected.depth,
-                   opacity_of(i["opacity_logit"]), colour)  # fmt: skip
-        arrays = [array[..., projected.visible].astype(np.float32) for array in rounded]
-        if textbook_determinant:
-            a, b, c = arrays[1]
-            arrays[2] = a * c - b * b
-        mean, cover, det, depth, opacity, colour = arrays
-        background = i["background"].astype(np.float32)
-        screen = Screen(mean, cover, det, depth, opacity, colour, background, camera.width, camera.height)
-        return composited(screen, raster, sum_of_squares if textbook_determinant else _inverse_matrix)
-
-    return wrong
-
-
-def _in_front(request: Request) -> dict[str, NDArray] | None:
-    if "visible" not in request.right:
-        return None
-    i = request.inputs
-    z = (i["rotation_matrix"] @ i["position"] + i["translation"][:, None])[2]
-    return {"visible": z > request.settings["raster"]["near"]}
-
+SOURCE, STAGE, FORMULAS = "splatting.render", "stages.compositing", "splatting.projection_formulas"
+DETERMINANT = "low_pass * low_pass + low_pass * spread + areas"
+CENTRE = "scene.harmonics, scene.residual, scene.position, camera_centre(camera), degree"
 
 WRONG_PORTS = [
-    WrongPort("pixel_corner_camera", "Render half a pixel off", "at i; right: at i + 1/2",
-              within("camera", ("render", "objective"), cx=lambda v: v + 0.5, cy=lambda v: v + 0.5)),
-    WrongPort("screen_gradient_in_ndc", "Screen gradient per NDC unit", "times half the image size; right: per px",
-              {"render": lambda r: {"d_mean2d": r.right["d_mean2d"] * np.array(
-                  [[r.settings["camera"]["width"] / 2], [r.settings["camera"]["height"] / 2]])}
-               if "d_mean2d" in r.right else None}),
-    WrongPort("determinant_cancels", "Determinant as a c - b^2", "in float32; right: sum of non-negative terms",
-              {"render": _single_precision(textbook_determinant=True)}),
-    WrongPort("distance_cancels", "Distance by the inverse matrix", "in float32; right: a sum of two squares",
-              {"render": _single_precision(textbook_determinant=False)}),
-    WrongPort("visible_if_in_front", "All in front of the camera counted as visible", "z > near; right: with its box",
-              {"render": _in_front}),
-]  # fmt: skip
+    port(
+        "pixel_corner_camera",
+        "Render half a pixel off",
+        "at i; right: at i + 1/2",
+        "projection render objective",
+        edit(
+            "stages.requests",
+            '**settings["camera"])',
+            '**settings["camera"] | {name: settings["camera"][name] + 0.5 for name in ("cx", "cy")})',
+        ),
+    ),
+    port(
+        "screen_gradient_in_ndc",
+        "Screen gradient per NDC unit",
+        "times half the image size; right: per px",
+        "render",
+        edit(
+            STAGE,
+            "    dtype, (d_rotation",
+            '    found["d_mean2d"] = found["d_mean2d"] * np.array(\n'
+            "        [[saved.camera.width / 2], [saved.camera.height / 2]])\n    dtype, (d_rotation",
+        ),
+    ),
+    port(
+        "optical_centre_is_translation",
+        "Translation of the pose taken for the optical centre",
+        "d; right: -W^T d",
+        "render objective",
+        edit(SOURCE, CENTRE, CENTRE.replace("camera_centre(camera)", "np.asarray(camera.translation)")),
+        edit(
+            SOURCE,
+            "projection.d_rotation - np.outer(translation, d_centre), projection.d_translation - rotation @ d_centre",
+            "projection.d_rotation, projection.d_translation + d_centre",
+        ),
+    ),
+    port(
+        "view_direction_not_to_position",
+        "Gradient of the view direction not added to the position",
+        "to the pose alone; right: to the position too",
+        "render objective",
+        edit(SOURCE, "projection.d_position + harmonics.d_position", "projection.d_position"),
+    ),
+    port(
+        "view_direction_not_to_pose",
+        "Gradient of the view direction not added to the pose",
+        "to the position alone; right: to the pose too",
+        "render",
+        edit(
+            SOURCE,
+            "projection.d_rotation - np.outer(translation, d_centre), projection.d_translation - rotation @ d_centre",
+            "projection.d_rotation, projection.d_translation",
+        ),
+    ),
+    port(
+        "determinant_cancels",
+        "Determinant as a c - b^2",
+        "loses digits; right: sum of non-negative terms",
+        "render",
+        edit(FORMULAS, DETERMINANT, "a * c - b * b"),
+        rounding=True,
+    ),
+    port(
+        "distance_cancels",
+        "Distance by the inverse matrix",
+        "loses digits; right: a sum of two squares",
+        "render",
+        edit(
+            "splatting.compositing",
+            "q = record[INVERSE_C] * dy * dy + record[PRECISION] * e * e",
+            "dx, off = x - record[U], -record[PRECISION] * record[SLOPE]\n"
+            "    q = (record[INVERSE_C] - off * record[SLOPE]) * dy * dy + (off + off) * dx * dy + "
+            "record[PRECISION] * dx * dx",
+        ),
+        rounding=True,
+    ),
+    port(
+        "visible_if_in_front",
+        "All in front of the camera counted as visible",
+        "z > near; right: with its box",
+        "render training",
+        edit(SOURCE, "projected, order, visible, saved)", "projected, order, projected.visible, saved)"),
+    ),
+]

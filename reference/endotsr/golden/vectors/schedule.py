@@ -9,7 +9,7 @@ import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
 from endotsr.golden.vectors.making import Spec, given
-from endotsr.golden.vectors.wrong import WrongPort, within
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("schedule",)
 MILESTONES = (1, 499, 500, 501, 600, 999, 1000, 1001, 1499, 1500, 1750, 2499, 2500, 2999, 3000, 3001, 3500, 3900, 3999,
@@ -34,36 +34,137 @@ def _spec(case: str, config: Config, iterations: tuple[int, ...], title: str, fl
 def cases() -> list[Spec]:
     """The published schedule and a short one."""
     flags = ("residuals_activated_late", "rates_not_decaying", "laplacian_weight_not_ramped",
-             "residual_rates_not_restarted", "degree_from_one", "densify_from_start")  # fmt: skip
+             "residual_rates_not_restarted", "degree_from_one", "degree_late",
+             "rates_one_step_late", "laplacian_ramp_late",
+             "statistics_from_start")  # fmt: skip
     return [
         _spec("paper", Config(), MILESTONES, "Milestones of preset paper, with the iterations before and after", flags),
         _spec("shared_decay", _short_run(), tuple(range(1, 21)),
               "A short run: no restart of the residual rates, a slower position",
-              ("residual_rates_restarted", "position_weights_same_rate")),
+              ("residual_rates_restarted", "position_weights_same_rate",
+               "densify_from_start", "densify_until_the_end")),
     ]  # fmt: skip
 
 
-# ---- mistakes; those of the training loop show in `training` too ----
+# ---- mistakes ----
+
+SOURCE = "fitting.schedules"
+BOTH = "schedule training"
 
 WRONG_PORTS = [
-    WrongPort("residual_rates_not_restarted", "Residual rates decay from the first iteration",
-              "i / T; right: (i - K_s) / (T - K_s)",
-              within("config", ("schedule",), optimiser__restart_residual_schedule=False)),
-    WrongPort("residual_rates_restarted", "Residual rates restarted where the configuration says no",
-              "(i - K_s) / (T - K_s); right: i / T",
-              within("config", ("schedule",), optimiser__restart_residual_schedule=True)),
-    WrongPort("degree_from_one", "Harmonic degree raised one interval early", "1 + floor(i / interval); right: floor",
-              {"schedule": lambda r: {"degree": np.minimum(
-                  r.right["degree"] + 1, r.settings["config"]["model"]["harmonics_degree"])}}),
-    WrongPort("densify_from_start", "Density control at its first iteration too", "i >= start; right: i > start",
-              within("config", ("schedule",), density__start=lambda v: v - 1)),
-    WrongPort("position_weights_same_rate", "One rate for all weights of the deformation",
-              "factor of the position channels ignored; right: applied",
-              within("config", ("schedule",), optimiser__deformation_position_factor=1.0)),
-    WrongPort("residuals_activated_late", "Residuals start one iteration late", "K_s + 2; right: K_s + 1",
-              within("config", ("training", "schedule"), training__residual_activation=lambda k: k + 1)),
-    WrongPort("rates_not_decaying", "Learning rates do not decay", "constant; right: exponential to 1/100",
-              within("config", ("training", "schedule"), optimiser__final_factor=1.0)),
-    WrongPort("laplacian_weight_not_ramped", "Detail weight full from the start", "1; right: 0, then linear",
-              within("config", ("training", "schedule"), loss__laplacian_from=0, loss__laplacian_full=0)),
-]  # fmt: skip
+    port(
+        "residual_rates_not_restarted",
+        "Residual rates decay from the first iteration",
+        "i / T; right: (i - K_s) / (T - K_s)",
+        BOTH,
+        edit(
+            SOURCE,
+            "residual_activation if config.optimiser.restart_residual_schedule else 0",
+            "residual_activation * 0",
+        ),
+    ),
+    port(
+        "residual_rates_restarted",
+        "Residual rates restarted where the configuration says no",
+        "(i - K_s) / (T - K_s); right: i / T",
+        BOTH,
+        edit(SOURCE, "residual_activation if config.optimiser.restart_residual_schedule else 0", "residual_activation"),
+    ),
+    port(
+        "degree_from_one",
+        "Harmonic degree raised one interval early",
+        "1 + floor(i / interval); right: floor",
+        BOTH,
+        edit(
+            SOURCE,
+            "iteration // config.training.harmonics_interval",
+            "1 + iteration // config.training.harmonics_interval",
+        ),
+    ),
+    port(
+        "degree_late",
+        "Harmonic degree raised one iteration late",
+        "floor((i - 1) / interval); right: floor(i / interval)",
+        BOTH,
+        edit(
+            SOURCE,
+            "iteration // config.training.harmonics_interval",
+            "(iteration - 1) // config.training.harmonics_interval",
+        ),
+    ),
+    port(
+        "densify_from_start",
+        "Density control at its first iteration too",
+        "i >= start; right: i > start",
+        BOTH,
+        edit(SOURCE, "density.start < iteration < density.until", "density.start <= iteration < density.until"),
+    ),
+    port(
+        "densify_until_the_end",
+        "Density control at its last iteration too",
+        "i <= until; right: i < until",
+        BOTH,
+        edit(SOURCE, "density.start < iteration < density.until", "density.start < iteration <= density.until"),
+    ),
+    port(
+        "position_weights_same_rate",
+        "One rate for all weights of the deformation",
+        "factor of the position channels ignored; right: applied",
+        BOTH,
+        edit(SOURCE, "deformation * o.deformation_position_factor", "deformation"),
+    ),
+    port(
+        "residuals_activated_late",
+        "Residuals start one iteration late",
+        "K_s + 2; right: K_s + 1",
+        BOTH,
+        edit(
+            SOURCE,
+            "has_any and iteration > config.training.residual_activation",
+            "has_any and iteration > config.training.residual_activation + 1",
+        ),
+    ),
+    port(
+        "rates_not_decaying",
+        "Learning rates do not decay",
+        "constant; right: exponential to 1/100",
+        BOTH,
+        edit(SOURCE, "return initial * (final / initial) ** fraction", "return initial"),
+    ),
+    port(
+        "rates_one_step_late",
+        "Learning rates of the iteration before",
+        "(i - 1) / T; right: i / T",
+        BOTH,
+        edit(SOURCE, "min(max(step / steps, 0.0), 1.0)", "min(max((step - 1) / steps, 0.0), 1.0)"),
+    ),
+    port(
+        "laplacian_weight_not_ramped",
+        "Detail weight full from the start",
+        "1; right: 0, then linear",
+        BOTH,
+        edit(
+            SOURCE,
+            "    if not config.model.laplacian or iteration",
+            "    if config.model.laplacian:\n        return 1.0\n    if not config.model.laplacian or iteration",
+        ),
+    ),
+    port(
+        "laplacian_ramp_late",
+        "Ramp of the detail weight one iteration late",
+        "i - 1; right: i",
+        BOTH,
+        edit(SOURCE, "(iteration - config.loss.laplacian_from) /", "(iteration - 1 - config.loss.laplacian_from) /"),
+    ),
+    port(
+        "statistics_from_start",
+        "Screen gradients gathered from the start of density control only",
+        "start < i < until; right: i < until",
+        BOTH,
+        edit(
+            SOURCE,
+            "return iteration < config.density.until",
+            "return config.density.start < iteration < config.density.until",
+        ),
+    ),
+]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from endotsr.golden.vectors.making import Made, Seeds, given, permutation
+from endotsr.golden.vectors.views import preset_of
 from endotsr.splatting.settings import RasterSettings
 from endotsr.stages.requests import raster_dict
 
@@ -11,7 +12,7 @@ WIDTH, HEIGHT = 18, 13
 
 def raster_settings(raster: RasterSettings) -> dict:
     """Rasteriser and image size as settings of a case of `composite`."""
-    return {"raster": raster_dict(raster), "width": WIDTH, "height": HEIGHT}
+    return {"preset": preset_of(raster), "raster": raster_dict(raster), "width": WIDTH, "height": HEIGHT}
 
 
 def screen_inputs(seeds: Seeds, count: int, low: float, high: float) -> dict[str, Made]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from endotsr.golden.vectors.images import HEIGHT, WIDTH, nothing, tool_mask
 from endotsr.golden.vectors.making import Seeds, Spec, given, scalar
-from endotsr.golden.vectors.wrong import WrongPort, only, swapped
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("smoothness",)
 
@@ -19,7 +19,8 @@ def cases() -> list[Spec]:
     edges[1:8, 4] = True
     rows = [
         ("generic", tool_mask(), "Squared steps of smooth tissue, total variation outside",
-         ("edges_ignored", "variation_of_tissue", "smoothness_on_all_pixels")),
+         ("edges_ignored", "variation_of_tissue", "smoothness_on_all_pixels",
+          "squared_steps_over_all_pixels", "squared_steps_without_two")),
         ("all_tissue", given(np.ones((HEIGHT, WIDTH), bool), "all True"), "All tissue: no total variation",
          ("variation_of_tissue", "edges_ignored")),
         ("no_tissue", nothing(), "No tissue: total variation alone", ("variation_of_tissue",)),
@@ -40,11 +41,43 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
+SOURCE = "losses.smoothness"
+SMOOTH = 'smooth = mask & ~check_plane("edges", edges, mask.shape)'
+
 WRONG_PORTS = [
-    WrongPort("edges_ignored", "Smoothing across edges", "all neighbours; right: not across an edge",
-              {"smoothness": swapped(lambda i: {"edges": np.zeros_like(i["edges"])})}),
-    WrongPort("variation_of_tissue", "Total variation of the tissue", "inside; right: of the excluded region",
-              {"smoothness": only(swapped(lambda i: {"mask": ~i["mask"]}), "d_rendered")}),
-    WrongPort("smoothness_on_all_pixels", "Squared steps on all pixels", "mask ignored; right: tissue only",
-              {"smoothness": only(swapped(lambda i: {"mask": np.ones_like(i["mask"])}), "d_rendered_depth")}),
-]  # fmt: skip
+    port(
+        "edges_ignored",
+        "Smoothing across edges",
+        "all neighbours; right: not across an edge",
+        "smoothness",
+        edit(SOURCE, SMOOTH, "smooth = mask.copy()"),
+    ),
+    port(
+        "variation_of_tissue",
+        "Total variation of the tissue",
+        "inside; right: of the excluded region",
+        "smoothness",
+        edit(SOURCE, "mask = np.ascontiguousarray(mask)", "mask = np.ascontiguousarray(~mask)"),
+    ),
+    port(
+        "smoothness_on_all_pixels",
+        "Squared steps on all pixels",
+        "mask ignored; right: tissue only",
+        "smoothness",
+        edit(SOURCE, SMOOTH, 'smooth = ~check_plane("edges", edges, mask.shape)'),
+    ),
+    port(
+        "squared_steps_over_all_pixels",
+        "Squared steps averaged over all pixels",
+        "over H W; right: smooth pixels",
+        "smoothness",
+        edit(SOURCE, "(np.count_nonzero(smooth) + FEW_PIXELS)", "smooth.size"),
+    ),
+    port(
+        "squared_steps_without_two",
+        "Gradient of a squared step without its 2",
+        "step; right: 2 step",
+        "smoothness",
+        edit(SOURCE, "type(2 * float(d_loss)", "type(float(d_loss)"),
+    ),
+]

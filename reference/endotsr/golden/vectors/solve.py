@@ -1,16 +1,17 @@
 """From a case without answers to its expected outputs, tolerances and mistakes."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from numpy.typing import NDArray
 
 from endotsr.golden.judge.compare import distances, fingerprint, largest, misses
-from endotsr.golden.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Truth
+from endotsr.golden.judge.format import FLIP_BUDGET, Array, Because, Case, Mistake, Output, Rule, Shown, Truth
 from endotsr.golden.judge.words import signs
 from endotsr.golden.vectors.making import Spec
 from endotsr.golden.vectors.reference import reference, stored
-from endotsr.golden.vectors.wrong import Request, WrongPort, answer
+from endotsr.golden.vectors.wrong import Wrong
 from endotsr.splatting.render import Compositor
 from endotsr.stages.stage import Asked, Inputs, Outputs, Stage
 
@@ -41,9 +42,18 @@ def kind_of(array: NDArray) -> str:
     return {"f": "real", "b": "boolean"}.get(array.dtype.kind, "integer")
 
 
-def solve(spec: Spec, operation: Stage, wrong_ports: dict[str, WrongPort]) -> Solved:
-    """Raises ValueError if a flag of the case names a mistake that the case does not show."""
-    inputs = {name: stored(made.array) for name, made in spec.inputs.items()}
+def stored_inputs(spec: Spec) -> dict[str, NDArray]:
+    """The inputs of a case as they are stored."""
+    return {name: stored(made.array) for name, made in spec.inputs.items()}
+
+
+def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> Solved:
+    """A case with its answers.
+
+    wrong    what wrong ports answer to it, by flag; None leaves the mistakes out
+    Raises:  ValueError if a flag of the case names a mistake that the case does not show.
+    """
+    inputs = stored_inputs(spec)
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
     asked = {n: a for n, a in operation.asked.items() if n in runs[0] and n not in spec.without}
     answers = tuple({name: stored(found[name]) for name in asked} for found in runs)
@@ -52,14 +62,16 @@ def solve(spec: Spec, operation: Stage, wrong_ports: dict[str, WrongPort]) -> So
     rules = {name: _rule(name, asked[name], spreads[name], len(answers)) for name in asked}
     if spec.flip_budget:
         rules |= _flip_budgets(spec, operation, inputs, expected, rules)
-    mistakes = _mistakes(spec, operation, inputs, answers, rules, asked, wrong_ports)
+    mistakes = {} if wrong is None else _mistakes(spec, answers, rules, asked, wrong)
     outputs = {}
     for name, value in expected.items():
-        caught = [m.distance for m in mistakes.values() if m.output == name and m.distance is not None]
+        caught = [m.shows[name].distance for m in mistakes.values() if name in m.shows]
+        caught = [size for size in caught if size is not None and size >= MARGIN * rules[name].float32]
         exact = rules[name].kind == "exact"
         outputs[name] = Output(
             file=f"expected/{name}.npy", level=asked[name].level, unit=asked[name].unit, dtype=kind_of(value),  # type: ignore[arg-type]
             shape=value.shape, compare=rules[name], truth=_truth(asked[name], name in spec.own),
+            order=asked[name].order,  # type: ignore[arg-type]
             because=None if exact else Because(spread_float64=_two(spreads[name][0]), spread_float32=_two(
                 spreads[name][1]), smallest_mutant=_two(min(caught)) if caught else None),
         )  # fmt: skip
@@ -169,47 +181,87 @@ def _flip_budgets(spec: Spec, operation: Stage, inputs: Inputs, expected: Output
 
 
 def _mistakes(
-    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], rules: dict[str, Rule],
-    asked: dict[str, Asked], wrong_ports: dict[str, WrongPort],
+    spec: Spec, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Asked],
+    wrong: Mapping[str, Wrong],
 ) -> dict[str, Mistake]:  # fmt: skip
     """The visible effect of every wrong port on this case."""
-
-    def run(arrays: Inputs, settings) -> Outputs:
-        return reference(operation, arrays, dict(settings), "float64", "definition")
-
     found: dict[str, Mistake] = {}
-    for wrong_port in wrong_ports.values():
-        wrong = answer(wrong_port, operation.name, Request(inputs, spec.settings, run, answers[0]))
-        if wrong is None:
-            continue
-        tries = [(one, {n: _size(wrong[n], one[n], rules[n]) for n in one}) for one in answers]
-        expected, sizes = min(tries, key=lambda t: misses((asked[n].level, size <= 1) for n, size in t[1].items()))
-        shown = [name for name in expected if sizes[name] >= MARGIN]
-        if shown:
-            made = {name: _mistake(name, wrong[name], expected[name], rules[name]) for name in shown}
-            best = max(shown, key=lambda name: (made[name].distance is not None, sizes[name]))
-            found[wrong_port.flag] = made[best]
-    missing = [flag for flag in spec.flags if flag not in found]
+    for flag, made in wrong.items():
+        shows = _shown(made.double, answers, rules, asked, "float64")
+        if made.single is not None:
+            single = _shown(made.single, answers, rules, asked, "float32")
+            found[flag] = Mistake(shows=shows, rounding=True, shows_float32=single)
+        else:
+            found[flag] = Mistake(shows=shows)
+    missing = [flag for flag in spec.flags if flag not in found or not _detected(found[flag], rules)]
     if missing:
         raise ValueError(f"{spec.name}: does not show {', '.join(missing)}")
-    return found
+    return _without_shared_integers(found, rules)
 
 
-def _size(wrong: NDArray, right: NDArray, rule: Rule) -> float:
-    """How many float32 tolerances a wrong output is away; a flip budget counts its flips too."""
-    if rule.kind == "exact":
-        return math.inf if wrong.shape != right.shape or (wrong != right).any() else 0.0
+def _detected(mistake: Mistake, rules: dict[str, Rule]) -> bool:
+    """Whether a mistake is far beyond the float32 tolerance of some output."""
+    return any(
+        one.distance is None
+        or rules[name].kind in ("exact", "identical")
+        or one.distance >= MARGIN * rules[name].float32
+        for name, one in mistake.shown("float32").items()
+    )
+
+
+def _shown(
+    made: Outputs, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Asked], precision: str
+) -> dict[str, Shown]:
+    """Every output that a wrong answer changes by more than half its tolerance, from the nearest legal answer."""
+    tries = []
+    for right in answers:
+        sizes = {name: _size(stored(made[name]), right[name], rules[name], precision) for name in right if name in made}
+        tries.append((misses((asked[name].level, size <= 0.5) for name, size in sizes.items()), right, sizes))
+    _, right, sizes = min(tries, key=lambda one: one[0])
+    return {
+        name: _one(name, stored(made[name]), right[name], rules[name]) for name, size in sizes.items() if size > 0.5
+    }
+
+
+def _one(name: str, wrong: NDArray, right: NDArray, rule: Rule) -> Shown:
+    if wrong.shape != right.shape:
+        return Shown(None, None)
     if rule.kind == "identical":
-        return math.inf if (wrong != right).any() else 0.0
-    if rule.kind == FLIP_BUDGET:
-        off = distances(wrong, right, rule.scale)
-        many = int((off > rule.float32).sum())
-        return float(off.max() / rule.float32) if many > 10 * rule.flips or off.max() > 10 * rule.flip_size else 0.0
-    return largest(wrong, right, rule.scale) / rule.float32
-
-
-def _mistake(name: str, wrong: NDArray, right: NDArray, rule: Rule) -> Mistake:
+        return Shown(_two(largest(wrong, right, "max")), None)
     distance = largest(wrong, right, rule.scale or "max")
-    if not math.isfinite(distance):
-        return Mistake(output=name, distance=None, fingerprint=None)
-    return Mistake(output=name, distance=_two(distance), fingerprint=float(f"{fingerprint(name, wrong):.9g}"))
+    number = float(f"{fingerprint(name, wrong):.15g}")
+    return Shown(_two(distance) if math.isfinite(distance) else None, number)
+
+
+def _without_shared_integers(found: dict[str, Mistake], rules: dict[str, Rule]) -> dict[str, Mistake]:
+    """No fingerprint of an integer or boolean output that two mistakes give alike."""
+    seen: dict[tuple[str, float | None], int] = {}
+    for mistake in found.values():
+        for name, one in mistake.shows.items():
+            seen[name, one.fingerprint] = seen.get((name, one.fingerprint), 0) + 1
+
+    def kept(name: str, one: Shown) -> Shown:
+        shared = rules[name].kind == "exact" and seen[name, one.fingerprint] > 1 and one.distance is not None
+        return Shown(one.distance, None) if shared else one
+
+    return {
+        flag: Mistake(
+            shows={name: kept(name, one) for name, one in mistake.shows.items()},
+            rounding=mistake.rounding, shows_float32=mistake.shows_float32,
+        )
+        for flag, mistake in found.items()
+    }  # fmt: skip
+
+
+def _size(wrong: NDArray, right: NDArray, rule: Rule, precision: str) -> float:
+    """How many tolerances a wrong output is away; a flip budget counts its flips too."""
+    tolerance = rule.float64 if precision == "float64" else rule.float32
+    if wrong.shape != right.shape:
+        return math.inf
+    if rule.kind in ("exact", "identical"):
+        return math.inf if (wrong != right).any() else 0.0
+    off = largest(wrong, right, rule.scale)
+    if rule.kind == FLIP_BUDGET:
+        many = int((distances(wrong, right, rule.scale) > tolerance).sum())
+        return off / tolerance if many > 10 * rule.flips or off > 10 * rule.flip_size else 0.0
+    return off / tolerance

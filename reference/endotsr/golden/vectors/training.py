@@ -22,10 +22,10 @@ from endotsr.golden.vectors.images import tissue
 from endotsr.golden.vectors.making import Made, Seeds, Spec, changed, given
 from endotsr.golden.vectors.moving import BASES, FRAMES, FREQUENCIES, LENS
 from endotsr.golden.vectors.views import pose, scene_inputs
-from endotsr.golden.vectors.wrong import WrongPort, within
+from endotsr.golden.vectors.wrong import edit, port
 
 OPERATIONS = ("training",)
-COUNT, ITERATIONS = 16, 20
+COUNT, ITERATIONS, SHORT = 16, 20, 12
 
 
 def _settings() -> Config:
@@ -78,30 +78,145 @@ def _clip(seeds: Seeds) -> dict[str, Made]:
     }  # fmt: skip
 
 
-def cases() -> list[Spec]:
-    """The trajectory."""
-    seeds = Seeds("training", "twenty_iterations")
-    order = seeds.uniform("frame_order", 0.0, 10.0, ITERATIONS).array
-    inputs = _first_gaussians(seeds) | _clip(seeds) | {
+def _inputs(seeds: Seeds, iterations: int) -> dict[str, Made]:
+    order = seeds.uniform("frame_order", 0.0, 10.0, iterations).array
+    return _first_gaussians(seeds) | _clip(seeds) | {
         "frame_order": given(np.floor(order).astype(np.int64), f"floor of uniform(0.0, 10.0) seed "
                              f"{seeds.seed('frame_order')}; positions within train_index", "frame"),
         "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, 32),
     }  # fmt: skip
+
+
+def _out_of_view() -> Spec:
+    """Every second frame is seen from one side or the other, where some of the Gaussians are out of view.
+
+    Without residuals: where a Gaussian has no gradient but rounding, Adam moves a coefficient by a whole rate.
+    """
+    seeds, config = Seeds("training", "out_of_view"), _settings()
+    inputs = _inputs(seeds, SHORT)
+    k = np.arange(FRAMES)
+    sideways = 4.0 * (k % 2) * (1 - 2 * (k // 2 % 2))
+    recipe = "(4, 0, k / 64) for k % 4 = 1, (-4, 0, k / 64) for k % 4 = 3, else (0, 0, k / 64)"
+    inputs["translations"] = given(np.stack([sideways, 0 * k, 0.015625 * k], axis=1), recipe, "scene unit")
+    config = msgspec.structs.replace(
+        config,
+        density=msgspec.structs.replace(config.density, start=3, interval=4, until=10),
+        training=msgspec.structs.replace(config.training, iterations=SHORT, residual_activation=SHORT),
+    )
+    flags = ("visible_if_in_front", "density_over_all_views", "statistics_not_reset")
+    title = "Gaussians leave the view and come back: only views in which one is visible count for its densification"
+    return Spec("training", "out_of_view", "training", title, flags,
+                {"camera": LENS, "config": msgspec.to_builtins(config)}, inputs)  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """The trajectory, and a shorter one whose Gaussians leave the view."""
     settings = {"camera": LENS, "config": msgspec.to_builtins(_settings())}
     flags = ("skipped_step_when_densifying", "residuals_activated_late", "rates_not_decaying",
              "laplacian_weight_not_ramped", "penalty_dropped_in_training", "calibration_of_half_ratio",
-             "densify_threshold_in_pixels")  # fmt: skip
+             "densify_threshold_in_pixels", "children_inherit_moments", "statistics_not_reset", "degree_late",
+             "laplacian_ramp_late", "residual_steps_from_start", "statistics_from_start", "moments_not_gathered",
+             "frame_order_of_all_frames", "densified_before_the_step")  # fmt: skip
     title = "Calibration, then twenty iterations: densification at 6 and 12, residuals from 9 on, detail ramp, degree 2"
-    return [Spec("training", "twenty_iterations", "training", title, flags, settings, inputs)]
+    inputs = _inputs(Seeds("training", "twenty_iterations"), ITERATIONS)
+    return [Spec("training", "twenty_iterations", "training", title, flags, settings, inputs), _out_of_view()]
 
 
-# ---- mistakes; those that `schedule` reveals are in that family ----
+# ---- mistakes ----
+
+SOURCE, STEP = "fitting.trainer", "fitting.fused.step"
+BOTH = "training"
 
 WRONG_PORTS = [
-    WrongPort("skipped_step_when_densifying", "No optimiser step when densifying", "skipped; right: taken",
-              within("config", ("training", "schedule"), optimiser__legacy_skip=True)),
-    WrongPort("penalty_dropped_in_training", "Matern penalty left out of training", "0; right: lambda_msp",
-              within("config", ("training", "schedule"), loss__lambda_msp=0.0)),
-    WrongPort("calibration_of_half_ratio", "Calibration with another ratio", "r / 2; right: r",
-              within("config", ("training", "schedule"), loss__gradient_ratio=lambda r: r / 2)),
-]  # fmt: skip
+    port(
+        "skipped_step_when_densifying",
+        "No optimiser step when densifying",
+        "skipped; right: taken",
+        BOTH,
+        edit(SOURCE, "if not (dense and config.optimiser.legacy_skip):", "if not dense:"),
+    ),
+    port(
+        "penalty_dropped_in_training",
+        "Matern penalty left out of training",
+        "0; right: lambda_msp",
+        BOTH,
+        edit(SOURCE, "config.loss.lambda_msp * (penalty or 0.0)", "0.0 * (penalty or 0.0)"),
+        edit(STEP, "saved.motion, config.loss.lambda_msp, grads", "saved.motion, 0.0, grads"),
+    ),
+    port(
+        "calibration_of_half_ratio",
+        "Calibration with another ratio",
+        "r / 2; right: r",
+        BOTH,
+        edit(
+            "fitting.objective",
+            "calibrate(views, config.loss.gradient_ratio)",
+            "calibrate(views, config.loss.gradient_ratio / 2)",
+        ),
+    ),
+    port(
+        "statistics_not_reset",
+        "Screen gradients kept after densification",
+        "carried over; right: zero",
+        BOTH,
+        edit(
+            SOURCE,
+            "    state.gaussians, state.statistics = result.gaussians, result.statistics\n",
+            "    kept = type(state.statistics)(*(a[result.plan.source] for a in state.statistics))\n"
+            "    state.gaussians, state.statistics = result.gaussians, kept\n",
+        ),
+    ),
+    port(
+        "moments_not_gathered",
+        "Moments not reordered with their Gaussians",
+        "all zero; right: those of the survivors kept",
+        BOTH,
+        edit(SOURCE, "result.plan.source, result.plan.survivors)", "result.plan.source, 0)"),
+    ),
+    port(
+        "residual_steps_from_start",
+        "Step count of the residuals from the first iteration",
+        "k = i; right: 1 at their first step",
+        BOTH,
+        edit(
+            SOURCE,
+            "add_array(state.adam, name, array)",
+            "add_array(state.adam, name, array)\n            state.adam.step[name] = state.iteration",
+        ),
+    ),
+    port(
+        "frame_order_of_all_frames",
+        "Frame order read as frame numbers",
+        "frame_order[i]; right: train_index[frame_order[i]]",
+        BOTH,
+        edit(
+            "fitting.sampling",
+            "int(sequence.train_index[rng.integers(len(sequence.train_index))])",
+            "int(rng.integers(len(sequence.train_index)))",
+        ),
+    ),
+    port(
+        "densified_before_the_step",
+        "Density control before the optimiser step",
+        "old parameters; right: those after the step",
+        BOTH,
+        edit(
+            SOURCE,
+            "    dense, state.ahead = densify_now(iteration, config), None\n",
+            "    dense, state.ahead = densify_now(iteration, config), None\n"
+            "    if dense:\n        before = Gaussians(*(None if a is None else a.copy() for a in state.gaussians))\n",
+        ),
+        edit(
+            SOURCE,
+            "            _control_density(state, shop)\n",
+            "            moved, state.gaussians = state.gaussians, before\n"
+            "            plan = densify(before, state.statistics, config.density, "
+            "copy.deepcopy(state.rng), shop.extent).plan\n"
+            "            _control_density(state, shop)\n"
+            "            for old, new in zip(moved, state.gaussians):\n"
+            "                if new is not None:\n"
+            "                    new[..., : plan.survivors] = old[..., plan.source[: plan.survivors]]\n",
+        ),
+        edit(SOURCE, "import math\n", "import copy\nimport math\n"),
+    ),
+]

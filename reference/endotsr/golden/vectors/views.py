@@ -45,7 +45,12 @@ def spread_points(seeds: Seeds, count: int, reach: float = 0.3) -> np.ndarray:
 
 def lens_settings(raster: RasterSettings, **more: Any) -> dict[str, Any]:
     """Rasteriser and lens as settings."""
-    return {"raster": raster_dict(raster), "camera": LENS} | more
+    return {"preset": preset_of(raster), "raster": raster_dict(raster), "camera": LENS} | more
+
+
+def preset_of(raster: RasterSettings) -> str:
+    """The name of a preset with these settings."""
+    return next(name for name, preset in PRESETS.items() if preset == raster)
 
 
 def logit_of(opacity: list[float]) -> Made:

@@ -1,30 +1,18 @@
-"""Wrong ports: each makes one plausible mistake wherever it applies, and is right otherwise.
+"""Wrong ports: each is a copy of the reference with one plausible mistake in its source, forward and reverse.
 
-A wrong port is a function of a request, the reference and the right answer. Its answers give the size and the
-fingerprint of the mistake in each golden case. The judge must refuse every wrong port and name its mistake.
+In: the cases of golden as inputs and settings. Out: what a port that makes the mistake answers, for the operations that
+are examined. These answers give the size and the fingerprints of the mistake. The judge must refuse every wrong port
+and name its mistake.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endotsr.stages.stage import Inputs, Outputs, Settings, tidy
-
-Run = Callable[[Inputs, Settings], Outputs]
-
-
-class Request(NamedTuple):
-    """The request of a case for a wrong port, with the reference and the right answer."""
-
-    inputs: Inputs
-    settings: Settings
-    run: Run  # the reference of the operation
-    right: Outputs
-
-
-Wrong = Callable[[Request], Mapping[str, Any] | None]
+from endotsr.golden.judge.store import in_precision
+from endotsr.golden.vectors.copies import Edit, changed_copy, without_compiler
+from endotsr.stages.stage import Inputs, Outputs
 
 
 class WrongPort(NamedTuple):
@@ -33,85 +21,68 @@ class WrongPort(NamedTuple):
     flag: str  # the name of the mistake
     title: str
     wrong: str  # the wrong rule and the right one
-    apply: Mapping[str, Wrong]  # by operation; None from the function = this case is not touched
+    operations: tuple[str, ...]  # on which the mistake is examined
+    edits: tuple[Edit, ...]  # the mistake, in the source of the reference
+    rounding: bool = False  # loses digits and is right otherwise: its wrong digits differ from port to port
 
 
-def answer(wrong_port: WrongPort, operation: str, request: Request) -> Outputs | None:
-    """The wrong answer to a request, or None where the mistake changes nothing by construction."""
-    wrong = wrong_port.apply.get(operation)
-    if wrong is None:
-        return None
-    with np.errstate(all="ignore"):
-        found = wrong(request)
-    if found is None:
-        return None
-    made = tidy(found)
-    return {name: made.get(name, right).astype(right.dtype) for name, right in request.right.items()}
+SLOW = ("render", "objective", "training")  # operations that take seconds without the compiler
+ALWAYS = "render/paper"  # the one case of them that every mistake in a kernel is examined on
 
 
-# ---- mistakes that occur in many families ----
+class Question(NamedTuple):
+    """A case, as a wrong port is asked."""
+
+    name: str
+    operation: str
+    inputs: Inputs
+    settings: Mapping[str, Any]
+    made_for: tuple[str, ...]  # flags
 
 
-def setting(**changes: Any) -> Wrong:
-    """Answers with other settings; a callable value gets the old one. Nested with a double underscore."""
-
-    def wrong(request: Request) -> Outputs | None:
-        settings = dict(request.settings)
-        touched = False
-        for key, value in changes.items():
-            touched |= _replace(settings, key.split("__"), value)
-        return request.run(request.inputs, settings) if touched else None
-
-    return wrong
+def edit(module: str, old: str, new: str, times: int = 1) -> Edit:
+    """A change of one module, see `Edit`."""
+    return Edit(module, old, new, times)
 
 
-def _replace(settings: dict[str, Any], keys: list[str], value: Any) -> bool:
-    first, *rest = keys
-    if first not in settings:
+def port(flag: str, title: str, wrong: str, operations: str, *edits: Edit, rounding: bool = False) -> WrongPort:
+    """A wrong port; the operations are separated by spaces."""
+    return WrongPort(flag, title, wrong, tuple(operations.split()), edits, rounding)
+
+
+def with_raster(fields: str) -> Edit:
+    """Reads the settings `found` of the rasteriser and takes them with other fields, an expression of keywords."""
+    return edit(
+        "stages.requests",
+        "    return RasterSettings(**fields)\n",
+        f"    found = RasterSettings(**fields)\n    return found._replace({fields})\n",
+    )
+
+
+class Wrong(NamedTuple):
+    """What a wrong port answers to a case; `single` in float32, for mistakes that lose digits only."""
+
+    double: Outputs
+    single: Outputs | None
+
+
+def answers(wrong_port: WrongPort, questions: Iterable[Question]) -> dict[str, Wrong]:
+    """What the wrong port answers, by case, to the questions on which it is examined."""
+    found, examined = {}, [question for question in questions if is_examined(wrong_port, question)]
+    with changed_copy(wrong_port.edits) as operation, np.errstate(all="ignore"):
+        for question in examined:
+
+            def run(precision: str, question: Question = question) -> Outputs:
+                settings = dict(question.settings) | {"_compositor": "definition"}
+                return operation(question.operation).compute(in_precision(question.inputs, precision), settings)
+
+            found[question.name] = Wrong(run("float64"), run("float32") if wrong_port.rounding else None)
+    return found
+
+
+def is_examined(wrong_port: WrongPort, question: Question) -> bool:
+    """Whether a case is of an operation of the mistake; of the slow ones only some, if a kernel is changed."""
+    if question.operation not in wrong_port.operations:
         return False
-    if rest:
-        settings[first] = dict(settings[first])
-        return _replace(settings[first], rest, value)
-    old = settings[first]
-    settings[first] = value(old) if callable(value) else value
-    return settings[first] != old
-
-
-def within(group: str, operations: tuple[str, ...], **changes: Any) -> dict[str, Wrong]:
-    """The same change in a group of settings (raster, camera, loss, config) for several operations."""
-    wrong = setting(**{f"{group}__{key}": value for key, value in changes.items()})
-    return {operation: wrong for operation in operations}
-
-
-def swapped(change: Callable[[dict[str, NDArray]], Mapping[str, NDArray]]) -> Wrong:
-    """Answers to other inputs."""
-
-    def wrong(request: Request) -> Outputs:
-        inputs = dict(request.inputs)
-        return request.run(inputs | dict(change(inputs)), request.settings)
-
-    return wrong
-
-
-def output(**changes: Callable[[NDArray], NDArray]) -> Wrong:
-    """Changes the outputs of a right answer."""
-
-    def wrong(request: Request) -> Outputs:
-        return {name: change(request.right[name]) for name, change in changes.items() if name in request.right}
-
-    return wrong
-
-
-def scaled(factor: float, *names: str) -> Wrong:
-    """These outputs times a factor."""
-    return output(**dict.fromkeys(names, lambda array: array * factor))
-
-
-def only(wrong: Wrong, *names: str) -> Wrong:
-    """These outputs of a wrong answer; the others stay right."""
-
-    def limited(request: Request) -> Mapping[str, Any] | None:
-        found = wrong(request)
-        return None if found is None else {name: found[name] for name in names if name in found}
-
-    return limited
+    slow = question.operation in SLOW and without_compiler(wrong_port.edits)
+    return not slow or wrong_port.flag in question.made_for or question.name == ALWAYS

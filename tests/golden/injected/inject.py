@@ -1,0 +1,170 @@
+"""Put single mistakes into ports and count how many the judge names: python tests/golden/injected/inject.py [PORT ...]
+
+PORT is c99, reference or torch; all of them by default. The port in PyTorch is run by the interpreter that
+ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. Every mistake is made
+alone. It is named rightly if the first mistake that the report names is this one. The right ports are judged as well:
+they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16 are named.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.golden.judge.command import run_port, write_requests
+from endotsr.golden.judge.npy import write_npy
+from endotsr.golden.judge.store import Golden, golden_folder, in_precision, read_golden
+from endotsr.golden.judge.verdict import Report, conclude, judge, judge_case
+from endotsr.golden.vectors.copies import changed_copy
+from endotsr.golden.vectors.reference import stored
+from endotsr.golden.vectors.registry import all_wrong_ports
+
+sys.path.insert(0, str(Path(__file__).parent))
+import autodiff
+import c99
+import in_reference
+
+SOURCES = golden_folder() / "ports" / "c99"
+
+
+class Outcome(NamedTuple):
+    """What the judge said of one mistake."""
+
+    port: str
+    flag: str
+    named: tuple[str, ...]  # mistakes that the report names, best first
+    refused: int  # outputs
+
+    @property
+    def right(self) -> bool:
+        """Whether the first name is that of the mistake."""
+        return self.named[:1] == (self.flag,)
+
+
+def said(port: str, flag: str, report: Report) -> Outcome:
+    """The outcome of a report."""
+    refused = sum(o.status == "refused" for case in report.cases for o in case.outputs)
+    return Outcome(port, flag, tuple(s.flag for s in report.suspects if s.named), refused)
+
+
+class CPort:
+    """The port in C99, compiled once; a mistake compiles its file again."""
+
+    def __init__(self, folder: Path, golden: Golden) -> None:
+        self.folder, self.golden, self.requests = folder, golden, folder / "requests"
+        write_requests(golden, self.requests, "float64", 2)
+        self.objects = {file.name: self._compiled(file, file.stem) for file in sorted(SOURCES.glob("*.c"))}
+
+    def _compiled(self, file: Path, name: str) -> str:
+        target = str(self.folder / f"{name}.o")
+        words = ["cc", "-std=c99", "-O0", "-DREAL=double", "-I", str(SOURCES), "-c", str(file), "-o", target]
+        subprocess.run(words, check=True)
+        return target
+
+    def report(self, mistake: c99.Injected | None) -> Report:
+        """The judge's report on the port with a mistake, or on the right one."""
+        objects = dict(self.objects)
+        if mistake:
+            file = self.folder / "wrong.c"
+            file.write_text(changed((SOURCES / mistake.file).read_text(), mistake))
+            objects[mistake.file] = self._compiled(file, "wrong")
+        subprocess.run(["cc", *objects.values(), "-lm", "-o", str(self.folder / "port")], check=True)
+        outputs = self.folder / "outputs"
+        shutil.rmtree(outputs, ignore_errors=True)
+        run_port(f"{self.folder / 'port'} {{requests}} {{outputs}}", self.requests, outputs, 60)
+        return judge(self.golden, outputs, "float64", level=2)
+
+
+def changed(text: str, mistake: c99.Injected) -> str:
+    """The text with the mistake. Raises ValueError where an old text does not occur exactly once."""
+    for old, new in mistake.changes:
+        if text.count(old) != 1:
+            raise ValueError(f"{mistake.flag}: {old!r} occurs {text.count(old)} times in {mistake.file}")
+        text = text.replace(old, new)
+    return text
+
+
+def in_c(golden: Golden) -> Iterator[Outcome]:
+    """The mistakes of `c99`, one by one, and first the right port."""
+    with tempfile.TemporaryDirectory() as scratch:
+        port = CPort(Path(scratch), golden)
+        yield said("c99", "", port.report(None))
+        for mistake in c99.MISTAKES:
+            yield said("c99", mistake.flag, port.report(mistake))
+
+
+def in_copies(golden: Golden) -> Iterator[Outcome]:
+    """The mistakes of `in_reference`: a case that the mistake is not examined on is taken as passed."""
+    for mistake in in_reference.MISTAKES:
+        with tempfile.TemporaryDirectory() as scratch:
+            folder, verdicts = Path(scratch), []
+            with changed_copy(mistake.edits) as operation, np.errstate(all="ignore"):
+                for case in golden.cases:
+                    if case.operation not in mistake.operations:
+                        continue
+                    inputs = in_precision(golden.inputs(case), "float32")
+                    found = operation(case.operation).compute(inputs, dict(case.settings) | {"_compositor": "blocks"})
+                    for name in set(case.outputs) & set(found):
+                        write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
+            verdicts = [judge_case(golden, c, folder, "float32") for c in golden.cases if (folder / c.name).is_dir()]
+            yield said("reference", mistake.flag, conclude(golden, verdicts, "float32", 4, []))
+
+
+def in_torch(golden: Golden) -> Iterator[Outcome]:
+    """The mistakes of `autodiff`, on the operations on which they are known; first the right port on all of its own."""
+    python = os.environ.get("ENDOTSR_TORCH_PYTHON", sys.executable)
+    if subprocess.run([python, "-c", "import torch"], capture_output=True, check=False).returncode:
+        print("torch: no PyTorch here, this port is left out")
+        return
+    known = all_wrong_ports()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        write_requests(golden, folder / "requests", "float64", 3)
+        jobs = [{"changes": [], "operations": [case.operation for case in golden.cases]}]
+        jobs += [{"changes": c, "operations": _first_two(known[flag].operations)} for flag, c in autodiff.MISTAKES]
+        (folder / "jobs.json").write_text(json.dumps(jobs))
+        driver = str(Path(__file__).with_name("autodiff_driver.py"))
+        subprocess.run([python, driver, str(folder / "jobs.json"), *(str(folder / n) for n in ("requests", "outputs"))],
+                       check=True)  # fmt: skip
+        for k, flag in enumerate(["", *(flag for flag, _ in autodiff.MISTAKES)]):
+            answered = folder / "outputs" / str(k)
+            cases = [case for case in golden.cases if (answered / case.name).is_dir()]
+            verdicts = [judge_case(golden, case, answered, "float64") for case in cases]
+            yield said("torch", flag, conclude(golden, verdicts, "float64", 3, []))
+
+
+def _first_two(operations: tuple[str, ...]) -> list[str]:
+    """The stage itself and one more: the whole objective is not ported."""
+    return [name for name in operations if name not in ("objective", "training")][:2]
+
+
+PORTS: dict[str, Callable[[Golden], Iterator[Outcome]]] = {"c99": in_c, "reference": in_copies, "torch": in_torch}
+
+
+def main(words: list[str]) -> int:
+    """Run, print a line for each mistake that is not named first, and count."""
+    golden, outcomes = read_golden(golden_folder()), []
+    for name in words or PORTS:
+        for outcome in PORTS[name](golden):
+            outcomes.append(outcome)
+            if outcome.flag == "":
+                print(f"{name}: the right port: {outcome.refused} outputs refused, named: {outcome.named or 'none'}")
+            elif not outcome.right:
+                named = ", ".join(outcome.named[:3]) or "none of the known mistakes"
+                print(f"{name}: {outcome.flag}: {outcome.refused} outputs refused, named: {named}", flush=True)
+    mistakes = [outcome for outcome in outcomes if outcome.flag]
+    right = sum(outcome.right for outcome in mistakes)
+    print(f"{right} of {len(mistakes)} single mistakes named rightly")
+    clean = all(not outcome.refused and not outcome.named for outcome in outcomes if not outcome.flag)
+    return 0 if clean and 16 * right >= 15 * len(mistakes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,53 @@
+"""The yardstick of the judge: its mistakes fit the sources, cover every family, and a sample of them is named.
+
+All of them: python tests/golden/injected/inject.py
+"""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from endotsr.golden.judge.store import golden_folder, read_golden
+from endotsr.golden.vectors.copies import changed_text
+from endotsr.golden.vectors.registry import FAMILIES, all_wrong_ports, families
+
+sys.path.insert(0, str(Path(__file__).parent))
+import autodiff
+import c99
+import in_reference
+import inject
+
+KNOWN = all_wrong_ports()
+
+
+def test_every_mistake_fits_its_source():
+    for mistake in c99.MISTAKES:
+        assert inject.changed((inject.SOURCES / mistake.file).read_text(), mistake)
+    for mistake in in_reference.MISTAKES:
+        for module in {one.module for one in mistake.edits}:
+            assert changed_text(module, [one for one in mistake.edits if one.module == module])
+        assert mistake.edits != KNOWN[mistake.flag].edits, f"{mistake.flag} is the wrong port itself"
+    text = autodiff.SOURCE.read_text()
+    for flag, changes in autodiff.MISTAKES:
+        assert [old for old, _ in changes if text.count(old) != 1] == [], flag
+
+
+def test_the_mistakes_are_many_known_and_of_every_family():
+    flags = [m.flag for m in c99.MISTAKES] + [m.flag for m in in_reference.MISTAKES] + [f for f, _ in autodiff.MISTAKES]
+    assert len(flags) >= 80 and set(flags) <= set(KNOWN)
+    touched = {name for name, family in zip(FAMILIES, families()) for w in family.WRONG_PORTS if w.flag in flags}
+    assert touched == set(FAMILIES)
+    assert sum("training" in m.operations for m in in_reference.MISTAKES) >= 10
+
+
+@pytest.mark.skipif(not (shutil.which("cc") or shutil.which("gcc")), reason="no C compiler (cc or gcc) on this machine")
+@pytest.mark.parametrize("flag", ["", "tanh_missing", "support_subsampled", "depth_over_opacity"])
+def test_a_mistake_in_the_c_port_is_named_and_the_right_port_is_not(flag):
+    golden = read_golden(golden_folder())
+    with tempfile.TemporaryDirectory() as scratch:
+        mistake = next((m for m in c99.MISTAKES if m.flag == flag), None)
+        outcome = inject.said("c99", flag, inject.CPort(Path(scratch), golden).report(mistake))
+    assert outcome.right if flag else outcome.named == () and outcome.refused == 0
