@@ -34,9 +34,9 @@ class SimulateOptions:
     effects: Annotated[str | None, Option("NAME,..")] = None
     """exactly these effects, instead of those of a scene; empty for none"""
     layout: Literal["endonerf", "stereomis"] = "endonerf"
-    """endonerf: pictures, depth, masks and poses; stereomis: stacked film, calibration, trajectory and masks"""
+    """endonerf: pictures, depth, masks and poses; stereomis: stacked video, calibration, trajectory and masks"""
     lossless: bool = False
-    """with the layout stereomis: a film without loss, in place of a compressed one"""
+    """with the layout stereomis: a video without loss, in place of a compressed one"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 
