@@ -38,7 +38,7 @@ def coloured(depth: np.ndarray, low: float, high: float) -> Picture:
 
 
 def recorded(raw: Path) -> Picture:
-    """Pictures of the film, left over right, side by side."""
+    """Pictures of the video, left over right, side by side."""
     return np.concatenate(list(video_pictures(raw / "simulated.mp4", list(SHOWN))), axis=1)
 
 

@@ -6,8 +6,8 @@
 
 A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the
 layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends:
-the EndoNeRF folder with depth from its own stereo pairs, and a recording whose film has no loss. They separate the cost
-of the depth, of the layout and of the compression.
+the EndoNeRF folder with depth from its own stereo pairs, and a recording whose video has no loss. They separate the
+cost of the depth, of the layout and of the compression.
 The result is docs/results/any_clip.json; the table stands in docs/guides/prepare.md.
 """
 
@@ -40,8 +40,8 @@ DEPTH = ["--nearest", "25", "--farthest", "120"]
 WAYS = {
     "endonerf": "EndoNeRF layout, given depth",
     "stereo": "EndoNeRF layout, depth from its stereo pairs",
-    "lossless": "StereoMIS layout, film without loss, `prepare`, `depth`",
-    "stereomis": "StereoMIS layout, compressed film, `prepare`, `depth`",
+    "lossless": "StereoMIS layout, video without loss, `prepare`, `depth`",
+    "stereomis": "StereoMIS layout, compressed video, `prepare`, `depth`",
 }
 
 
@@ -88,7 +88,9 @@ def measured(root: Path, way: str) -> dict[str, float]:
         "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
     }
     return (
-        found if way == "endonerf" else found | depth_error(clean, root / way) | {"film": film_psnr(clean, root / way)}
+        found
+        if way == "endonerf"
+        else found | depth_error(clean, root / way) | {"video": video_psnr(clean, root / way)}
     )
 
 
@@ -98,7 +100,7 @@ def frames_of(clean: Path, other: Path) -> Iterator[tuple[np.ndarray, np.ndarray
         yield read_png(file).astype(np.float64), read_png(other / "images" / file.name).astype(np.float64)
 
 
-def film_psnr(clean: Path, prepared: Path) -> float:
+def video_psnr(clean: Path, prepared: Path) -> float:
     """PSNR in dB of the prepared pictures against those without loss, over all frames; infinite for equal ones."""
     error = np.mean([((a - b) ** 2).mean() for a, b in frames_of(clean, prepared)])
     return float(10 * np.log10(255**2 / error)) if error else float("inf")
@@ -126,26 +128,26 @@ def table(result: dict[str, Any]) -> str:
         if way not in ways:
             continue
         row = ways[way]
-        film = row.get("film", np.inf)
+        video = row.get("video", np.inf)
         depth = f"{row['depth_mm']:.2f}, {row['coverage']:.0%}" if "depth_mm" in row else "given"
         rows.append(
             [label, f"{row['own']:.2f}", f"{row['lossless']:.2f}", f"{row['ssim']:.4f}", f"{row['flow']:.2f}",
-             "-" if film is None or not np.isfinite(film) else f"{film:.1f}", depth]
+             "-" if video is None or not np.isfinite(video) else f"{video:.1f}", depth]
         )  # fmt: skip
     headings = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM full", "optical flow, dB",
                 "PSNR of the prepared pictures, dB", "depth: error in mm, coverage"]  # fmt: skip
     steps = {
         "the depth from stereo": ("stereo", "endonerf"),
         "the raw layout": ("lossless", "stereo"),
-        "the compression of the film": ("stereomis", "lossless"),
+        "the compression of the video": ("stereomis", "lossless"),
     }
     if "lossless" not in ways:
-        steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and film": ("stereomis", "stereo")}
+        steps = {"the depth from stereo": ("stereo", "endonerf"), "layout and video": ("stereomis", "stereo")}
     changes = [f"{what} {ways[a]['lossless'] - ways[b]['lossless']:+.2f} dB" for what, (a, b) in steps.items()]
     about = (
         f"Held-out frames of `{result['scene']}`, trained with `{result['training']}`. What changes the PSNR"
         f" against the lossless pictures: {', '.join(changes)}. The given depth is rounded to whole millimetres. A"
-        " compressed film loses sensor noise, which makes its own held-out frames easier to predict."
+        " compressed video loses sensor noise, which makes its own held-out frames easier to predict."
         f" {result['date']}."
     )
     return markdown(headings, rows) + "\n\n" + about

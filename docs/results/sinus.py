@@ -51,7 +51,6 @@ def result(run: Path) -> dict[str, Any]:
         "held_out": rows,
         "training_psnr": metrics["training"]["mean"]["psnr_tissue"],
         "gaussians": about["gaussians"],
-        "seconds": about["seconds"],
         "machine": about["machine"],
         "versions": about["versions"],
         "input": kept,

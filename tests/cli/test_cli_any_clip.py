@@ -57,7 +57,7 @@ def test_prepare_finds_cameras_pictures_masks_and_depth_of_the_scene(chain):
         np.testing.assert_allclose(pose.rotation, expected.rotation, atol=1e-12)
         np.testing.assert_allclose(pose.translation, expected.translation, atol=1e-9)
         apart = np.abs(pair.left.astype(float) - clean.images[i].transpose(1, 2, 0))
-        assert apart.mean() < 6  # grey levels: what the film loses
+        assert apart.mean() < 6  # grey levels: what the video loses
         np.testing.assert_array_equal(recording.masks(i), clean.masks[i])
         depth, tissue = recording.depth(i), clean.masks[i]
         assert depth is not None
@@ -81,7 +81,7 @@ def test_the_rest_of_the_way_takes_one_command_each(chain, capsys):
     ("words", "named"),
     [
         (["--stereo.on", "false"], ("stereo.on = False does not fit the layout stereomis",)),
-        (["--width", "97"], ("width = 97 does not fit a film", "even")),
+        (["--width", "97"], ("width = 97 does not fit a video", "even")),
         (["--layout", "colmap"], ("layout", "endonerf, stereomis")),
         (["--layout", "endonerf", "--lossless"], ("--lossless belongs to --layout stereomis",)),
     ],

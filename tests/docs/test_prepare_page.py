@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
 TABLES = ("any_clip", "masks", "sinus", "long_clip")
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
-            "video": "Film", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
+            "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
 
 
 def script(name: str):

@@ -102,6 +102,21 @@ def test_masks_of_any_source_keep_their_mark(tmp_path):
     assert masks is not None and masks.proposed
 
 
+def test_masks_take_the_place_of_those_of_a_prepared_sequence(tmp_path):
+    written(tmp_path / "clip")
+    (tmp_path / "m" / "masks").mkdir(parents=True)
+    for i in range(FRAMES):
+        write_png(
+            tmp_path / f"m/masks/{i:06d}.png", np.where(np.arange(32) < 5 + i, 255, 0)[None].repeat(24, 0).astype("u1")
+        )
+    assert (
+        main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "b"), "--masks", str(tmp_path / "m/masks")])
+        == 0
+    )
+    for i in range(FRAMES):
+        assert (read_png(tmp_path / f"b/masks/{i:06d}.png") > 0).sum() == 24 * (5 + i)
+
+
 def test_nothing_found_writes_nothing(tmp_path, capsys):
     (tmp_path / "source").mkdir()
     for i, picture in enumerate(scene("still")[0]):

@@ -39,9 +39,9 @@ class SimulateOptions:
     json: JsonFile = None
     """also write what was simulated as JSON"""
     layout: Literal["endonerf", "stereomis"] = "endonerf"
-    """endonerf: pictures, depth, masks and poses; stereomis: stacked film, calibration, trajectory and masks"""
+    """endonerf: pictures, depth, masks and poses; stereomis: stacked video, calibration, trajectory and masks"""
     lossless: bool = False
-    """with the layout stereomis: a film without loss, in place of a compressed one"""
+    """with the layout stereomis: a video without loss, in place of a compressed one"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 

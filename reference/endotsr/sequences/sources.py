@@ -4,6 +4,7 @@ Comes in: paths and the statements of `SourceOptions`; goes out: functions of a 
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from endotsr.sequences.recording import (
     Lens,
     Pair,
     Picture,
+    Recording,
     Rig,
     checked_lens,
     colour_picture,
@@ -183,6 +185,25 @@ def stated_depth(
     paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
     factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
     return depth_reader(paired, options.depth_scale * factor)
+
+
+def with_stated(recording: Recording, options: SourceOptions) -> Recording:
+    """The recording with the masks of `--masks` and the depth of `--depth` in place of its own, if they are stated.
+
+    Raises:  InputError for files that do not belong to its frames, or depth in millimetres beside an arbitrary unit.
+    """
+    lens = recording.lens
+    assert lens is not None
+    frames = [recording.where / f"{name}.png" for name in recording.names]
+    masks, depth = stated_masks(options, frames, lens.width, lens.height), stated_depth(options, frames)
+    if depth is not None and (options.depth_unit == ARBITRARY) != (recording.unit == ARBITRARY):
+        raise InputError(f"{recording.where}: --depth-unit {options.depth_unit} beside the unit {recording.unit}")
+    return replace(
+        recording,
+        masks=masks or recording.masks,
+        depth=depth or recording.depth,
+        proposed=recording.proposed and masks is None,
+    )
 
 
 def stated_camera(options: SourceOptions, width: int, height: int, where: object) -> tuple[Lens | None, Rig | None]:

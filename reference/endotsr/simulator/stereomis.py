@@ -7,7 +7,7 @@
     truth/                    see truth.py
 
 In: settings. Out: files, one frame at a time. The cameras are an ideal pair: without distortion, rectified already. The
-film is compressed as real recordings are, or without loss; then its pictures are those of `write_sequence`.
+video is compressed as real recordings are, or without loss; then its pictures are those of `write_sequence`.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ from endotsr.simulator.instrument import graspers
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import camera_centre
 
-FILM, CALIBRATION, TRAJECTORY, MASKS = "simulated.mp4", "StereoCalibration.ini", "groundtruth.txt", "masks"
+VIDEO, CALIBRATION, TRAJECTORY, MASKS = "simulated.mp4", "StereoCalibration.ini", "groundtruth.txt", "masks"
 RATE = 25.0  # frames a second
 METRE = 1000.0  # millimetres
 
@@ -35,7 +35,7 @@ def check_recording(settings: SimulatorSettings) -> None:
     if not settings.stereo.on:
         raise InputError("simulator: stereo.on = False does not fit the layout stereomis; allowed: True")
     if settings.width % 2:
-        raise InputError(f"simulator: width = {settings.width} does not fit a film; allowed: even numbers")
+        raise InputError(f"simulator: width = {settings.width} does not fit a video; allowed: even numbers")
     split_frames(settings.frames, "every_eighth", 0)
     check_field_of_view(settings)
 
@@ -49,7 +49,7 @@ def write_recording(
 ) -> None:
     """Write a recording and its truth into an existing, empty folder. `on_frame` is called after every frame.
 
-    lossless  a film without loss, which is about ten times as large
+    lossless  a video without loss, which is about ten times as large
 
     Raises:  InputError as `check_recording` does, or where the settings fold the tissue over itself.
     """
@@ -59,11 +59,11 @@ def write_recording(
     scene = make_scene(settings)
     (folder / CALIBRATION).write_text(calibration_text(scene), encoding="utf-8")
     (folder / TRAJECTORY).write_text(trajectory_text(scene), encoding="utf-8")
-    write_video(folder / FILM, _stacked(folder, scene, name, on_frame), RATE, lossless)
+    write_video(folder / VIDEO, _stacked(folder, scene, name, on_frame), RATE, lossless)
 
 
 def _stacked(folder: Path, scene: Scene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
-    """The pictures of the film, (2H, W, 3) uint8; masks and truth are written on the way."""
+    """The pictures of the video, (2H, W, 3) uint8; masks and truth are written on the way."""
     from endotsr.opencv import write_png
 
     masked = bool(graspers(scene.settings))

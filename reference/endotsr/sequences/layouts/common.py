@@ -2,13 +2,14 @@
 
 from endotsr.sequences.common import common_hashes, open_common, read_common, recognises
 from endotsr.sequences.layouts import Layout
+from endotsr.sequences.sources import with_stated
 
 LAYOUT = Layout(
     name="common",
     about="a folder with sequence.toml and images/",
     rank=0,
     recognises=recognises,
-    open=lambda path, options: open_common(path),
+    open=lambda path, options: with_stated(open_common(path), options),
     read=read_common,
     hashes=common_hashes,
 )

@@ -13,7 +13,7 @@ from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import Lens, Pose, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_masks
+from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_depth, stated_masks
 from endotsr.sequences.trajectory import poses_at, read_trajectory
 
 LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
@@ -81,7 +81,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
         names=[file.stem for file in files],
         pictures=pictures_from_files(files, []),
         masks=stated_masks(options, files, width, height),
-        depth=depth,
+        depth=stated_depth(options, files) or depth,
         unit="mm",
         lens=lens,
         poses=poses,
