@@ -81,7 +81,7 @@ def test_evaluate_again_gives_the_same_numbers(finished_run, tmp_path, capsys):
     shutil.copytree(finished_run, out)
     (out / "report.html").unlink()
     shutil.rmtree(out / "renders")
-    assert main(["evaluate", str(out), "--paper-row", "pulling"]) == 0
+    assert main(["evaluate", str(out), "--paper-row", "pulling", "--no-view"]) == 0
     said = capsys.readouterr().out
     before, after = (json.loads((folder / "metrics.json").read_text()) for folder in (finished_run, out))
     assert before["held_out"] == after["held_out"] and before["baselines"] == after["baselines"]
@@ -90,6 +90,8 @@ def test_evaluate_again_gives_the_same_numbers(finished_run, tmp_path, capsys):
     assert "39.34" in said and str(out / "report.html") in said
     page = (out / "report.html").read_text()
     assert "rendered without A, colour residual" in page and "39.34" in page
+    assert not (out / "view.html").exists() and "view.html" not in page, "neither page nor link"
+    assert 'href="view.html"' in (finished_run / "report.html").read_text() and (finished_run / "view.html").exists()
 
 
 def test_table_writes_a_dash_for_no_value():

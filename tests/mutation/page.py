@@ -60,13 +60,13 @@ def detected(found: list[Row], suites: Iterable[str]) -> dict[str, int]:
 
 def table(title: str, groups: dict[str, list[Row]], suites: list[str]) -> list[str]:
     """One line a group: the detected fraction of the mutants that are not equivalent, and what is left."""
-    head = [title, "any suite", *suites, "mutants", "equivalent", "survivors"]
+    head = [title, "any suite", *suites, "mutants", "survivors"]
     lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     for name, group in groups.items():
         real = counted(group)
         found = detected(real, suites)
         parts = [percent(found[s], len(real)) for s in ("any", *suites)]
-        left = [len(real), len(group) - len(real), len(real) - found["any"]]
+        left = [len(real), len(real) - found["any"]]
         lines.append("| " + " | ".join([f"`{name}`", *parts, *map(str, left)]) + " |")
     return lines
 
@@ -213,7 +213,8 @@ def page(result: dict[str, Any]) -> str:
         *method(result, found),
         "## Equivalent mutants",
         "",
-        "These mutants compute the same results, or differ only in values on which no result depends.",
+        f"These {len(found) - len(counted(found))} mutants compute the same results, or differ only in values on which "
+        "no result depends.",
         "",
     ]
     tested = {r.name for r in found if r.equivalent}

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from endotsr.report.data import Preview
 from endotsr.report.page import FramePictures, FreeTable, ReportData, report_html, write_report
 
 VOID = {"meta", "img", "source", "br"}
@@ -208,3 +209,33 @@ def test_writing_replaces_the_old_page_whole(tmp_path, monkeypatch):
         write_report(path, ReportData("second"))
     assert "first" in path.read_text(encoding="utf-8")
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def moving_picture(count):
+    """An animated WebP of grey pictures."""
+    pictures, out = [Image.new("RGB", (20, 10), (40 * k,) * 3) for k in range(count)], io.BytesIO()
+    pictures[0].save(out, "WEBP", save_all=count > 1, append_images=pictures[1:])
+    return out.getvalue()
+
+
+def test_the_scene_moves_and_its_viewer_is_one_link_away():
+    preview = Preview(moving_picture(3), moving_picture(1), 20, 10, "moving & turning")
+    page = report_html(made_up_data(preview=preview, viewer="view.html"))
+    reader = Reader(page)
+    assert [value for name, value in reader.attributes if name == "href"] == ["view.html"]
+    moving = re.search(r'<img src="data:image/webp;base64,([^"]*)" alt="moving &amp; turning" width="20"', page)
+    still = re.search(r'prefers-reduced-motion: reduce\)" srcset="data:image/webp;base64,([^"]*)"', page)
+    counts = [Image.open(io.BytesIO(base64.b64decode(found[1]))).n_frames for found in (moving, still)]
+    assert counts == [3, 1]
+    assert "Open the viewer" not in report_html(made_up_data(preview=preview))
+
+
+def test_columns_of_8_bits_are_folded():
+    data = made_up_data()
+    data.evaluation["held_out"]["mean"] |= {"psnr_full_8bit": 31.71, "psnr_tissue_8bit": 30.19}
+    page = report_html(data)
+    shown, _, folded = page.partition("<summary>The same of pictures rounded to 8 bits")
+    table = shown[shown.index("Held-out frames against baselines") :]
+    assert "8‑bit" not in table and "31.71" not in table and "30.25" in table
+    opened = folded[: folded.index("</details>")]
+    assert "31.71" in opened and "30.19" in opened and "30.25" not in opened

@@ -40,3 +40,13 @@ def test_html_escapes_heads_and_keeps_cells():
     rows = [attributes for tag, attributes in found if tag == "tr"]
     assert rows == [{}, {"class": "best"}, {}]
     assert [attributes["scope"] for tag, attributes in found if tag == "th"] == ["col", "col", "row", "row"]
+
+
+def test_units_and_sentences_in_html():
+    text = html_table(["name", "PSNR, dB", "why"], [["x", "1", "<b>a sentence</b> that is too long for one line"]])
+    assert "PSNR,\u00a0dB" in text and '<td class="words"><b>' in text and "<td>1</td>" in text
+
+
+def test_few_columns_stand_below_the_name_of_their_row_on_a_telephone():
+    few, many = (html_table([str(k) for k in range(n)], [["x"] * n]) for n in (7, 8))
+    assert 'class="scroll few" style="--cells:6"' in few and 'class="scroll"' in many

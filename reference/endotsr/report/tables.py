@@ -44,7 +44,7 @@ def _cell(content: str) -> str:
 
 def unbroken(name: str) -> str:
     """The name of a quantity, whose unit stays on the line of the comma: `PSNR, dB`."""
-    return re.sub(r", (\S+)$", ",\u00a0\1", name)
+    return re.sub(r", (?=\S+$)", ",\u00a0", name)
 
 
 def html_table(
