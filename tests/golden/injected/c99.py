@@ -88,6 +88,15 @@ TIME = [
         "time.c",
         ("scale * 4 * e / ((1 + e) * (1 + e)) * d_residual[k]", "scale * d_residual[k] + 0 * e"),
     ),
+    mistake(
+        "motion_cosines_dropped",
+        "time.c",
+        (
+            'count = in_size(request, "d_translation", 1);',
+            'count = in_size(request, "d_translation", 1);\n    real *sines = scratch(request, terms);\n'
+            "    memcpy(sines, phi, (size_t)(terms / 2) * sizeof *phi);\n    phi = sines;",
+        ),
+    ),
     mistake("matern_sum_one", "time.c", ("* (double)count / sum", "/ sum")),
     mistake(
         "matern_wrong_power",
