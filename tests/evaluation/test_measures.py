@@ -160,6 +160,14 @@ def test_the_instrument_does_not_count_in_the_right_view(pair):
     assert not none.counted.any()
 
 
+def test_excluded_pixels_are_moved_with_the_tissue():
+    sequence = sequence_of(textured(0.0))
+    sequence.masks[0, 20:40, 30:50] = False
+    counted = moved_left(sequence, 0, 5.0).counted  # f B / z = 6 px
+    assert not counted[20:40, 24:44].any()
+    assert counted[5:15, 5:50].all() and counted[25:35, 5:20].all()
+
+
 def test_the_right_camera_stands_to_the_right():
     camera = Camera(np.eye(3), np.array([0.0, 0.0, 5.0]), 60.0, 60.0, 32, 32, 64, 64)
     from endotsr.splatting.camera import project

@@ -16,7 +16,10 @@ from tiny_sweep import (
     write_spec,
 )
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are found in /proc")
+pytestmark = [
+    pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are found in /proc"),
+    pytest.mark.timeout(1800),
+]
 LENGTH = 60  # iterations, enough to kill a process in the middle
 
 
