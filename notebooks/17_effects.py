@@ -20,7 +20,7 @@
 # The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must carry. The
 # page {doc}`/effects` says how often the tests are right, and what a plan saves.
 
-# %%
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import os
 
 import matplotlib.pyplot as plt
@@ -37,6 +37,7 @@ from endotsr.effects.study import settings_of
 from endotsr.equations.dictionary import frequencies, report_atoms
 from endotsr.simulator.simulate import simulate
 
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"
 FRAMES = 16 if SMALL else 40
 CLIPS = {
@@ -200,8 +201,9 @@ for n in lengths:
     reports.append(report)
 plan = make_plan(found["beating"], PAPER)
 carried = plan.dictionary
-print(f"{found['beating'].clip.count} stamps of {FRAMES} frames: {carried.frequencies} frequencies up to "
-      f"{carried.frequency_max:g} cycles, condition {carried.condition:.3g}")  # fmt: skip
+stamps = found["beating"].clip.count
+print(f"{stamps} stamps of {FRAMES} frames: {carried.frequencies} frequencies up to")
+print(f"{carried.frequency_max:g} cycles, condition {carried.condition:.3g}")
 assert carried.frequency_max <= FRAMES / 2 and carried.rank == 2 * carried.frequencies
 
 # %% tags=["hide-input"]
@@ -239,9 +241,8 @@ for name, inspection in found.items():
         plan.memory, 1 - numbers_text(config.model) / numbers_text(PAPER.model), rtol=1e-12
     )
     np.testing.assert_allclose(plan.memory, 1 - memory_fraction(config), rtol=1e-12)
-    print(
-        f"{name}: {numbers_text(config.model)} of {numbers_text(PAPER.model)} numbers a Gaussian"
-    )
+    small, large = numbers_text(config.model), numbers_text(PAPER.model)
+    print(f"{name}: {small} of {large} numbers a Gaussian")
     print(*(f"  {line}" for line in lines), sep="\n")
 
 # %% [markdown]
@@ -251,8 +252,9 @@ for name, inspection in found.items():
 # many cycles of both does the clip hold, and which of them can the test of rates and the dictionary find?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles of the dictionary, and
-# 63 frames carry 31.5 cycles. The test of rates asks for three cycles, so that it finds the beat and not the breath.
+# Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles
+# of the dictionary, and 63 frames carry 31.5 cycles. The test of rates asks for three cycles, so
+# that it finds the beat and not the breath.
 from endotsr.effects.periodic import LEAST_CYCLES
 
 seconds = 63 / 15

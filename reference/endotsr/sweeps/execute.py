@@ -182,7 +182,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     if measured_at_the_end(job):
         return
     model, weights = load_model(folder), load_lpips_weights(job.lpips)
-    truth = true_positions_of(job.source, job.simulator, job.config)
+    truth = true_positions_of(job.source, job.simulator, job.config, sequence)
     metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, (), truth)
     if job.measures:
         metrics["measures"] = measured(job.measures, model, sequence, job.source)
