@@ -65,9 +65,10 @@ def scores(simulated: Any, variant: str, seed: int, iterations: int) -> dict[str
     preset, sections = VARIANTS[variant]
     points = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
     threshold = {"gradient_threshold": DEMO.density.gradient_threshold}
+    training = {"seed": seed, "threads": 1}
     config = make_config(
-        preset, iterations=iterations, training={"seed": seed, "threads": 1}, initialisation=points, density=threshold,
-        **sections,
+        preset, iterations=iterations, training=training, initialisation=points, density=threshold,
+        model=sections.get("model", {}), loss=sections.get("loss", {}),
     )  # fmt: skip
     run = fit(simulated.sequence, config, on_message=lambda line: None)
     motion = trajectory_error(run.model, simulated.sequence, simulated.true_positions)

@@ -59,21 +59,19 @@ def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, con
 def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
     case = Case(gaussians=gaussians, width=width, height=height)
     everything, off, absent = (_prepared(case, c) for c in (config, changed(config, part), changed(config, part)))
-    seconds: dict[str, list[float]] = {"everything": [], "off": [], "absent": []}
+    builds: dict[str, tuple[Any, Any, tuple[tuple[Any, str], ...]]] = {
+        "everything": (*everything, ()), "off": (*off, ()), "absent": (*absent, part.functions),
+    }  # fmt: skip
+    seconds: dict[str, list[float]] = {name: [] for name in builds}
     for turn in range(repeats + 2):
-        for name, pair, missing in (
-            ("everything", everything, ()),
-            ("off", off, ()),
-            ("absent", absent, part.functions),
-        ):
-            taken = _iteration(*pair, missing)
+        for name, (state, shop, missing) in builds.items():
+            taken = _iteration(state, shop, missing)
             if turn >= 2:  # after compilation and one warm turn
                 seconds[name].append(taken)
     pairs = list(zip(seconds["off"], seconds["absent"]))
     medians = {name: statistics.median(values) for name, values in seconds.items()}
-    states = {"everything": (everything, ()), "off": (off, ()), "absent": (absent, part.functions)}
-    sizes = {name: _numbers(pair[0]) for name, (pair, _) in states.items()}
-    allocated = {name: _allocated(*pair, missing) for name, (pair, missing) in states.items()}
+    sizes = {name: _numbers(state) for name, (state, _, _) in builds.items()}
+    allocated = {name: _allocated(state, shop, missing) for name, (state, shop, missing) in builds.items()}
     return {
         "everything_ms": 1e3 * medians["everything"],
         "off_ms": 1e3 * medians["off"],

@@ -82,8 +82,8 @@ def return_error(clip: Clip, tracks: Tracks, noise: Noise) -> FloatArray:
         if k == clip.reference:
             continue
         common, there = mask & clip.masks[k], tracks.flow[k] / np.float32(clip.shrink)
-        pictures = (normalised(grey[i], common, sigma) for i in (k, clip.reference))
-        back = warp_bilinear(dense_flow(*pictures, "dis"), there)
+        start, end = normalised(grey[k], common, sigma), normalised(grey[clip.reference], common, sigma)
+        back = warp_bilinear(dense_flow(start, end, "dis"), there)
         squares.append(tile_means(np.hypot(*(there + back)), tracks.valid[k])[0] ** 2)
     known = np.isfinite(squares)
     total = np.where(known, squares, 0.0).sum(axis=0)

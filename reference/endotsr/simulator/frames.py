@@ -139,7 +139,7 @@ def _tissue_light(scene: Scene, eye: Eye, lamp: Camera, blocker: Blocker | None,
     for view in views:
         one = shade(settings, scene.texture, view, lamps, t)
         light += one.light / len(times)
-        if highlight is not None:
+        if highlight is not None and one.highlight is not None:
             highlight += one.highlight / len(times)
     return TissueLight(light, highlight)
 

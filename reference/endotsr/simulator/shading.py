@@ -51,15 +51,13 @@ def shade(settings: SimulatorSettings, texture: Texture, view: View, lamps: list
     light = np.concatenate([part.light for part in parts], axis=1)
     if not settings.highlights.on:
         return TissueLight(light, None)
-    return TissueLight(light, np.concatenate([part.highlight for part in parts]))
+    return TissueLight(light, np.concatenate([part.highlight for part in parts if part.highlight is not None]))
 
 
 def _rows_of(view: View, rows: slice) -> View:
     """Some rows of a view."""
-    fields = (view.material, view.point, view.normal)
-    return View(
-        *(field[:, rows] for field in fields), view.depth[rows], None if view.wound is None else view.wound[rows]
-    )
+    wound = None if view.wound is None else view.wound[rows]
+    return View(view.material[:, rows], view.point[:, rows], view.normal[:, rows], view.depth[rows], wound)
 
 
 def _shade_rows(settings: SimulatorSettings, texture: Texture, view: View, lamps: list[Lit], t: float) -> TissueLight:
