@@ -50,7 +50,7 @@ html_css_files = ["endotsr.css"]
 # The whole tree of pages beside every page would take most of the time of a build.
 html_theme_options = {"show_toc_level": 2, "home_page_in_toc": True, "collapse_navigation": True}
 html_theme_options |= {"navbar_persistent": []}  # one search, in the sidebar
-html_sidebars = {"_modules/**": []}
+html_sidebars = {"_modules/**": [], "search": ["navbar-logo.html", "sbt-sidebar-nav.html"]}  # one search a page
 html_show_sphinx = False
 
 MATHJAX_CDN = "https://cdn.jsdelivr.net/npm/mathjax@3/es5/tex-chtml.js"

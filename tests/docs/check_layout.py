@@ -47,9 +47,10 @@ function measure(page, width) {
   if (boxes.length > 1) say("search", boxes.length + " search boxes", 0);
 }
 function widest(root, width) {
-  const wide = [...root.querySelectorAll("body *")].filter((e) => e.getBoundingClientRect().right > width + 1);
-  const last = wide.filter((e) => box(e) === root).pop();
-  return last ? last.tagName.toLowerCase() + "." + last.className : "";
+  const wide = [...root.querySelectorAll("article *, main > *")].filter((e) =>
+    e.getBoundingClientRect().right > width + 1 && box(e) === root);
+  const inner = wide.find((e) => ![...e.children].some((child) => wide.includes(child)));
+  return inner ? inner.tagName.toLowerCase() + " " + inner.textContent.trim().slice(0, 40) : "";
 }
 (async () => {
   for (const page of pages) for (const width of widths) {
