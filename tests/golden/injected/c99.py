@@ -27,8 +27,6 @@ READING = [
         "mask_inverted",
         "reading.c",
         ("tissue += mask[p]", "tissue += !mask[p]"),
-        ("found += mask[row", "found += !mask[row"),
-        ("if (mask[row", "if (!mask[row"),
     ),
     mistake(
         "pixel_corner",
