@@ -26,8 +26,6 @@ from endotsr.sweeps.capacity import usable_cores
 from endotsr.sweeps.execute import FAILED, Outcome, execute
 from endotsr.sweeps.jobs import Job
 
-Client = Future = Any  # of `distributed`
-
 TICK = 0.5  # seconds between two looks at the runs
 PATIENCE = 15.0  # seconds for a scheduler to answer, and for its first worker
 MOST_LOSSES = 3  # times that the data of a run may be lost with all workers that held it
@@ -55,7 +53,7 @@ def cluster_outcomes(
 
 
 def _outcomes(
-    client: Client, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
+    client: Any, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
 ) -> Generator[Outcome | None, None, None]:
     sent, losses = _Sent(client, sequence_of), Counter[str]()
     running = {_submitted(client, job, sent, out, threads): job for job in jobs}
@@ -77,7 +75,7 @@ def _outcomes(
 class _Sent:
     """Sequences that the workers hold, by what they were read from."""
 
-    def __init__(self, client: Client, sequence_of: Callable[[Job], Sequence]) -> None:
+    def __init__(self, client: Any, sequence_of: Callable[[Job], Sequence]) -> None:
         self._client, self._sequence_of = client, sequence_of
         self._found: dict[str, Any] = {}
 
@@ -93,7 +91,7 @@ class _Sent:
         self._found.pop(job.input_key, None)
 
 
-def _submitted(client: Client, job: Job, sent: _Sent, out: Path, threads: int | None) -> Future:
+def _submitted(client: Any, job: Job, sent: _Sent, out: Path, threads: int | None) -> Any:
     on_host = Counter(_host(worker) for worker in client.nthreads())
     key = f"{job.name}-{secrets.token_hex(4)}"
     return client.submit(
@@ -132,7 +130,7 @@ class _Asked:
         return self._file.exists()
 
 
-def _outcome(job: Job, future: Future) -> Outcome:
+def _outcome(job: Job, future: Any) -> Outcome:
     if future.status == "finished":
         return future.result()
     if future.status in ("cancelled", "lost"):
@@ -142,8 +140,8 @@ def _outcome(job: Job, future: Future) -> Outcome:
 
 
 @contextlib.contextmanager
-def _connected(address: str) -> Iterator[Client]:
-    """A client of the scheduler, silent on everything that Dask would log."""
+def _connected(address: str) -> Iterator[Any]:
+    """A `distributed.Client` of the scheduler, silent on everything that Dask would log."""
     try:
         import distributed
     except ImportError:
@@ -163,7 +161,7 @@ def _connected(address: str) -> Iterator[Client]:
             client.close(timeout=5)
 
 
-def _refuse_workers(client: Client, out: Path) -> None:
+def _refuse_workers(client: Any, out: Path) -> None:
     """Raises InputError if there is no worker, or one of another version, with several threads or without the disk."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
