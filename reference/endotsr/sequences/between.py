@@ -86,7 +86,8 @@ def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float,
 
     images, tissue = sequence.images[pair].astype(np.float32) / np.float32(255), sequence.masks[pair]
     seen = moved(tissue, warp_bilinear) > WHOLE
-    image = _mixed(moved(images, warp_cubic), images, seen, seen.all(axis=0) & tissue.all(axis=0), weights)
+    both = seen[0] & seen[1] & tissue[0] & tissue[1]
+    image = _mixed(moved(images, warp_cubic), images, seen, both, weights)
     known = moved(tissue & (sequence.depth[pair] > 0), warp_bilinear) > WHOLE
     depth = _blended(moved(sequence.depth[pair], warp_bilinear), known, weights)
     mask = np.tensordot(weights, seen, 1) > 0
