@@ -5,6 +5,7 @@ of a picture includes sorting, drawing, and waiting until the last pixel is ther
 on this machine alone, because a page without a server cannot hand a time back.
 """
 
+import contextlib
 import json
 import statistics
 import subprocess
@@ -41,10 +42,11 @@ def milliseconds_a_picture(page: Path, longest: float = LONGEST) -> float:
             if self.path == "/wait":  # the browser ends when everything is loaded: not before the answer
                 done.wait(longest)
             known = {"/": WRAPPER.encode(), "/page.html": page.read_bytes()}
-            self.send_response(200 if self.path in known else 404)
-            self.send_header("Content-Type", "text/html; charset=utf-8")
-            self.end_headers()
-            self.wfile.write(known.get(self.path, b""))
+            with contextlib.suppress(BrokenPipeError):  # the browser has ended
+                self.send_response(200 if self.path in known else 404)
+                self.send_header("Content-Type", "text/html; charset=utf-8")
+                self.end_headers()
+                self.wfile.write(known.get(self.path, b""))
 
         def do_POST(self) -> None:
             answers.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
