@@ -91,7 +91,7 @@ def normalised_depth(i, s):
     known = torch.isfinite(prior) & (prior > 0)
     valid = known & i["mask"]
     depth = torch.where(torch.isfinite(depth), depth, torch.zeros_like(depth))
-    if int(valid.sum()) < 10 or float(depth.max()) <= 0:
+    if int(valid.sum()) < 10 or float(depth.detach().max()) <= 0:
         return {"loss": 0 * depth.sum()}
     largest, largest_prior = torch.amax(depth), prior[known].max()
     residual = depth[valid] / largest - prior[valid] / largest_prior
@@ -258,7 +258,7 @@ def main(requests, outputs):
         found = answer(request["operation"], real, request["settings"]) or {}
         (outputs / case).mkdir(parents=True, exist_ok=True)
         for name in set(found) & set(request["outputs"]):
-            np.save(outputs / case / f"{name}.npy", np.ascontiguousarray(found[name]))
+            np.save(outputs / case / f"{name}.npy", np.array(found[name], order="C"))
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ def main(jobs, requests, outputs):
             for name in set(found) & set(request["outputs"]):
                 target = outputs / str(k) / case
                 target.mkdir(parents=True, exist_ok=True)
-                np.save(target / f"{name}.npy", np.ascontiguousarray(found[name]))
+                np.save(target / f"{name}.npy", np.array(found[name], order="C"))
 
 
 if __name__ == "__main__":

@@ -29,5 +29,5 @@ def serve(answer: Answer) -> None:
             continue
         (outputs / case).mkdir(parents=True, exist_ok=True)
         for name in set(found) & set(request["outputs"]):
-            np.save(outputs / case / f"{name}.npy", np.ascontiguousarray(found[name]))
+            np.save(outputs / case / f"{name}.npy", np.array(found[name], order="C"))
     (outputs / "not_ported.txt").write_text("".join(f"{name}\n" for name in sorted(left_out)))
