@@ -1,7 +1,7 @@
 """Where a run is better and where it is worse than optical flow between the frames: by held-out frame, and by pixels.
 
-    python docs/pages/against_flow.py RUN NAME   write docs/results/NAME.json from a finished run, then the tables
-    python docs/pages/against_flow.py NAME       write the tables of the last result again
+    python docs/pages/against_flow.py RUN   write docs/results/against_flow.json from a finished run, then the tables
+    python docs/pages/against_flow.py       write the tables of the last result again
 
 The squared error of the tissue pixels is divided among kinds of pixels; a pixel belongs to the first kind that fits.
 The tables stand in docs/results/README.md between its marks.
@@ -119,13 +119,12 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("run", nargs="?", type=Path)
-    parser.add_argument("name")
     options = parser.parse_args()
-    file = RESULTS / f"{options.name}.json"
+    file = RESULTS / "against_flow.json"
     if options.run:
         write_json(file, measured(options.run))
     write_marked(
-        RESULTS / "README.md", {"table": tables(read_json(file, "docs/pages/against_flow.py RUN NAME"))}, "against_flow"
+        RESULTS / "README.md", {"table": tables(read_json(file, "docs/pages/against_flow.py RUN"))}, "against_flow"
     )
 
 

@@ -24,7 +24,7 @@ def cases() -> list[Spec]:
 
 # ---- mistakes ----
 
-SOURCE, SSIM, DETAIL, DEPTH = "losses.masked_l1", "losses.masked_ssim", "equations.laplacian", "losses.depth"
+SOURCE, SSIM, LAPLACIAN, DEPTH = "losses.masked_l1", "losses.masked_ssim", "equations.laplacian", "losses.depth"
 COUNT = "rendered.shape[0] * int(np.count_nonzero(mask))"
 
 WRONG_PORTS = [
@@ -59,7 +59,7 @@ WRONG_PORTS = [
         "Mean over no pixels",
         "0 / 0; right: a defined value",
         "laplacian masked_l1 masked_ssim",
-        edit(DETAIL, "count) if count else 0.0", "count) if count else np.nan"),
+        edit(LAPLACIAN, "count) if count else 0.0", "count) if count else np.nan"),
         edit(SOURCE, "return 0.0, saved", "return np.nan, saved"),
         edit(SOURCE, "return np.zeros_like(saved.rendered)", "return np.full_like(saved.rendered, np.nan)"),
         edit(SSIM, "return 1.0, saved", "return np.nan, saved"),
@@ -75,7 +75,7 @@ WRONG_PORTS = [
         "a pull between equal images; right: none",
         "laplacian masked_l1",
         edit(
-            DETAIL,
+            LAPLACIAN,
             "sign[x] = np.int8(band > real(0.0)) - np.int8(band < real(0.0))",
             "sign[x] = (1 if band >= real(0.0) else -1) if keep[x] else 0",
         ),
@@ -91,11 +91,11 @@ WRONG_PORTS = [
         edit(SSIM, "seen[i] - wanted[i] if tissue[i] else zero", "seen[i] * tissue[i] - wanted[i]"),
         edit(SSIM, "seen[i] + wanted[i] if tissue[i] else zero", "seen[i] * tissue[i] + wanted[i]"),
         edit(
-            DETAIL,
+            LAPLACIAN,
             "target[x] = d if keep[x] else real(0.0)\n\n\ndef _band",
             "target[x] = d * real(keep[x])\n\n\ndef _band",
         ),
-        edit(DETAIL, "band = band if keep[x] else real(0.0)", "band = band * real(keep[x])"),
+        edit(LAPLACIAN, "band = band if keep[x] else real(0.0)", "band = band * real(keep[x])"),
         edit(DEPTH, "abs(residual) if use[i] else zero", "abs(residual) * use[i]"),
     ),
 ]
