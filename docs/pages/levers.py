@@ -7,7 +7,6 @@ docs/results/levers.json when it ends, and a command that was stopped goes on wi
 stands in docs/results/README.md between its marks; --table writes it again.
 """
 
-import argparse
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from marks import read_json, write_marked
 from scipy import stats
-from trajectories import SCENES, measured
+from trajectories import SCENES, asked, measured
 
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
@@ -75,11 +74,7 @@ def _cell(values: np.ndarray, label: str, digits: int) -> str:
 
 def main() -> None:
     """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--iterations", type=int, default=1500)
-    parser.add_argument("--table", action="store_true")
-    options = parser.parse_args()
+    options = asked(__doc__)
     file = RESULTS / "levers.json"
     about = {"seeds": options.seeds, "iterations": options.iterations}
     result = read_json(file, "docs/pages/levers.py") if file.exists() else {}

@@ -82,13 +82,18 @@ def _over(values: np.ndarray, digits: int) -> str:
     return f"{values.mean():.{digits}f} ± {values.std(ddof=1) if values.size > 1 else 0:.{digits}f}"
 
 
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def asked(purpose: str | None) -> argparse.Namespace:
+    """The options of a command that trains on these scenes; `purpose` is the text of its module."""
+    parser = argparse.ArgumentParser(description=(purpose or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--iterations", type=int, default=1500)
     parser.add_argument("--table", action="store_true")
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    """The command."""
+    options = asked(__doc__)
     file = RESULTS / "trajectories.json"
     if not options.table:
         scenes = {
