@@ -106,12 +106,15 @@ def tables(result: dict[str, Any]) -> str:
         more = (row["model"] - row["flow"]) / sums["flow"]
         share = [f"{row[key] / sums[key]:.1%}".replace("%", " %") for key in ("pixels", "model", "flow")]
         by_kind.append([KINDS[name], *share, f"{more:+.1%}".replace("%", " %")])
+    seen = [row for name, row in result["pixels"].items() if name != "excluded"]
+    ratio = sum(row["model"] for row in seen) / sum(row["flow"] for row in seen) - 1
     head = ["Frame", "motion between its neighbours, px", "model, dB", "flow, dB", "difference, dB"]
     other = ["Tissue pixels", "of the pixels", "of the model's error", "of the error of flow", "model minus flow"]
     return (
         markdown(head, by_frame) + "\n\n" + markdown(other, by_kind) + "\n\n"
         "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
-        f"squared error of flow. {result['sequence']}, {result['date']}."
+        f"squared error of flow. On the pixels that both can read, the squared error of the model is {100 * abs(ratio):.1f} % "
+        f"{'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, {result['date']}."
     )
 
 

@@ -48,6 +48,8 @@ def run_missing(result: dict[str, Any], file: Path) -> None:
 def table(result: dict[str, Any]) -> str:
     """Means over the seeds of `sharp`, and the paired differences of what is taken back with 95 % intervals."""
     rows = []
+    if not result:
+        return "Not measured yet."
     for scene, variants in result["scenes"].items():
         for label, runs in variants.items():
             pairs = [(runs[seed], variants[WHOLE][seed]) for seed in sorted(runs) if seed in variants[WHOLE]]
