@@ -113,8 +113,9 @@ def tables(result: dict[str, Any]) -> str:
     return (
         markdown(head, by_frame) + "\n\n" + markdown(other, by_kind) + "\n\n"
         "PSNR over the tissue. *Model minus flow* is the difference of the squared errors as a fraction of the whole "
-        f"squared error of flow. On the pixels that both can read, the squared error of the model is {100 * abs(ratio):.1f} % "
-        f"{'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, {result['date']}."
+        "squared error of flow. On the pixels that both can read, the squared error of the model is "
+        f"{100 * abs(ratio):.1f} % {'below' if ratio < 0 else 'above'} that of flow. {result['sequence']}, "
+        f"{result['date']}."
     )
 
 
