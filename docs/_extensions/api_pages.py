@@ -28,7 +28,7 @@ GROUPS = (
         ("equations", "splatting", "losses", "kernels"),
     ),
     ("Checks and ports", "Gradients, stored numbers, and the registry of both.", ("gradcheck", "golden", "stages")),
-    ("Time and accuracy", "Measurements of this machine.", ("bench", "tradeoff")),
+    ("Time and accuracy", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps")),
     ("Commands", "The program `endotsr`.", ("cli",)),
 )  # in the order in which a user meets them
 ROLE = re.compile(r"\{([\w:]+)\}(?=`)")
