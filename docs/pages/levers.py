@@ -2,8 +2,8 @@
 
     python docs/pages/levers.py [--seeds 3] [--iterations 1500] [--table]
 
-The scenes, the points and the length are those of docs/pages/trajectories.py. Every run is kept in
-docs/results/levers.json when it ends, and a command that was stopped goes on with the runs that are missing. The table
+The scenes, the points and the length are those of docs/pages/trajectories.py. Every run is kept when it ends, and a
+command that was stopped goes on with the runs that are missing. The result is docs/results/levers.json; the table
 stands in docs/results/README.md between its marks; --table writes it again.
 """
 
@@ -11,6 +11,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+import kept
 import numpy as np
 from marks import read_json, write_marked
 from scipy import stats
@@ -21,6 +22,7 @@ from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 
 RESULTS = Path(__file__).parents[1] / "results"
+FILE = RESULTS / "levers.json"
 WHOLE = "`sharp`"
 TAKEN_BACK: dict[str, dict[str, dict[str, Any]]] = {
     WHOLE: {},
@@ -34,15 +36,25 @@ TAKEN_BACK: dict[str, dict[str, dict[str, Any]]] = {
 SHOWN = (("psnr_tissue", "held-out PSNR tissue, dB", 2), ("scene_units", "trajectory error, mm", 3))
 
 
-def run_missing(result: dict[str, Any], file: Path) -> None:
-    """Train what `result` does not hold yet; the file is written after every run."""
-    for seed in range(result["seeds"]):
-        for scene, settings in SCENES.items():
-            for label, changed in TAKEN_BACK.items():
-                runs = result["scenes"].setdefault(scene, {}).setdefault(label, {})
-                if str(seed) not in runs:
-                    runs[str(seed)] = measured(settings, "sharp", seed, result["iterations"], changed)
-                    write_json(file, result)
+def found(seeds: int, iterations: int) -> dict[str, Any]:
+    """Scene -> label -> seed -> numbers of the run; runs that are kept are not trained again."""
+    about = {"seeds": seeds, "iterations": iterations, "sources": kept.sources("")}
+    runs = {
+        f"{scene}, {label}, seed {seed}": (scene, label, seed)
+        for seed in range(seeds)
+        for scene in SCENES
+        for label in TAKEN_BACK
+    }
+
+    def train(key: str) -> dict[str, float]:
+        scene, label, seed = runs[key]
+        return measured(SCENES[scene], "sharp", seed, iterations, TAKEN_BACK[label])
+
+    answers = kept.measured(FILE, about, runs, train)
+    scenes: dict[str, Any] = {}
+    for key, (scene, label, seed) in runs.items():
+        scenes.setdefault(scene, {}).setdefault(label, {})[str(seed)] = answers[key]
+    return scenes
 
 
 def table(result: dict[str, Any]) -> str:
@@ -52,7 +64,7 @@ def table(result: dict[str, Any]) -> str:
         return "Not measured yet."
     for scene, variants in result["scenes"].items():
         for label, runs in variants.items():
-            pairs = [(runs[seed], variants[WHOLE][seed]) for seed in sorted(runs) if seed in variants[WHOLE]]
+            pairs = [(runs[seed], variants[WHOLE][seed]) for seed in sorted(runs)]
             values = [np.array([[run[key] for run in pair] for pair in pairs]) for key, _, _ in SHOWN]
             cells = [_cell(v, label, digits) for v, (_, _, digits) in zip(values, SHOWN, strict=True)]
             rows.append([scene, label, str(len(pairs)), *cells])
@@ -77,14 +89,12 @@ def _cell(values: np.ndarray, label: str, digits: int) -> str:
 def main() -> None:
     """The command."""
     options = asked(__doc__)
-    file = RESULTS / "levers.json"
-    about = {"seeds": options.seeds, "iterations": options.iterations}
-    result = read_json(file, "docs/pages/levers.py") if file.exists() else {}
     if not options.table:
-        if {key: result.get(key) for key in about} != about:
-            result = {"scenes": {}}
-        result |= about | {"date": date.today().isoformat(), "machine": machine()}
-        run_missing(result, file)
+        about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
+        scenes = found(options.seeds, options.iterations)
+        write_json(FILE, about | {"machine": machine(), "scenes": scenes})
+        kept.finished(FILE)
+    result = read_json(FILE, "docs/pages/levers.py") if FILE.exists() else {}
     write_marked(RESULTS / "README.md", {"table": table(result)}, "levers")
 
 

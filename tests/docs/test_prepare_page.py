@@ -1,6 +1,6 @@
 """docs/guides/prepare.md: its tables are what the committed results say, and every layout has its section."""
 
-import importlib.util
+import importlib
 import json
 from pathlib import Path
 
@@ -15,20 +15,11 @@ SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": 
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
 
 
-def script(name: str):
-    """The module docs/results/NAME.py."""
-    spec = importlib.util.spec_from_file_location(f"results_{name}", ROOT / "docs" / "results" / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_is_what_its_result_says(name):
-    made = script(name)
+    made = importlib.import_module(name)
     if not made.FILE.exists():
-        pytest.skip(f"not measured yet: python docs/results/{name}.py")
+        pytest.skip(f"not measured yet: python docs/pages/{name}.py")
     found = json.loads(made.FILE.read_text(encoding="utf-8"))
     assert made.table(found["rows"] if name == "long_clip" else found) in PAGE.read_text(encoding="utf-8")
 

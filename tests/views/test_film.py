@@ -5,11 +5,12 @@ import pytest
 from PIL import Image
 
 from endotsr.errors import InputError
+from endotsr.evaluation.depth import normalised_depth
 from endotsr.report.figures import EXCLUDED
 from endotsr.sequences.sequence import Frame
 from endotsr.splatting.render import RenderOut
 from endotsr.views.film import check_film, write_film
-from endotsr.views.panels import Scale, normalised_depth, panel, side_by_side
+from endotsr.views.panels import Scale, panel, side_by_side
 from film_reader import read_video
 
 

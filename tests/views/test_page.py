@@ -14,13 +14,13 @@ from browser import browser, dom, drawn
 from frame_rate import milliseconds_a_picture
 
 from endotsr.errors import InputError
+from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.scene import open_scene
 from endotsr.report.figures import bytes_image, depth_picture
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.views.page import check_page, page, write_page
-from endotsr.views.panels import normalised_depth
 from endotsr.views.trajectories import _signed, key_times, packed, trajectories
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))

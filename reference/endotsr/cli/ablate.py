@@ -8,6 +8,7 @@ import msgspec
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import Place, check_place, ended, run_spec
 from endotsr.config import PRESETS, with_iterations
 from endotsr.errors import InputError
@@ -51,7 +52,7 @@ class AblateOptions:
     """keep the model of every run (hundreds of megabytes each at full size)"""
     collect: bool = False
     """train nothing: only write the results of the runs that are finished"""
-    json: Annotated[Path | None, Option("FILE")] = None
+    json: JsonFile = None
     """also write the results there"""
     workers: Annotated[int | None, Option("N")] = None
     """runs at a time (default: as many as cores and free memory allow)"""
@@ -67,7 +68,7 @@ class AblateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.runs.files import refuse_unwritable, write_json
+    from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
     from endotsr.sweeps.ablation_page import ablation_markdown, write_ablation
     from endotsr.sweeps.spec import spec_of
 
@@ -88,7 +89,6 @@ def run(words: list[str]) -> int:
             write_json(options.json, record)
 
     if options.collect:
-        from endotsr.runs.files import refuse_folder
         from endotsr.sweeps.sweep import Inputs, planned
 
         refuse_folder(options.out)

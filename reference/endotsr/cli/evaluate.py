@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.parts.shown import SHOWN, ShownSettings, shown_sequence
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, replace_file, write_json
@@ -34,7 +35,7 @@ class EvaluateOptions:
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """sequence folder, or `simulated`; with RUN: its current location (default: the recorded one)"""
-    json: Annotated[Path | None, Option("FILE")] = None
+    json: JsonFile = None
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE")] = None
     """also write the metrics of every held-out frame as CSV"""
@@ -127,22 +128,16 @@ def evaluate_run(
     source     current place of the sequence; default: the recorded one
     """
     from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.measures import MEASURES, measure_lines, measured
-    from endotsr.evaluation.run import measure_run
+    from endotsr.evaluation.measures import check_measures, measure_lines
+    from endotsr.evaluation.run import measure_folder
     from endotsr.report.run_text import held_out_table
-    from endotsr.runs.model import load_model
-    from endotsr.runs.records import REPORTED
-    from endotsr.runs.sources import run_source, true_positions_of
+    from endotsr.runs.sources import run_source
 
-    for name in measures:
-        if name not in MEASURES:
-            raise InputError(f"--measures {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
-    weights = load_lpips_weights(lpips)
-    remembered, simulator = run_source(folder)
-    model, truth = load_model(folder), true_positions_of(source or remembered, simulator, folder.config(), sequence)
-    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
-    if measures:
-        metrics["measures"] = measured(measures, model, sequence, source or remembered)
+    check_measures(measures, "--measures")
+    weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
+    model, metrics, held_out = measure_folder(
+        folder, sequence, source, weights=weights, published=published, measures=measures
+    )
     _write(folder, model, sequence, metrics, held_out, view)
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):

@@ -35,6 +35,11 @@ class Neighbours(NamedTuple):
     after: int  # frame index
     fraction: float  # position of the time between them, 0 = before, 1 = after
 
+    @property
+    def nearest(self) -> int:
+        """The frame nearest in time; equally near: the earlier one."""
+        return self.after if self.fraction > 0.5 + 1e-9 else self.before  # times i / n are equally far up to rounding
+
 
 def neighbours(sequence: Sequence, index: int) -> Neighbours:
     """The training frames next to frame `index` on both sides (never the frame itself) and the time fraction.
@@ -82,9 +87,7 @@ def temporal_mean_image(sequence: Sequence) -> FloatArray:
 
 def nearest_frame(sequence: Sequence, index: int) -> FloatArray:
     """Copy of the training frame nearest in time; equally near: the earlier one. (3, H, W) float32 in [0, 1]."""
-    near = neighbours(sequence, index)
-    # 1e-9: times such as i / n are equally far only up to rounding
-    return unit_image(sequence, near.after if near.fraction > 0.5 + 1e-9 else near.before)
+    return unit_image(sequence, neighbours(sequence, index).nearest)
 
 
 def two_neighbours(sequence: Sequence, index: int) -> FloatArray:

@@ -18,10 +18,15 @@ from endotsr.splatting.render import RenderOut
 LEAST_OPACITY = 0.5  # of a pixel whose rendered depth counts; below, the render is mostly background
 
 
-def rendered_depth(rendered: RenderOut) -> FloatArray:
-    """Depth of a render divided by its opacity, (H, W) scene units; 0 where the opacity is below 1/2."""
-    seen = rendered.opacity >= LEAST_OPACITY
-    return np.where(seen, rendered.depth / np.where(seen, rendered.opacity, 1), 0)
+def normalised_depth(out: RenderOut, least_opacity: float = 0.0) -> FloatArray:
+    """Depth divided by opacity: the mean depth of what is seen, also where the scene is translucent.
+
+    least_opacity  of a pixel that has a depth
+    returns        (H, W) scene units; 0 = below the least opacity, or no opacity. The rendered depth itself is the sum
+                   over Gaussians with their weights, which approaches 0 where little is opaque
+    """
+    seen = (out.opacity > 0) & (out.opacity >= least_opacity)
+    return np.where(seen, out.depth / np.where(seen, out.opacity, 1), 0).astype(out.depth.dtype)
 
 
 def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut]) -> dict[str, Any]:
@@ -34,7 +39,7 @@ def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut
              the errors are those of the pixels that all rows cover
     """
     makers = {
-        "this model": lambda i: rendered_depth(render(i, sequence.cameras[i])),
+        "this model": lambda i: normalised_depth(render(i, sequence.cameras[i]), LEAST_OPACITY),
         "blend of the neighbouring priors": lambda i: blended_prior(sequence, i),
         "prior of the nearest training frame": lambda i: nearest_prior(sequence, i),
     }
@@ -81,5 +86,4 @@ def blended_prior(sequence: Sequence, index: int) -> FloatArray:
 
 def nearest_prior(sequence: Sequence, index: int) -> FloatArray:
     """The prior of the training frame nearest in time. (H, W) scene units, 0 = none."""
-    near = neighbours(sequence, index)
-    return sequence.depth[near.after if near.fraction > 0.5 + 1e-9 else near.before]
+    return sequence.depth[neighbours(sequence, index).nearest]

@@ -30,6 +30,13 @@ MEASURES: dict[str, Callable[[Model, Sequence, str, RenderView], dict[str, Any]]
 }
 
 
+def check_measures(names: Iterable[str], what: str = "measure") -> None:
+    """Raises InputError for a name that is not in MEASURES; the message begins with `what`."""
+    for name in names:
+        if name not in MEASURES:
+            raise InputError(f"{what} {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
+
+
 def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str) -> dict[str, dict[str, Any]]:
     """The named measurements of a model.
 
@@ -41,12 +48,9 @@ def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str
         time = float(sequence.times[index])
         return render_at(model.gaussians, model.spectral, model.config, camera, time, frames=model.frames)
 
-    found = {}
-    for name in names:
-        if name not in MEASURES:
-            raise InputError(f"measure {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
-        found[name] = MEASURES[name](model, sequence, source, render)
-    return found
+    names = list(names)
+    check_measures(names)
+    return {name: MEASURES[name](model, sequence, source, render) for name in names}
 
 
 def measure_lines(found: dict[str, dict[str, Any]]) -> list[str]:

@@ -13,10 +13,14 @@ import msgspec
 from endotsr.evaluation.baselines import neighbours
 from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.evaluation.measures import measured
 from endotsr.evaluation.trajectories import TruePositions, trajectory_error
 from endotsr.fitting.model import render_at, without
 from endotsr.kernels.arrays import FloatArray
-from endotsr.runs.model import Model
+from endotsr.runs.folder import RunFolder
+from endotsr.runs.model import Model, load_model
+from endotsr.runs.records import REPORTED
+from endotsr.runs.sources import run_source, true_positions_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 
@@ -54,6 +58,28 @@ def measure_run(
     metrics["published"] = list(published)
     metrics["run"] = _about_run(record, model)
     return metrics, held_out
+
+
+def measure_folder(
+    folder: RunFolder,
+    sequence: Sequence,
+    source: str,
+    *,
+    weights: LpipsWeights | None = None,
+    published: tuple[dict[str, Any], ...] = (),
+    measures: tuple[str, ...] = (),
+) -> tuple[Model, dict[str, Any], dict[int, RenderOut]]:
+    """The model of the latest checkpoint of a run, and what `measure_run` returns for it.
+
+    source    where the sequence is now
+    measures  names of `evaluation.measures.MEASURES`: their results are `measures` in metrics.json
+    """
+    model, (_, simulator) = load_model(folder), run_source(folder)
+    truth = true_positions_of(source, simulator, folder.config(), sequence)
+    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
+    if measures:
+        metrics["measures"] = measured(measures, model, sequence, source)
+    return model, metrics, held_out
 
 
 def measure_model(

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.evaluation.depth import LEAST_OPACITY, normalised_depth
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.sources import remembered_cameras
-from endotsr.splatting.camera import Camera, backproject
+from endotsr.splatting.camera import Camera, backproject, project
 
 MOST_VOXELS = 1 << 24
 MOST_VIEWS = 32  # cameras of a moving clip that are fused, evenly chosen
-LEAST_OPACITY = 0.5  # of a pixel whose depth is used
 PIXELS_A_VOXEL = 1.5  # side of a voxel, in pixels at the median depth
 TRUNCATION = 4.0  # voxels in front of and behind the surface
 SLAB = 1 << 20  # voxels that are filled at once
@@ -65,8 +65,7 @@ def surface(scene: MovingScene, time: float, voxel: float | None = None, taken_o
 def depth_view(scene: MovingScene, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> DepthView:
     """Depth divided by opacity, where the scene is opaque enough to have one."""
     out = scene.render(time, camera, taken_out)
-    seen = out.opacity > LEAST_OPACITY
-    return DepthView(camera, np.where(seen, out.depth / np.where(seen, out.opacity, 1), 0), out.colour)
+    return DepthView(camera, normalised_depth(out, LEAST_OPACITY), out.colour)
 
 
 def fused(views: list[DepthView], voxel: float | None = None) -> Mesh:
@@ -144,9 +143,8 @@ def _slabs(grid: Grid) -> Iterator[tuple[slice, FloatArray]]:
 
 def _projected(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """View-space z of points (3, M), and their row and column in the picture as `map_coordinates` counts them."""
-    x, y, z = camera.rotation @ points + np.asarray(camera.translation)[:, None]
-    safe = np.where(z > 0, z, 1)
-    return z, np.stack([y / safe * camera.fy + camera.cy - 0.5, x / safe * camera.fx + camera.cx - 0.5])
+    u, v, z = project(camera, points)
+    return z, np.where(z > 0, np.stack([v, u]) - 0.5, 0)
 
 
 def _looked_up(view: DepthView, points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -78,7 +78,8 @@ class RunFolder:
         """
         refuse_link(self.log)
         with self.log.open("ab") as file:
-            _lock(file, self.path)
+            if not lock_taken(file):
+                raise RunBusy(f"{self.path}: another process trains this run; wait until it ends, or stop it")
             yield
 
     def remove_leftovers(self) -> None:
@@ -93,17 +94,19 @@ class RunFolder:
         write_json(self.path / "run.json", self.record() | entries)
 
 
-def _lock(file: IO[bytes], path: Path) -> None:
+def lock_taken(file: IO[bytes]) -> bool:
+    """Take the lock of an open file: whether no other process holds it. True where there are no locks."""
     try:
         import fcntl
     except ImportError:
-        return
+        return True
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise RunBusy(f"{path}: another process trains this run; wait until it ends, or stop it") from None
+        return False
     except OSError:
-        return
+        return True
+    return True
 
 
 def refuse_existing(path: Path) -> None:

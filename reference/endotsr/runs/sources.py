@@ -31,9 +31,7 @@ ARRAYS = ("images", "masks", "depth", "times")
 def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> Sequence:
     """The whole sequence in memory, fully checked. Raises InputError for anything that cannot be used."""
     if source == SIMULATED:
-        from endotsr.simulator.simulate import simulate
-
-        return _split(simulate(simulated_settings(simulator, config)).sequence, config)
+        return _simulated(simulated_settings(simulator, config), config)
     if source == IN_MEMORY:
         raise InputError("the run was trained on arrays in memory; allowed: the folder that holds the same frames")
     from endotsr.sequences.layouts import read_sequence
@@ -41,24 +39,25 @@ def load_sequence(source: str, config: Config, simulator: SimulatorSettings) -> 
     return read_sequence(Path(source), config.sequence, config.raster.near)
 
 
-def _split(sequence: Sequence, config: Config) -> Sequence:
-    """A simulated sequence with the split of the settings, where the simulator has no setting for it."""
+def _simulated(settings: SimulatorSettings, config: Config) -> Sequence:
+    """The simulated sequence with the split of the sequence settings; with the default one, that of the simulator."""
+    from endotsr.simulator.simulate import simulate
+
     wanted = config.sequence
-    if wanted.split not in ("every_second", "end"):
-        return sequence
-    train, test = split_frames(sequence.count, wanted.split, wanted.block_length)
-    return dataclasses.replace(sequence, train_index=train, test_index=test)
+    if wanted.split == "every_eighth":
+        return simulate(settings).sequence
+    train, test = split_frames(settings.frames, wanted.split, wanted.block_length)  # refused before the work
+    return dataclasses.replace(simulate(settings).sequence, train_index=train, test_index=test)
 
 
 def simulated_settings(simulator: SimulatorSettings, config: Config) -> SimulatorSettings:
-    """The simulator's settings with the scale and the split of the sequence settings."""
+    """The simulator's settings with the scale of the sequence settings."""
     wanted = config.sequence
     if wanted.frames:
         raise InputError("simulated: --frames selects files of a folder; here --simulator.frames N says how many")
     changes = {
         "width": round(simulator.width * wanted.scale),
         "height": round(simulator.height * wanted.scale),
-        "block_length": wanted.block_length if wanted.split == "blocks" else simulator.block_length,
     }
     return checked(msgspec.to_builtins(simulator) | changes, SimulatorSettings, "command line", "simulator.")
 

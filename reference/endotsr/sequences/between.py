@@ -17,11 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
-
-FloatArray = NDArray[np.floating]
-BoolArray = NDArray[np.bool_]
 
 STEPS = 3  # fixed-point steps for v_0 and v_1; smooth flow contracts, and a fourth step moves it by under 0.05 px
 WHOLE = 0.999  # bilinear weight of tissue, or of pixels with a prior depth, above which all four neighbours are

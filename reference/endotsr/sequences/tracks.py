@@ -15,14 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.between import WHOLE, Flows, flows_between
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, backproject, project
 
 OUTSIDE = -1e6  # column and row of a point behind the camera
-BoolArray = NDArray[np.bool_]
-
 CONSISTENT = 0.01  # of the squared lengths of the flows there and back
 TOLERANCE = 0.5  # px^2
 DEPTH_JUMP = 0.1  # of the depth; a larger change between two frames, or from the expected depth, is another surface

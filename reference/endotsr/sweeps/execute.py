@@ -170,22 +170,15 @@ def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
 def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     """metrics.json, pictures and report of a trained run; checkpoints that are not wanted are removed."""
     from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.measures import measured
-    from endotsr.evaluation.run import measure_run
+    from endotsr.evaluation.run import measure_folder
     from endotsr.report.run_files import write_evaluation
-    from endotsr.runs.model import load_model
-    from endotsr.runs.records import REPORTED
-    from endotsr.runs.sources import true_positions_of
 
     if folder.record().get("status") != FINISHED:  # killed between the last checkpoint and this record
         folder.update(status=FINISHED, finished=now())
     if measured_at_the_end(job):
         return
-    model, weights = load_model(folder), load_lpips_weights(job.lpips)
-    truth = true_positions_of(job.source, job.simulator, job.config, sequence)
-    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, (), truth)
-    if job.measures:
-        metrics["measures"] = measured(job.measures, model, sequence, job.source)
+    weights = load_lpips_weights(job.lpips)
+    _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)
     write_evaluation(folder, sequence, metrics, held_out)
     (folder.path / "checkpoint.previous.npz").unlink(missing_ok=True)
     if not job.keep_checkpoints:

@@ -7,9 +7,8 @@ import contextlib
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
 
-from endotsr.runs.folder import RunBusy, RunFolder
+from endotsr.runs.folder import RunBusy, RunFolder, lock_taken
 
 POLL = 0.5  # seconds between two attempts
 PATIENCE = 60.0  # seconds without progress of the holder after which an attempt is given up
@@ -23,7 +22,7 @@ def file_lock(path: Path, message: str = "", *, wait: bool = False) -> Iterator[
     Raises:  RunBusy with `message` if another process holds it and `wait` is False.
     """
     with path.open("ab") as file:
-        while not _taken(file):
+        while not lock_taken(file):
             if not wait:
                 raise RunBusy(message)
             time.sleep(POLL)
@@ -51,17 +50,3 @@ def run_lock(folder: RunFolder, patience: float = PATIENCE) -> Iterator[None]:
                     raise
                 time.sleep(POLL)
         yield
-
-
-def _taken(file: IO[bytes]) -> bool:
-    try:
-        import fcntl
-    except ImportError:
-        return True
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True

@@ -32,7 +32,7 @@ from endotsr.config import (
     with_iterations,
 )
 from endotsr.errors import InputError
-from endotsr.evaluation.measures import MEASURES
+from endotsr.evaluation.measures import check_measures
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.untrusted.json import integer, listed, text
@@ -97,9 +97,7 @@ def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
     seeds = tuple(_seed(value, where) for value in listed(data.get("seeds", [0]), f"{where}: seeds"))
     splits = tuple(_split(word, where) for word in _texts(data.get("splits", []), f"{where}: splits", least=0))
     measures = _texts(data.get("measures", []), f"{where}: measures", least=0)
-    for name in measures:
-        if name not in MEASURES:
-            raise InputError(f"{where}: measures = {name!r} is not allowed; allowed: {', '.join(MEASURES)}")
+    check_measures(measures, f"{where}: measures =")
     for key, values in (("sequences", sequences), ("seeds", seeds), ("splits", splits)):
         if len(set(values)) < len(values) or (key == "seeds" and not values):
             raise InputError(f"{where}: {key}: one is named twice or none at all; allowed: each once")

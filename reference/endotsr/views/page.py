@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.scene import MovingScene
 from endotsr.fitting.model import raster_settings
 from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode_transparent
@@ -22,7 +23,7 @@ from endotsr.runs.files import replace_file
 from endotsr.runs.sources import remembered_cameras
 from endotsr.sequences.sequence import Sequence
 from endotsr.views.cameras import pivot_depth_of
-from endotsr.views.panels import ERROR_SCALE, normalised_depth
+from endotsr.views.panels import ERROR_SCALE
 from endotsr.views.trajectories import header, key_times, packed, trajectories
 
 MOST_KEYS = 128

@@ -35,16 +35,6 @@ class Scale(NamedTuple):
     error: float = ERROR_SCALE
 
 
-def normalised_depth(out: RenderOut) -> FloatArray:
-    """Depth divided by opacity: the mean depth of what is seen, also where the scene is translucent. 0 = no opacity.
-
-    returns   (H, W) scene units. The rendered depth itself is the sum over Gaussians with their weights, which
-              approaches 0 where little is opaque
-    """
-    seen = out.opacity > 0
-    return np.where(seen, out.depth / np.where(seen, out.opacity, 1), 0).astype(out.depth.dtype)
-
-
 def scale_of(depth: FloatArray) -> Scale:
     """The colours of a series, from the depth of its first view."""
     return Scale(*depth_range(depth))

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.files import check_folder_name
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import moments
@@ -25,7 +26,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
 from endotsr.views.film import check_film, write_film
-from endotsr.views.panels import NEEDS_TRUTH, Panel, normalised_depth, scale_of, side_by_side
+from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
 from endotsr.views.plan import Request, View, check_request, views_of
 
 DepthKind = Literal["accumulated", "normalised"]

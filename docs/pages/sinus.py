@@ -1,8 +1,8 @@
 """Train on the real clip with a moving camera, from its own files in one `prepare`, and write the table of the result.
 
-    python docs/results/sinus.py [--data ../shared/data/sinus_endoscopy] [--scale 0.16667] [--iterations 1500]
-    python docs/results/sinus.py --run RUN    write the result of a run that exists
-    python docs/results/sinus.py --table      write the table of the last result again
+    python docs/pages/sinus.py [--data ../shared/data/sinus_endoscopy] [--scale 0.16667] [--iterations 1500]
+    python docs/pages/sinus.py --run RUN    write the result of a run that exists
+    python docs/pages/sinus.py --table      write the table of the last result again
 
 The clip has 35 frames, poses, intrinsics and sparse points of a reconstruction, and one mask of the field of view. Its
 anatomy is rigid; the camera and the light move. The result is docs/results/sinus.json; the table stands in
@@ -11,28 +11,20 @@ docs/guides/prepare.md.
 
 import argparse
 import json
-import sys
 import tempfile
 from datetime import date
 from pathlib import Path
 from typing import Any
 
-from endotsr.cli.main import main as endotsr
+from any_clip import said
+from marks import read_json, write_marked
+
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 
-FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "pages"))
-from marks import write_marked  # noqa: E402
-
-FILE, PAGE = FOLDER / "sinus.json", FOLDER.parent / "guides" / "prepare.md"
+DOCS = Path(__file__).parents[1]
+FILE, PAGE = DOCS / "results" / "sinus.json", DOCS / "guides" / "prepare.md"
 COLUMNS = (("psnr_tissue", "PSNR tissue, dB", 2), ("psnr_full", "PSNR full, dB", 2), ("ssim_full", "SSIM full", 4))
-
-
-def said(*words: object) -> None:
-    """Run a command. Raises SystemExit if it fails."""
-    if endotsr([str(word) for word in words]) != 0:
-        raise SystemExit(f"failed: endotsr {' '.join(map(str, words))}")
 
 
 def result(run: Path) -> dict[str, Any]:
@@ -76,7 +68,7 @@ def table(found: dict[str, Any]) -> str:
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", type=Path, default=FOLDER.parents[2] / "shared" / "data" / "sinus_endoscopy")
+    parser.add_argument("--data", type=Path, default=DOCS.parents[1] / "shared" / "data" / "sinus_endoscopy")
     parser.add_argument("--scale", type=float, default=1 / 6)
     parser.add_argument("--preset", default="paper")
     parser.add_argument("--iterations", type=int, default=1500)
@@ -91,7 +83,7 @@ def main() -> None:
             said("prepare", options.data, "--out", clip, "--scale", options.scale)
             said("train", clip, "--out", run, "--preset", options.preset, "--iterations", options.iterations)
             write_json(FILE, result(run))
-    write_marked(PAGE, {"rows": table(json.loads(FILE.read_text(encoding="utf-8")))}, "sinus")
+    write_marked(PAGE, {"rows": table(read_json(FILE, "python docs/pages/sinus.py"))}, "sinus")
 
 
 if __name__ == "__main__":

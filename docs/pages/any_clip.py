@@ -1,8 +1,8 @@
 """One simulated scene through two layouts, one command a step, and the table of what the way costs.
 
-    python docs/results/any_clip.py                measure, a few minutes on two cores
-    python docs/results/any_clip.py --ways stereo  measure one way again
-    python docs/results/any_clip.py --table        write the table of the last result again
+    python docs/pages/any_clip.py                measure, a few minutes on two cores
+    python docs/pages/any_clip.py --ways stereo  measure one way again
+    python docs/pages/any_clip.py --table        write the table of the last result again
 
 A moving camera with an instrument is written as an EndoNeRF folder without any loss, and as raw recordings in the
 layout of StereoMIS. A recording goes through prepare, depth, check, train and render. Two ways stand between the ends:
@@ -13,7 +13,6 @@ The result is docs/results/any_clip.json; the table stands in docs/guides/prepar
 
 import argparse
 import json
-import sys
 import tempfile
 from collections.abc import Iterator
 from datetime import date
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from marks import read_json, write_marked
 
 from endotsr.cli.main import main as endotsr
 from endotsr.opencv import read_png
@@ -29,11 +29,8 @@ from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 from endotsr.sequences.common import open_common
 
-FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "pages"))
-from marks import write_marked  # noqa: E402
-
-FILE, PAGE = FOLDER / "any_clip.json", FOLDER.parent / "guides" / "prepare.md"
+DOCS = Path(__file__).parents[1]
+FILE, PAGE = DOCS / "results" / "any_clip.json", DOCS / "guides" / "prepare.md"
 SCENE = ["moving-camera", "--instrument.on", "--width", "240", "--height", "192", "--frames", "25"]
 TRAINING = ["--preset", "demo", "--iterations", "600"]
 DEPTH = ["--nearest", "25", "--farthest", "120"]
@@ -167,7 +164,7 @@ def main() -> None:
             said("simulate", *SCENE, "--out", Path(root) / "clean")
             ways |= {way: measured(Path(root), way) for way in options.ways}
         write_json(FILE, about | {"date": date.today().isoformat(), "machine": machine(), "ways": ways})
-    write_marked(PAGE, {"ways": table(json.loads(FILE.read_text(encoding="utf-8")))}, "any_clip")
+    write_marked(PAGE, {"ways": table(read_json(FILE, "python docs/pages/any_clip.py"))}, "any_clip")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Measure the memory of a training on a long clip, which repeats the frames of a short one.
 
-    python docs/results/long_clip.py --frames 2000 --memory 4     the memory of an 8 GB machine: half of it is the limit
-    python docs/results/long_clip.py --frames 300 --memory 0.6    the same proportions, in a few minutes
-    python docs/results/long_clip.py --table                      write the table of the measured clips again
+    python docs/pages/long_clip.py --frames 2000 --memory 4     the memory of an 8 GB machine: half of it is the limit
+    python docs/pages/long_clip.py --frames 300 --memory 0.6    the same proportions, in a few minutes
+    python docs/pages/long_clip.py --table                      write the table of the measured clips again
 
 The frames of the source (--source, by default ../shared/data/endonerf_pulling) are linked again and again into a folder
 of temporary files. The training has as many iterations as training frames, so that every frame is used about once, and
@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from marks import write_marked
 
 from endotsr.opencv import read_png
 from endotsr.report.tables import markdown
@@ -30,11 +31,8 @@ from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 from endotsr.sequences.checks.cost import estimated_cost
 
-FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "pages"))
-from marks import write_marked  # noqa: E402
-
-FILE, PAGE = FOLDER / "long_clip.json", FOLDER.parent / "guides" / "prepare.md"
+DOCS = Path(__file__).parents[1]
+FILE, PAGE = DOCS / "results" / "long_clip.json", DOCS / "guides" / "prepare.md"
 NAMES = ("images", "masks", "depth")
 
 
@@ -115,7 +113,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--source", type=Path, default=FOLDER.parents[2] / "shared" / "data" / "endonerf_pulling")
+    parser.add_argument("--source", type=Path, default=DOCS.parents[1] / "shared" / "data" / "endonerf_pulling")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--memory", type=float, default=0.6)
     parser.add_argument("--preset", default="paper")

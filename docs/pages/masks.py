@@ -1,7 +1,7 @@
 """Measure the proposed masks against true ones, and write the table of docs/guides/prepare.md.
 
-    python docs/results/masks.py [--data ../shared/data/endonerf_pulling]      measure, a minute or two
-    python docs/results/masks.py --table                                       write the table of the last result again
+    python docs/pages/masks.py [--data ../shared/data/endonerf_pulling]      measure, a minute or two
+    python docs/pages/masks.py --table                                       write the table of the last result again
 
 Simulated scenes know which pixels an instrument covers, margin included (`gt_masks`). The masks `gt_masks` of the real
 clip are polygons drawn by hand with a wide border. The intersection over union is the mean over the frames in which the
@@ -9,14 +9,13 @@ true mask is not empty; a scene without instruments should give no proposal. The
 """
 
 import argparse
-import json
-import sys
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
+from marks import read_json, write_marked
 
 from endotsr.kernels.arrays import BoolArray
 from endotsr.opencv import read_png
@@ -28,11 +27,8 @@ from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.scenes import named_scene
 from endotsr.simulator.settings import SimulatorSettings
 
-FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "pages"))
-from marks import write_marked  # noqa: E402
-
-FILE, PAGE = FOLDER / "masks.json", FOLDER.parent / "guides" / "prepare.md"
+DOCS = Path(__file__).parents[1]
+FILE, PAGE = DOCS / "results" / "masks.json", DOCS / "guides" / "prepare.md"
 SIZE = {"width": 320, "height": 256, "frames": 17}
 SCENES = ("pulling", "cutting", "smoke", "everything", "moving-camera", "breathing", "still")
 
@@ -82,7 +78,7 @@ def table(result: dict[str, Any]) -> str:
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", type=Path, default=FOLDER.parents[2] / "shared" / "data" / "endonerf_pulling")
+    parser.add_argument("--data", type=Path, default=DOCS.parents[1] / "shared" / "data" / "endonerf_pulling")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
     if not options.table:
@@ -90,7 +86,7 @@ def main() -> None:
         if options.data.is_dir():
             clips[f"`{options.data.name}`"] = measured(*real(options.data))
         write_json(FILE, {"date": date.today().isoformat(), "clips": clips})
-    write_marked(PAGE, {"iou": table(json.loads(FILE.read_text(encoding="utf-8")))}, "masks")
+    write_marked(PAGE, {"iou": table(read_json(FILE, "python docs/pages/masks.py"))}, "masks")
 
 
 if __name__ == "__main__":
