@@ -12,7 +12,7 @@ import numpy as np
 from endotsr.effects.clip import Clip
 from endotsr.effects.noise import Noise
 from endotsr.effects.verdict import Curve, Verdict
-from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.sequence import Sequence
 
 BLUR = np.log(2.0)  # fall of the log sharpness below the median frame
@@ -44,6 +44,14 @@ def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Verd
     blur = _verdict("blur", clear, max(BLUR, spread), "natural logarithm", "fall of the log sharpness below its"
                     " neighbours", clip, {"log sharpness": series.sharpness})  # fmt: skip
     return smoke, blur
+
+
+def clear_frames(clip: Clip, *verdicts: Verdict) -> BoolArray:
+    """(m,) False for the training frames that a verdict of `clarity_verdicts` names."""
+    clear = np.ones(clip.count, bool)
+    for verdict in verdicts:
+        clear[verdict.details["frames"]] = False
+    return clear
 
 
 def _measures(image: np.ndarray, mask: np.ndarray, sigma: float) -> tuple[float, float]:

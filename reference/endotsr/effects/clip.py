@@ -29,16 +29,12 @@ class Clip(NamedTuple):
     cameras: list[Camera]  # m, at full size
     shrink: int  # side of the averaged squares, pixels of the full size
     frames: int  # of the whole sequence, held-out frames included
+    reference: int  # the training frame that the others are compared with
 
     @property
     def count(self) -> int:
         """Number of training frames m."""
         return len(self.images)
-
-    @property
-    def reference(self) -> int:
-        """The training frame that the others are compared with: the middle one."""
-        return self.count // 2
 
     @property
     def luminance(self) -> NDArray[np.float32]:
@@ -47,7 +43,7 @@ class Clip(NamedTuple):
 
 
 def training_clip(sequence: Sequence) -> Clip:
-    """The training frames of a sequence, averaged to at most `WIDEST` columns."""
+    """The training frames of a sequence, averaged to at most `WIDEST` columns; the middle one is the reference."""
     index, side = sequence.train_index, -(-sequence.width // WIDEST)
     height, width = sequence.height // side, sequence.width // side
     rows, columns = height * side, width * side
@@ -59,7 +55,18 @@ def training_clip(sequence: Sequence) -> Clip:
     masks = np.logical_and.reduce(whole, axis=(2, 4))
     depth = sequence.depth[index][:, side // 2 : rows : side, side // 2 : columns : side]
     cameras = [sequence.cameras[i] for i in index]
-    return Clip(images, masks, depth, sequence.times[index], cameras, side, sequence.count)
+    return Clip(images, masks, depth, sequence.times[index], cameras, side, sequence.count, len(index) // 2)
+
+
+def with_clear_reference(clip: Clip, clear: BoolArray) -> Clip:
+    """The clip with the clear frame nearest the middle as its reference; as it is if no frame is clear.
+
+    clear   (m,) False for training frames that blur or smoke spoils
+    """
+    frames = np.flatnonzero(clear)
+    if not frames.size:
+        return clip
+    return clip._replace(reference=int(frames[np.abs(frames - clip.count // 2).argmin()]))
 
 
 def tile_means(values: FloatArray, weights: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -1,9 +1,13 @@
-"""All tests of a clip, in order: the noise, then motion, on which the test of light depends, then the others."""
+"""All tests of a clip, in order: noise, then blur and smoke, then motion, then the others.
+
+Every test measures in units of the noise. Frames that blur or smoke spoils are no reference and show no motion. The
+test of light depends on whether there is motion.
+"""
 
 from typing import Any, NamedTuple
 
-from endotsr.effects.clarity import clarity_verdicts
-from endotsr.effects.clip import Clip, training_clip
+from endotsr.effects.clarity import clarity_verdicts, clear_frames
+from endotsr.effects.clip import Clip, training_clip, with_clear_reference
 from endotsr.effects.depth_quality import depth_verdict
 from endotsr.effects.motion import motion_verdict
 from endotsr.effects.noise import Noise, estimate_noise
@@ -11,7 +15,7 @@ from endotsr.effects.periodic import Line
 from endotsr.effects.photometric import photometric_verdict
 from endotsr.effects.seen import camera_verdict, highlight_verdict, occluder_verdict
 from endotsr.effects.topology import topology_verdict
-from endotsr.effects.tracks import make_tracks
+from endotsr.effects.tracks import make_tracks, without_frames
 from endotsr.effects.verdict import Verdict, verdict_record
 from endotsr.effects.views import view_verdict
 from endotsr.errors import InputError
@@ -49,14 +53,17 @@ def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Ins
         raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames a second")
     clip = training_clip(sequence)
     noise = estimate_noise(sequence, clip)
+    smoke, blur = clarity_verdicts(sequence, clip, noise)
+    clear = clear_frames(clip, smoke, blur)
+    clip = with_clear_reference(clip, clear)
     tracks = make_tracks(clip, noise)
-    motion, lines = motion_verdict(sequence, clip, tracks, noise)
+    motion, lines = motion_verdict(sequence, clip, without_frames(tracks, ~clear), noise)
     camera = camera_verdict(sequence, clip)
     found = [
         motion, camera, view_verdict(sequence, clip), occluder_verdict(sequence, clip),
         photometric_verdict(clip, tracks, noise, motion.present or camera.present),
-        highlight_verdict(sequence, clip), depth_verdict(sequence, clip), topology_verdict(clip, tracks, noise),
-        *clarity_verdicts(sequence, clip, noise),
+        highlight_verdict(sequence, clip), depth_verdict(sequence, clip),
+        topology_verdict(clip, clear, noise, camera.present), smoke, blur,
     ]  # fmt: skip
     by_name = {verdict.effect: verdict for verdict in found}
     return Inspection(clip, noise, {name: by_name[name] for name in EFFECTS}, lines, frame_rate)

@@ -32,7 +32,7 @@ SWEEPS: dict[str, tuple[float, ...]] = {
     "highlights": (0.25, 0.5, 1.0, 2.0),
     "camera_motion": (0.001, 0.1, 1.0, 3.0, 9.0),
     "depth_errors": (0.02, 0.05, 0.1, 0.5),
-    "cutting": (1.0, 2.0, 4.0),
+    "cutting": (0.25, 0.5, 1.0, 2.0, 4.0),
 }
 STRENGTH = {"highlights": "strength", "depth_errors": "sigma", "cutting": "opening"}
 """The setting that is swept; otherwise `amplitude`."""

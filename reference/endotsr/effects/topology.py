@@ -1,62 +1,148 @@
-"""Change of topology, as by cutting: tissue that appears or vanishes and that no motion of the reference explains.
+"""Change of topology, as by cutting: tissue that only one end of the clip shows.
 
-After the frames are moved onto the reference along their flow, a difference of local structure that stays (in a sixth
-of the frames or more) marks tissue that the reference does not show, or shows and has lost. A tile counts when the
-correlation of its local structure with the reference falls below `LOST`, while it is textured enough to correlate.
-This is the least certain of the tests: a strong highlight that wanders, or flow that fails, gives the same picture.
+Two frames are references: the first and the last one. Frames of both ends are moved onto each of them along their
+flow, and their local structure is correlated with that of the reference around every pixel. A pixel counts as lost
+when the frames of its own end agree with the reference and no frame of the other end does. A slit, its wound or blood
+leaves a connected region of such pixels; flow that fails here and there leaves single ones, which are dropped.
+
+A cut that closes again before the clip ends is not found. Tissue that is covered for good (blood, a clip, a swab) is
+found as well: either way the clip shows tissue that cannot be reached by moving what its other end shows. A camera
+that moves brings tissue into view, which looks the same: the answer is then left open.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.effects.clip import TILE, Clip, tile_map, tile_means
+from endotsr.effects.clip import LUMINANCE, Clip
 from endotsr.effects.noise import Noise
-from endotsr.effects.tracks import Tracks, normalised
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.tracks import inside, normalised
+from endotsr.effects.verdict import Map, Verdict
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.opencv import dense_flow, warp_bilinear
 
-LOST = 0.3  # correlation below which a tile no longer shows the tissue of the reference
-TEXTURED = 0.8  # least correlation that a tile must reach in its best tenth of the frames
-STAYS = 1.0 / 6.0  # fraction of the frames
-TILE_FRACTION = 0.02
-LEAST_TILES = 2
-
-
-def topology_verdict(clip: Clip, tracks: Tracks, noise: Noise) -> Verdict:
-    """Whether tissue of the reference is lost for good."""
-    scores = structure_scores(clip, tracks, noise)
-    known = np.isfinite(scores)
-    best = np.nanpercentile(np.where(known, scores, -1.0), 90, axis=0)
-    textured = (best > TEXTURED) & tracks.usable
-    lost = known & (scores < LOST)
-    fraction = lost.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    gone = textured & (fraction >= STAYS)
-    needed = max(LEAST_TILES, TILE_FRACTION * int(textured.sum()))
-    statistic = float(gone.sum()) / needed
-    present = statistic >= 1.0
-    reason = (
-        f"In {int(gone.sum())} of {int(textured.sum())} tiles the structure of the reference is lost and stays lost."
-        if present
-        else "The structure of the reference frame is found again in every frame that shows the place."
-    )
-    course = (lost & textured).sum(axis=1) / max(int(textured.sum()), 1)
-    return Verdict("topology change", present, "suspected" if present else "none", statistic, 1.0,
-                   "times the threshold", "tiles that lose their structure in a sixth of the frames, over 2 %",
-                   0.05, reason, {"tiles": int(gone.sum())},
-                   Curve("tiles without the structure of the reference, percent", "time", clip.times,
-                         {"lost": 100 * course}),
-                   Map("structure lost, percent of the frames",
-                       tile_map(np.where(textured, 100 * fraction, np.nan), *clip.images.shape[2:])))  # fmt: skip
+WINDOW = 2.5  # Gaussian radius of the local structure, working pixels
+AGREES = 0.8  # least median correlation of the frames of the same end
+LOST = 0.5  # correlation that no frame of the other end reaches
+LEAST_FRAMES = 3  # of either end
+END_FRACTION = 1.0 / 8.0  # of the frames, that belong to an end
+LEAST_REGION = 0.003  # of the tissue that is seen from both ends
+LEAST_COMMON = 0.7  # of the agreeing pixels must be found again; below it the two ends do not show the same tissue
 
 
-def structure_scores(clip: Clip, tracks: Tracks, noise: Noise) -> np.ndarray:
-    """Correlation (m, T) of the local structure of the aligned frames with that of the reference; nan if not seen."""
-    sigma, reference = float(noise.working.mean()), clip.reference
-    grey = np.einsum("c,mchw->mhw", np.array([0.299, 0.587, 0.114], np.float32), tracks.aligned)
-    rows = []
-    for k in range(clip.count):
-        common = tracks.valid[k]
-        a = normalised(grey[reference], common, sigma).astype(np.float32) - 128
-        b = normalised(grey[k], common, sigma).astype(np.float32) - 128
-        (ab, aa, bb), count = tile_means(np.stack([a * b, a * a, b * b]), common)
-        with np.errstate(all="ignore"):
-            rows.append(np.where(count >= 0.9 * TILE * TILE, ab / np.sqrt(aa * bb), np.nan))
-    return np.array(rows)
+class End(NamedTuple):
+    """What one end of the clip shows and the other one does not, on the grid of its outermost frame."""
+
+    agrees: BoolArray  # (h, w) the frames of this end agree with its outermost one
+    seen: BoolArray  # (h, w) the other end shows the place
+    lost: BoolArray  # (h, w) agrees and seen, but no frame of the other end shows this structure
+    region: int  # pixels of the largest connected region of `lost`
+
+    @property
+    def common(self) -> float:
+        """Fraction of the agreeing pixels that the other end shows again."""
+        candidates = int((self.agrees & self.seen).sum())
+        return 1.0 - int(self.lost.sum()) / candidates if candidates else 0.0
+
+
+def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> Verdict:
+    """Whether tissue appears or vanishes for good.
+
+    clear    (m,) False for training frames that blur or smoke spoils; they are not compared
+    returns  kind "none", "suspected", or "unknown": the ends have too little tissue in common, or the camera moves
+    """
+    frames = np.flatnonzero(clear)
+    count = max(LEAST_FRAMES, round(END_FRACTION * len(frames)))
+    if len(frames) < 2 * count:
+        return _verdict("unknown", 0.0, clip, None, "There are too few clear frames to compare")
+    first, last = frames[:count], frames[-count:][::-1]
+    ends = [_end(clip, first, last, noise), _end(clip, last, first, noise)]
+    needed = [LEAST_REGION * max(int((end.agrees & end.seen).sum()), 1) for end in ends]
+    statistic, end = max(((e.region / n, e) for e, n in zip(ends, needed)), key=lambda pair: pair[0])
+    if min(e.common for e in ends) < LEAST_COMMON:
+        return _verdict("unknown", statistic, clip, end, "The first and the last frames have little tissue in common")
+    if camera_moves and statistic >= 1.0:
+        return _verdict("unknown", statistic, clip, end, "The camera moves, which may bring tissue into view")
+    return _verdict("suspected" if statistic >= 1.0 else "none", statistic, clip, end)
+
+
+def _end(clip: Clip, near: np.ndarray, far: np.ndarray, noise: Noise) -> End:
+    """Compare the frames of both ends with the outermost frame of the near one."""
+    reference, others = int(near[0]), near[1:]
+    with np.errstate(all="ignore"):
+        own = np.nan_to_num(_median([local_correlation(clip, reference, int(k), noise) for k in others]), nan=-1.0)
+        best = np.fmax.reduce([local_correlation(clip, reference, int(k), noise) for k in far])
+    agrees, seen = own > AGREES, np.isfinite(best)
+    lost = _without_single_pixels(agrees & seen & (best < LOST))
+    return End(agrees, seen, lost, _largest_region(lost))
+
+
+def _median(rows: list[FloatArray]) -> FloatArray:
+    """The median over the frames that see a pixel; nan where none does."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # "All-NaN slice": that is an answer here
+        return np.nanmedian(np.array(rows), axis=0)
+
+
+def local_correlation(clip: Clip, reference: int, other: int, noise: Noise) -> FloatArray:
+    """Correlation (h, w) of the structure around each pixel of a frame with that of another frame moved onto it.
+
+    In [-1, 1]; nan where either frame does not show tissue, or the flow leads out of the picture.
+    """
+    sigma = float(noise.working.mean())
+    grey = [np.einsum("c,chw->hw", LUMINANCE, clip.images[k]) for k in (reference, other)]
+    common = clip.masks[reference] & clip.masks[other]
+    start, end = (normalised(g, common, sigma) for g in grey)
+    flow = dense_flow(start, end, "dis")
+    seen = common & inside(flow) & (warp_bilinear(clip.masks[other].astype(np.float32), flow) > 0.999)
+    moved = warp_bilinear(end.astype(np.float32)[None], flow)[0]
+    return np.where(seen, _correlation(start.astype(np.float32) - 128, moved - 128, seen), np.nan)
+
+
+def _correlation(a: FloatArray, b: FloatArray, seen: BoolArray) -> FloatArray:
+    """Normalised correlation under a Gaussian window over the seen pixels."""
+    from scipy.ndimage import gaussian_filter
+
+    weight = seen.astype(np.float32)
+
+    def mean(values: FloatArray) -> FloatArray:
+        return gaussian_filter(values * weight, WINDOW) / total
+
+    total = np.maximum(gaussian_filter(weight, WINDOW), 1e-3)
+    mean_a, mean_b = mean(a), mean(b)
+    variance_a, variance_b = mean(a * a) - mean_a**2, mean(b * b) - mean_b**2
+    # variances below one grey level squared are those of rounding
+    return (mean(a * b) - mean_a * mean_b) / np.sqrt(np.maximum(variance_a, 1.0) * np.maximum(variance_b, 1.0))
+
+
+def _without_single_pixels(lost: BoolArray) -> BoolArray:
+    from scipy.ndimage import binary_opening
+
+    return binary_opening(lost, np.ones((3, 3), bool))
+
+
+def _largest_region(lost: BoolArray) -> int:
+    from scipy.ndimage import label
+
+    return int(np.bincount(label(lost)[0].ravel())[1:].max(initial=0))
+
+
+def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> Verdict:
+    """The answer; `why` says what leaves it open."""
+    pixels = 0 if end is None else end.region * clip.shrink**2
+    reason = {
+        "unknown": f"{why}; no change is assumed.",
+        "none": "The first frames show all tissue of the last ones, and the other way round.",
+        "suspected": f"One end of the clip shows a region of {pixels} pixels that the other end does not.",
+    }[kind]
+    picture = np.full(clip.images.shape[2:], np.nan) if end is None else _picture(end)
+    return Verdict("topology change", kind == "suspected", kind, statistic, 1.0, "times the threshold",
+                   "largest region that only one end of the clip shows, over 0.3 % of the tissue", 0.05, reason,
+                   {"pixels": pixels}, None, Map("tissue that only one end shows", picture))  # fmt: skip
+
+
+def _picture(end: End) -> FloatArray:
+    """1 where tissue is lost, 0 where it is found again, nan where nothing can be said."""
+    return np.where(end.agrees & end.seen, end.lost.astype(float), np.nan)

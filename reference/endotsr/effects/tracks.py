@@ -58,6 +58,13 @@ def make_tracks(clip: Clip, noise: Noise) -> Tracks:
     return Tracks(np.array(flow), np.array(valid), stacked, usable & np.isfinite(null), null, np.array(aligned))
 
 
+def without_frames(tracks: Tracks, spoiled: BoolArray) -> Tracks:
+    """The tracks with some frames (m,) not seen; tiles that too few of the other frames see are dropped."""
+    tiles = np.where(spoiled[:, None, None], np.nan, tracks.tiles)
+    seen = np.isfinite(tiles[:, 0]).sum(axis=0) >= VISIBLE_FRAMES * max(int((~spoiled).sum()), 1)
+    return tracks._replace(tiles=tiles, usable=seen & np.isfinite(tracks.null))
+
+
 def inside(flow: FloatArray) -> BoolArray:
     """(h, w) True where the flow (2, h, w) leads to a place inside the picture."""
     height, width = flow.shape[1:]
