@@ -1,7 +1,8 @@
 """Measure what `endotsr inspect` finds and what `--effects auto` saves, and write the tables of docs/effects.md.
 
     python docs/pages/effects.py detect [SEEDS [FIRST]]      simulated clips: detections, false positives
-    python docs/pages/effects.py train [SEEDS [SCENE ...]]   held-out PSNR and time, `auto` against `everything`
+    python docs/pages/effects.py train [SEEDS [NAME ...]]    held-out PSNR and time, `auto` against `everything`;
+                                                             NAME is a scene (none = all) or an EndoNeRF folder
     python docs/pages/effects.py truth [SEEDS [ITERATIONS]]  errors against the truth, leakage between light and motion
     python docs/pages/effects.py real FOLDER ...             verdicts on EndoNeRF folders and on `sinus_endoscopy`
     python docs/pages/effects.py                             write the page from docs/results
@@ -33,7 +34,7 @@ FILES = {
     "detect": "effects_detect.json", "train": "effects_train.json", "real": "effects_real.json",
     "truth": "effects_truth.json", "bench": "bench_effects.json",
 }  # fmt: skip
-SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS = 5, 40, 24, 400
+SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 5, 40, 24, 400, 1000
 SCENES = {
     "still": ("noise",),
     "breathing": ("noise", "breathing"),
@@ -63,14 +64,17 @@ def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
 
 
 def train(seeds: int, names: list[str]) -> dict[str, Any]:
-    """Every named scene (none = all) with both settings: tissue PSNR, processor time, numbers of a Gaussian.
+    """Every named scene (none = all) and folder with both settings: tissue PSNR, processor time, size of a Gaussian.
 
-    Raises: InputError for a name that is not in SCENES.
+    Raises: InputError for a name that is neither in SCENES nor a folder.
     """
-    unknown = [name for name in names if name not in SCENES]
+    folders = {Path(name).name: Path(name) for name in names if Path(name).is_dir()}
+    scenes = [name for name in names if Path(name).name not in folders] or list(SCENES)
+    unknown = [name for name in scenes if name not in SCENES]
     if unknown:
-        raise InputError(f"scene {unknown[0]!r} is not allowed; allowed: {', '.join(SCENES)}")
-    pairs = {f"{name} {seed}": (name, seed) for seed in range(seeds) for name in names or SCENES}
+        raise InputError(f"scene {unknown[0]!r} is not allowed; allowed: {', '.join(SCENES)}, or a folder")
+    every = {name: None for name in scenes} | folders
+    pairs = {f"{name} {seed}": (name, seed) for seed in range(seeds) for name in every}
     ready: list[bool] = []
 
     def measure(key: str) -> dict[str, Any]:
@@ -78,14 +82,26 @@ def train(seeds: int, names: list[str]) -> dict[str, Any]:
             _load_kernels()
             ready.append(True)
         name, seed = pairs[key]
-        found = _pair(_clip(name, seed), seed)
+        folder = every[name]
+        found = _pair(_clip(name, seed), seed, ITERATIONS) if folder is None else _real_pair(folder, seed)
         print(key, found, flush=True)
         return found
 
-    about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS}
+    about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS, "real_iterations": REAL_ITERATIONS}
     answers = kept.measured(RESULTS / FILES["train"], about | {"sources": kept.sources("")}, pairs, measure)
-    scenes = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in names or SCENES}
-    return {"seeds": seeds, **about, "scenes": scenes}
+    found = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in every}
+    return {"seeds": seeds, **about, "scenes": found, "real": list(folders)}
+
+
+def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
+    """Both settings on a real clip at half size."""
+    import msgspec
+
+    from endotsr.config import DEMO
+    from endotsr.sequences.endonerf import read_endonerf
+
+    sequence = read_endonerf(folder, msgspec.structs.replace(DEMO.sequence, scale=0.5), DEMO.raster.near)
+    return _pair(sequence, seed, REAL_ITERATIONS)
 
 
 def _clip(name: str, seed: int) -> Any:
@@ -105,14 +121,14 @@ def _load_kernels() -> None:
     fit(_clip("everything", 0), make_config("demo", iterations=20, training={"threads": 1}), on_message=print)
 
 
-def _pair(sequence: Any, seed: int) -> dict[str, Any]:
+def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
     """Both settings on one clip."""
     from endotsr.api import make_config
     from endotsr.api import train as fit
     from endotsr.effects.auto import planned_settings
     from endotsr.effects.savings import numbers_of_a_gaussian
 
-    everything = make_config("demo", iterations=ITERATIONS, training={"seed": seed, "threads": 1})
+    everything = make_config("demo", iterations=iterations, training={"seed": seed, "threads": 1})
     began = time.process_time()
     auto, lines, _ = planned_settings(sequence, everything)
     found: dict[str, Any] = {"inspect_s": time.process_time() - began, "changes": lines[1:]}

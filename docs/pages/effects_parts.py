@@ -102,6 +102,9 @@ def training(result: dict[str, Any]) -> str:
         f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
         f"the training ({machine(result)})."
     )
+    if result["real"]:
+        names = ", ".join(f"`{name}`" for name in result["real"])
+        note += f" Real, at half size with {result['real_iterations']} iterations: {names}."
     return f"{markdown(heads, rows)}\n\n{note}"
 
 

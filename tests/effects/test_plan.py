@@ -49,6 +49,15 @@ def test_motion_without_a_rate_keeps_the_deformation_alone():
     assert config.model.deformation and not config.model.spectral_motion
 
 
+def test_tracked_motion_keeps_its_carrier():
+    """B15 stores the motion along flow in the coefficients of the Fourier translation, whether or not it has a rate."""
+    tracked = with_setting(PAPER, "initialisation.motion", "flow")
+    plan, config = planned("noise", "pull", frames=40, config=tracked)
+    assert config.model.spectral_motion
+    assert "flow" in dict(plan.kept)["model.spectral_motion"]
+    assert not planned("noise", config=tracked)[1].model.spectral_motion  # without motion there is nothing to carry
+
+
 def test_fewer_harmonics_keep_the_step_of_the_displayed_colour():
     """One Adam step of all 16 coefficients along their signs, seen from one pixel, against one of the first alone."""
     from endotsr.effects.views import harmonic_design, harmonic_sizes

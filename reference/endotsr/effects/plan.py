@@ -64,7 +64,7 @@ def make_plan(inspection: Inspection, config: Config, explicit: frozenset[str] =
     dictionary = carried(inspection, config)
     wanted: list[tuple[str, Any, str, tuple[str, ...]]] = [
         ("model.deformation", motion.present, motion.reason, ("motion",)),
-        ("model.spectral_motion", _periodic(inspection, dictionary), _about_rates(inspection, dictionary), ("motion",)),
+        ("model.spectral_motion", *_spectral_motion(inspection, dictionary, config), ("motion",)),
         ("model.appearance", light.present, light.reason, ("photometric",)),
         ("model.exposure", light.present, light.reason, ("photometric",)),
         ("model.harmonics_degree", *_degree(inspection, config), ("view change", "motion")),
@@ -169,11 +169,14 @@ def _periodic(inspection: Inspection, dictionary: Dictionary) -> bool:
     return any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
 
 
-def _about_rates(inspection: Inspection, dictionary: Dictionary) -> str:
+def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
+    """Whether the Fourier translation is called for: by a rate, or by any motion if it carries tracked motion (B15)."""
     motion = inspection.verdicts["motion"]
+    if motion.present and config.initialisation.motion != "none":
+        return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."
     if not inspection.lines or _periodic(inspection, dictionary):
-        return motion.reason
-    return f"The rates found lie above the {dictionary.frequency_max:g} cycles that the stamps can carry."
+        return _periodic(inspection, dictionary), motion.reason
+    return False, f"The rates found lie above the {dictionary.frequency_max:g} cycles that the stamps can carry."
 
 
 def _remarks(inspection: Inspection) -> tuple[str, ...]:

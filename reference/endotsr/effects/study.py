@@ -18,7 +18,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import SimulatedSequence, simulate
 
-FIRST_SEED = 100
+FIRST_SEED = 200
 FOUND = (*EFFECTS, "periodic motion")
 MOTIONS = ("breathing", "pulsation", "pull")
 LIGHTS = ("exposure", "brightening")

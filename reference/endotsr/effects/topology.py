@@ -10,7 +10,7 @@ found as well: either way the clip shows tissue that cannot be reached by moving
 that moves brings tissue into view, which looks the same: the answer is then left open.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -126,7 +126,8 @@ def _without_single_pixels(lost: BoolArray) -> BoolArray:
 def _largest_region(lost: BoolArray) -> int:
     from scipy.ndimage import label
 
-    return int(np.bincount(label(lost)[0].ravel())[1:].max(initial=0))
+    numbers, _ = cast(tuple[np.ndarray, int], label(lost))
+    return int(np.bincount(numbers.ravel())[1:].max(initial=0))
 
 
 def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> Verdict:
