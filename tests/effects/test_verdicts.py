@@ -138,6 +138,7 @@ def test_confidence_is_half_at_the_threshold_and_grows_on_both_sides():
     assert verdict.confidence == 0.5
     assert verdict._replace(statistic=4.0).confidence == verdict._replace(statistic=1.0).confidence == 0.875
     assert verdict._replace(statistic=0.0, false_positive_rate=0.0).confidence == 1.0
+    assert verdict._replace(statistic=4.0, kind="unknown").confidence == 0.5
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])

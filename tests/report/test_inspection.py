@@ -17,7 +17,7 @@ from report.test_report import Reader, without_pictures
 @pytest.fixture
 def found() -> tuple[Inspection, Plan]:
     clip = Clip(np.full((3, 3, 16, 32), 0.5, np.float32), np.ones((3, 16, 32), bool), np.ones((3, 16, 32), np.float32),
-                np.arange(3) / 4, [], 1, 4)  # fmt: skip
+                np.arange(3) / 4, [], 1, 4, 1)  # fmt: skip
     curve = Curve("flow, px", "time", np.arange(3) / 4, {"one": np.arange(3.0), "two": np.ones(3)}, 0.5)
     values = np.full((16, 32), 2.0)
     values[:4] = np.nan
@@ -35,6 +35,14 @@ def found() -> tuple[Inspection, Plan]:
     plan = Plan(changes, (("model.deformation", "It <moves>."),), ("Remark.",), Dictionary(8, 16.0, 16, 10.0, report),
                 0.05, 0.07)  # fmt: skip
     return Inspection(clip, noise, verdicts, [Line(5.0, 2, 0.9, 1e-9, 0.8)], 20.0), plan
+
+
+def test_headline_separates_what_was_found_from_what_is_open(found):
+    inspection, plan = found
+    for kind, said in (("suspected", "Found: motion, occluders."), ("unknown", "Found: motion. Left open: occluders.")):
+        verdict = inspection.verdicts["occluders"]._replace(present=True, kind=kind)
+        changed = inspection._replace(verdicts=inspection.verdicts | {"occluders": verdict})
+        assert said in Reader(inspection_html("clip", changed, plan)).words
 
 
 def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found, tmp_path):

@@ -45,6 +45,7 @@ def test_html_escapes_heads_and_keeps_cells():
 def test_units_and_sentences_in_html():
     text = html_table(["name", "PSNR, dB", "why"], [["x", "1", "<b>a sentence</b> that is too long for one line"]])
     assert "PSNR,\u00a0dB" in text and '<td class="words"><b>' in text and "<td>1</td>" in text
+    assert '<th scope="col" class=words>why</th>' in text and '<th scope="col">name</th>' in text
 
 
 def test_few_columns_stand_below_the_name_of_their_row_on_a_telephone():

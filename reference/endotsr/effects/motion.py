@@ -13,7 +13,7 @@ from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line, spectral_lines
 from endotsr.effects.rigid import fit_rigid
 from endotsr.effects.tracks import Tracks, filled_tiles
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.verdict import UNKNOWN, Curve, Map, Verdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
@@ -40,7 +40,7 @@ def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks, noise: Noise)
     ratio = np.where(moving.usable, size / limit, 0.0)
     needed = max(LEAST_TILES, round(TILE_FRACTION * int(moving.usable.sum())))
     if int(moving.usable.sum()) < needed:
-        return _verdict("unknown", 1.0, clip, moving, size, [], clip.count), []
+        return _verdict(UNKNOWN, 1.0, clip, moving, size, [], clip.count), []
     statistic = float(np.sort(ratio)[-needed])
     if statistic < 1.0:
         return _verdict("none", statistic, clip, moving, size, [], 0), []
@@ -88,7 +88,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
     largest = float(size[tracks.usable].max(initial=0.0))
     rates = ", ".join(f"{line.cycles:.2g}" for line in lines)
     reason = {
-        "unknown": "Too few tiles of tissue are seen to tell; motion is assumed.",
+        UNKNOWN: "Too few tiles of tissue are seen to tell; motion is assumed.",
         "none": f"No tile moves by more than noise would show ({statistic:.2f} of the threshold).",
         "rigid": f"Tissue moves by up to {largest:.2g} px (RMS), all of it along one affine map of the picture.",
         "periodic": f"Tissue moves by up to {largest:.2g} px (RMS), with {rates} cycles per sequence.",

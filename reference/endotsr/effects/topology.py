@@ -17,7 +17,7 @@ import numpy as np
 from endotsr.effects.clip import LUMINANCE, Clip
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import inside, normalised
-from endotsr.effects.verdict import Map, Verdict
+from endotsr.effects.verdict import UNKNOWN, Map, Verdict
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import dense_flow, warp_bilinear
 
@@ -49,20 +49,20 @@ def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: b
     """Whether tissue appears or vanishes for good.
 
     clear    (m,) False for training frames that blur or smoke spoils; they are not compared
-    returns  kind "none", "suspected", or "unknown": the ends have too little tissue in common, or the camera moves
+    returns  kind "none", "suspected", or UNKNOWN: the ends have too little tissue in common, or the camera moves
     """
     frames = np.flatnonzero(clear)
     count = max(LEAST_FRAMES, round(END_FRACTION * len(frames)))
     if len(frames) < 2 * count:
-        return _verdict("unknown", 0.0, clip, None, "There are too few clear frames to compare")
+        return _verdict(UNKNOWN, 0.0, clip, None, "There are too few clear frames to compare")
     first, last = frames[:count], frames[-count:][::-1]
     ends = [_end(clip, first, last, noise), _end(clip, last, first, noise)]
     needed = [LEAST_REGION * max(int((end.agrees & end.seen).sum()), 1) for end in ends]
     statistic, end = max(((e.region / n, e) for e, n in zip(ends, needed)), key=lambda pair: pair[0])
     if min(e.common for e in ends) < LEAST_COMMON:
-        return _verdict("unknown", statistic, clip, end, "The first and the last frames have little tissue in common")
+        return _verdict(UNKNOWN, statistic, clip, end, "The first and the last frames have little tissue in common")
     if camera_moves and statistic >= 1.0:
-        return _verdict("unknown", statistic, clip, end, "The camera moves, which may bring tissue into view")
+        return _verdict(UNKNOWN, statistic, clip, end, "The camera moves, which may bring tissue into view")
     return _verdict("suspected" if statistic >= 1.0 else "none", statistic, clip, end)
 
 
@@ -120,7 +120,7 @@ def _correlation(a: FloatArray, b: FloatArray, seen: BoolArray) -> FloatArray:
 def _without_single_pixels(lost: BoolArray) -> BoolArray:
     from scipy.ndimage import binary_opening
 
-    return binary_opening(lost, np.ones((3, 3), bool))
+    return np.asarray(binary_opening(lost, np.ones((3, 3), bool)), bool)
 
 
 def _largest_region(lost: BoolArray) -> int:
@@ -134,7 +134,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str 
     """The answer; `why` says what leaves it open."""
     pixels = 0 if end is None else end.region * clip.shrink**2
     reason = {
-        "unknown": f"{why}; no change is assumed.",
+        UNKNOWN: f"{why}; no change is assumed.",
         "none": "The first frames show all tissue of the last ones, and the other way round.",
         "suspected": f"One end of the clip shows a region of {pixels} pixels that the other end does not.",
     }[kind]

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 from endotsr.kernels.arrays import FloatArray
 
+UNKNOWN = "unknown"  # kind of a verdict that the clip does not allow
+
 
 class Curve(NamedTuple):
     """A quantity over time or frequency."""
@@ -44,8 +46,11 @@ class Verdict(NamedTuple):
     def confidence(self) -> float:
         """0.5 at the threshold, towards 1 on either side: 1 - (smaller / larger)^2 / 2 of statistic and threshold.
 
-        A measure of the distance from the threshold, not a probability; 1 where the answer is a fact.
+        A measure of the distance from the threshold, not a probability; 1 where the answer is a fact, and 0.5 where the
+        kind is "unknown".
         """
+        if self.kind == UNKNOWN:
+            return 0.5
         if self.false_positive_rate == 0.0:
             return 1.0
         small, large = sorted((abs(self.statistic), abs(self.threshold)))

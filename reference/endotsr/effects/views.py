@@ -9,7 +9,7 @@ than half a grey level. A fixed camera sees every resting point from one directi
 import numpy as np
 
 from endotsr.effects.clip import Clip
-from endotsr.effects.verdict import Verdict
+from endotsr.effects.verdict import UNKNOWN, Verdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.sequences.sequence import Sequence
@@ -32,7 +32,7 @@ def view_verdict(sequence: Sequence, clip: Clip) -> Verdict:
                        {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     directions = view_directions(clip)
     if not len(directions):
-        return Verdict("view change", True, "unknown", LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
+        return Verdict("view change", True, UNKNOWN, LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
                        "Without depth the view directions are not known; every degree is assumed.",
                        {"degree": HIGHEST, "changes": [LEAST_CHANGE] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     changes = [float(np.median([band_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from endotsr.effects.inspect import Inspection
 from endotsr.effects.plan import Plan
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.verdict import UNKNOWN, Curve, Map, Verdict
 from endotsr.report import curves, figures, parts, tables
 from endotsr.report.style import Theme
 from endotsr.runs.files import replace_file
@@ -68,8 +68,11 @@ def _value(value: Any) -> str:
 
 
 def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
-    present = [v.effect for v in inspection.verdicts.values() if v.kind not in SMALL]
+    verdicts = inspection.verdicts.values()
+    present = [v.effect for v in verdicts if v.present and v.kind not in (UNKNOWN, *SMALL)]
     found = f"Found: {', '.join(present)}." if present else "Nothing was found beyond still tissue."
+    unknown = [v.effect for v in verdicts if v.kind == UNKNOWN]
+    found += f" Left open: {', '.join(unknown)}." if unknown else ""
     cards = [
         (f"{255 * inspection.noise.level:.2f}", "grey levels", "noise, standard deviation"),
         (str(inspection.clip.count), "", f"training frames of {inspection.clip.frames}"),

@@ -127,7 +127,7 @@ font-variant-numeric:tabular-nums}
 table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;padding:.6rem .9rem 0}
 th,td{padding:.5rem .9rem;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}
-tbody th,td.words{white-space:normal}td.words{text-align:left;min-width:11rem}
+tbody th,td.words{white-space:normal}.words{text-align:left}td.words{min-width:11rem}
 h1,h2,p,dt{overflow-wrap:anywhere}
 thead th{color:var(--soft);font-weight:600;font-size:.8rem;vertical-align:bottom;white-space:normal}
 th:first-child{text-align:left;position:sticky;left:0;background:var(--panel)}

@@ -36,10 +36,13 @@ def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([body[0], "|" + "---|" * len(columns), *body[1:]])
 
 
+def _is_sentence(content: str) -> bool:
+    return len(re.sub("<[^>]*>", "", content)) > LONGEST_VALUE
+
+
 def _cell(content: str) -> str:
-    """A cell; one with a sentence in it breaks its lines."""
-    words = len(re.sub("<[^>]*>", "", content)) > LONGEST_VALUE
-    return f'<td class="words">{content}</td>' if words else f"<td>{content}</td>"
+    """A cell; one with a sentence in it breaks its lines and begins at the left."""
+    return f'<td class="words">{content}</td>' if _is_sentence(content) else f"<td>{content}</td>"
 
 
 def unbroken(name: str) -> str:
@@ -60,10 +63,15 @@ def html_table(
     classes            class of each row; "" or no entry = none
     """
     names = list(columns)
-    head = "".join(f'<th scope="col">{html.escape(unbroken(column))}</th>' for column in names)
+    lines = [list(row) for row in rows]
+    wordy = {i for line in lines for i, cell in enumerate(line) if i and _is_sentence(cell)}
+    head = "".join(
+        f'<th scope="col"{" class=words" if i in wordy else ""}>{html.escape(unbroken(column))}</th>'
+        for i, column in enumerate(names)
+    )
     kinds = list(classes)
     body = []
-    for position, (first, *rest) in enumerate(rows):
+    for position, (first, *rest) in enumerate(lines):
         kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
         body.append(f'<tr{kind}><th scope="row">{first}</th>{"".join(map(_cell, rest))}</tr>')
     title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
