@@ -42,6 +42,18 @@ def test_rates_of_the_paper_preset():
     assert (rates["opacity_logit"], rates["log_scale"], rates["quaternion"]) == (0.05, 0.005, 0.001)
 
 
+def test_exposure_has_a_rate_only_where_the_model_has_it_and_decays_like_the_position():
+    config = changed("model", exposure=True)
+    start, last = (learning_rates(i, config) for i in (0, 6000))
+    assert start["exposure_log_gain"] == start["exposure_bias"] == config.optimiser.exposure > 0
+    assert (
+        last["exposure_log_gain"]
+        == last["exposure_bias"]
+        == pytest.approx(config.optimiser.exposure * config.optimiser.final_factor)
+    )
+    assert not {"exposure_log_gain", "exposure_bias"} & set(learning_rates(0, PAPER))
+
+
 def test_residuals_start_after_the_activation_with_the_rates_of_the_paper():
     assert not schedules.residuals_active(3000, PAPER)
     assert schedules.residuals_active(3001, PAPER)

@@ -68,15 +68,17 @@ def lit_by_second(settings: SimulatorSettings, view: View, blocker: Blocker | No
     return Lit(diffuse, received, _half_way(view, towards, eye))
 
 
-def mirrored(settings: SimulatorSettings, lit: Lit, normal: FloatArray, slopes: FloatArray) -> FloatArray:
-    """The highlights of a lamp, (H, W): strength received (n'.half)^exponent.
-
-    slopes   (2, H, W) of the fine relief, which turn the normal n to n'
-    """
+def bent_normal(normal: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Unit normals n' (3, H, W) of the wet surface: those of the sheet, turned by slopes (2, H, W) of its relief."""
     bent = normal.copy()
     bent[0] += slopes[0]
     bent[1] += slopes[1]
     bent /= np.sqrt((bent**2).sum(axis=0))
+    return bent
+
+
+def mirrored(settings: SimulatorSettings, lit: Lit, bent: FloatArray) -> FloatArray:
+    """The highlights of a lamp, (H, W): strength received (n'.half)^exponent, with n' of `bent_normal`."""
     mirror = np.maximum((bent * lit.half).sum(axis=0), 0.0) ** settings.highlights.exponent
     return settings.highlights.strength * lit.received * mirror
 

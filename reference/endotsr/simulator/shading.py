@@ -9,7 +9,7 @@ import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.bleeding import with_blood
-from endotsr.simulator.lamps import Blocker, Lit, lit_by_endoscope, lit_by_second, mirrored
+from endotsr.simulator.lamps import Blocker, Lit, bent_normal, lit_by_endoscope, lit_by_second, mirrored
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.surface import gaussian_weight
 from endotsr.simulator.texture import BLOCK_ROWS, Texture, sample
@@ -73,9 +73,10 @@ def _shade_rows(settings: SimulatorSettings, texture: Texture, view: View, lamps
         light = light * _brightening(settings, view.material, t)
     if not settings.highlights.on:
         return TissueLight(light, None)
-    highlight = mirrored(settings, lamps[0], view.normal, maps[3:])
+    bent = bent_normal(view.normal, maps[3:])
+    highlight = mirrored(settings, lamps[0], bent)
     for lamp in lamps[1:]:
-        highlight = highlight + mirrored(settings, lamp, view.normal, maps[3:])
+        highlight = highlight + mirrored(settings, lamp, bent)
     return TissueLight(light + highlight, highlight)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.jit import jit
 from endotsr.simulator.settings import SimulatorSettings
 
 FLESH = np.array([0.62, 0.20, 0.15])  # linear reflectances
@@ -25,7 +26,7 @@ SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit norm
 class Texture(NamedTuple):
     """Maps over material coordinates, sampled bilinearly. Outside, the border value holds."""
 
-    values: NDArray[np.float32]  # (5, rows, columns) linear RGB reflectance, relief slope by a and by b
+    values: NDArray[np.float32]  # (rows, columns, 5) linear RGB reflectance, relief slope by a and by b
     origin: tuple[float, float]  # material coordinates (a, b) of texel [0, 0], mm
     step: tuple[float, float]  # mm per texel along a and b
 
@@ -41,7 +42,7 @@ def make_texture(settings: SimulatorSettings) -> Texture:
     rng = np.random.default_rng([settings.seed, 1])
     colour = _colour(a, b, rng)
     slope_a, slope_b = _fine_relief(a, b, rng)
-    values = np.concatenate([colour, slope_a[None], slope_b[None]]).astype(np.float32)
+    values = np.stack([*colour, slope_a, slope_b], axis=2).astype(np.float32)
     return Texture(values, (float(a[0]), float(b[0])), (float(a[1] - a[0]), float(b[1] - b[0])))
 
 
@@ -52,26 +53,31 @@ def half_extent(settings: SimulatorSettings) -> tuple[float, float]:
 
 
 def sample(texture: Texture, material: FloatArray) -> FloatArray:
-    """All five maps at material coordinates (2, H, W): (5, H, W) float64."""
-    found = np.empty((5, *material.shape[1:]))
-    for top in range(0, material.shape[1], BLOCK_ROWS):  # rows that stay in the processor's cache
-        found[:, top : top + BLOCK_ROWS] = _sample_rows(texture, material[:, top : top + BLOCK_ROWS])
+    """All five maps at material coordinates (2, H, W), bilinear: (5, H, W) float64. NaN counts as the first texel."""
+    found = np.empty((texture.values.shape[2], *material.shape[1:]))
+    sample_kernel(texture.values, texture.origin, texture.step, np.ascontiguousarray(material), found)
     return found
 
 
-def _sample_rows(texture: Texture, material: FloatArray) -> list[FloatArray]:
-    rows, columns = texture.values.shape[1:]
-    x = np.clip((material[0] - texture.origin[0]) / texture.step[0], 0, columns - 1.001)
-    y = np.clip((material[1] - texture.origin[1]) / texture.step[1], 0, rows - 1.001)
-    left, top = x.astype(np.intp), y.astype(np.intp)
-    across, down = x - left, y - top
-    near_a, near_b, corner = 1 - across, 1 - down, top * columns + left
-    found = []
-    for texels in texture.values.reshape(5, -1):
-        upper = texels.take(corner) * near_a + texels.take(corner + 1) * across
-        lower = texels.take(corner + columns) * near_a + texels.take(corner + columns + 1) * across
-        found.append(upper * near_b + lower * down)
-    return found
+def _sample_kernel(
+    values: FloatArray, origin: tuple[float, float], step: tuple[float, float], material: FloatArray, out: FloatArray
+) -> None:
+    """Fill `out` pixel by pixel. Compiled, because a picture with motion blur samples the maps a dozen times."""
+    rows, columns, maps = values.shape
+    for i in range(material.shape[1]):
+        for j in range(material.shape[2]):
+            x, y = (material[0, i, j] - origin[0]) / step[0], (material[1, i, j] - origin[1]) / step[1]
+            x, y = x if x > 0.0 else 0.0, y if y > 0.0 else 0.0
+            x, y = min(x, columns - 1.001), min(y, rows - 1.001)
+            left, top = int(x), int(y)
+            across, down = x - left, y - top
+            for k in range(maps):
+                upper = values[top, left, k] * (1 - across) + values[top, left + 1, k] * across
+                lower = values[top + 1, left, k] * (1 - across) + values[top + 1, left + 1, k] * across
+                out[k, i, j] = upper * (1 - down) + lower * down
+
+
+sample_kernel = jit(_sample_kernel)
 
 
 def _colour(a: FloatArray, b: FloatArray, rng: np.random.Generator) -> FloatArray:
