@@ -1,16 +1,36 @@
-"""The picture of docs/guides/simulate.md, made by `python docs/pages/simulate.py`: the named scenes, one a row."""
+"""The picture and the times of docs/guides/simulate.md.
 
+    python docs/pages/simulate.py          the named scenes, one a row
+    python docs/pages/simulate.py times    measure how long a frame of each scene takes, and write the table
+
+Time is processor time on one core, for a frame with its right picture and its truth, files included; the median of
+`FRAMES` frames from the middle of the clip, where every effect of a scene has begun.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
+from effects_parts import machine
+from marks import write_marked
 
+from endotsr.bench.suite import dated
 from endotsr.opencv import write_png
+from endotsr.report.tables import markdown
+from endotsr.runs.files import write_json
+from endotsr.simulator.folder import write_sequence
 from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.scenes import SCENES, named_scene
 
-PICTURE = Path(__file__).parents[1] / "results" / "simulated_scenes.png"
+DOCS = Path(__file__).parents[1]
+PAGE, FILE, PICTURE = DOCS / "guides" / "simulate.md", DOCS / "results" / "simulate.json", "simulated_scenes.png"
 SIZE = {"width": 120, "height": 96, "frames": 3}
+FRAMES = 16
 
 
 def row(name: str) -> np.ndarray:
@@ -20,5 +40,33 @@ def row(name: str) -> np.ndarray:
     return np.concatenate(frames, axis=1)
 
 
+def times() -> dict[str, Any]:
+    """Seconds of processor time a frame of every named scene at its full size, and the time before the first frame."""
+    return {"frames": FRAMES, "scenes": {name: _seconds(name) for name in SCENES}}
+
+
+def _seconds(name: str) -> dict[str, float]:
+    settings = msgspec.structs.replace(named_scene(name), frames=FRAMES)
+    stamps = [time.process_time()]
+    with tempfile.TemporaryDirectory() as folder:
+        write_sequence(Path(folder), settings, name, lambda: stamps.append(time.process_time()))
+    steps = np.diff(stamps)
+    return {"frame": statistics.median(steps[FRAMES // 2 :]), "start": float(steps[0])}
+
+
+def table(result: dict[str, Any]) -> str:
+    """Seconds a frame by scene."""
+    rows = [(f"`{name}`", f"{x['frame']:.2f} s") for name, x in result["scenes"].items()]
+    note = f"Processor time on one core, right picture, truth and files included ({machine(result)})."
+    return f"{markdown(('Scene', 'A frame of 640x512'), rows)}\n\n{note}"
+
+
 if __name__ == "__main__":
-    write_png(PICTURE, np.concatenate([row(name) for name in SCENES]))
+    if sys.argv[1:] == ["times"]:
+        measured = dated(times())
+        write_json(FILE, measured)
+        write_marked(PAGE, {"times": table(measured)}, "simulate")
+    elif not sys.argv[1:]:
+        write_png(DOCS / "results" / PICTURE, np.concatenate([row(name) for name in SCENES]))
+    else:
+        sys.exit(__doc__)
