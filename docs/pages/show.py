@@ -80,11 +80,12 @@ def table(result: dict[str, Any]) -> str:
     rows = [(name, f"{x['seconds']:.1f} s", f"{x['mb']:.1f} MB") for name, x in result["commands"].items()]
     page = result["page"]
     slim = result["commands"]["slim model"]["mb"] / result["checkpoint_mb"]
+    size = f"{result['width']}x{result['height']}"
     note = (
-        f"A run of {result['gaussians']} Gaussians on {result['frames']} frames of {result['width']}x{result['height']}, "
-        f"whose checkpoint has {result['checkpoint_mb']:.0f} MB; the slim model is {slim:.0%} of it. A headless browser that draws with the "
-        f"processor needs {page['milliseconds']:.0f} ms a picture of the page, and its picture has {page['psnr']:.1f} dB "
-        f"against the reference renderer ({machine(result)})."
+        f"A run of {result['gaussians']} Gaussians on {result['frames']} frames of {size}, whose checkpoint has "
+        f"{result['checkpoint_mb']:.0f} MB; the slim model is {slim:.0%} of it. A headless browser that draws with the "
+        f"processor needs {page['milliseconds']:.0f} ms a picture of the page, and its picture has {page['psnr']:.1f} "
+        f"dB against the reference renderer ({machine(result)})."
     )
     return f"{markdown(('Written', 'Time', 'Size'), rows)}\n\n{note}"
 

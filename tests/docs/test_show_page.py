@@ -17,5 +17,5 @@ def test_table_is_what_the_measurement_says():
 
 
 def test_it_wants_one_run():
-    with pytest.raises(SystemExit, match="show.py RUN"):
+    with pytest.raises(SystemExit, match="RUN"):
         made.main([])
