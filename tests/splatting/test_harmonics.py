@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from endotsr.config import ModelConfig
 from endotsr.fitting.model import scene_at, spectral_from
+from endotsr.kernels.groups import GROUP
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import camera_centre
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
@@ -67,6 +68,16 @@ def test_bands_above_the_active_degree_are_not_read(degree):
     if degree < 3:
         with pytest.raises(ValueError, match="coefficients"):
             harmonics_forward(h[: (degree + 1) ** 2], None, position, np.zeros(3), degree + 1)
+
+
+@pytest.mark.parametrize("count", [GROUP - 1, 2 * GROUP + 3])
+def test_gradients_above_the_active_degree_are_zero_whatever_the_memory_held(count, monkeypatch):
+    """Every group of Gaussians writes its own zeros: new arrays hold NaN here, and none is left."""
+    h, position = np.full((16, 3, count), 0.1), np.ones((3, count))
+    _, saved = harmonics_forward(h, None, position, np.zeros(3), 1)
+    monkeypatch.setattr(np, "empty_like", lambda array: np.full_like(array, np.nan))
+    back = harmonics_reverse(np.ones((3, count)), saved)
+    assert (back.d_harmonics[4:] == 0).all() and np.isfinite(back.d_harmonics).all()
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
