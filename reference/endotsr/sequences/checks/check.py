@@ -18,7 +18,7 @@ from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.cost import Cost, estimated_cost
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts, depth_findings, inverted_finding
-from endotsr.sequences.checks.findings import Finding, worst_first
+from endotsr.sequences.checks.findings import Finding, finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
@@ -58,13 +58,12 @@ class _Pass:
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
 
-    def tried(self, make: Callable[[], T], code: str, where: object, remedy: str, frame: int | None = None) -> T | None:
+    def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
         """The value, or None and a refusal."""
         try:
             return make()
         except InputError as error:
-            why = "a training refuses it"
-            self.findings.append(Finding("refusal", code, str(where), frame, " ".join(str(error).split()), why, remedy))
+            self.findings.append(finding(code, where, " ".join(str(error).split()), frame))
             return None
 
 
@@ -90,7 +89,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
     usual = float(np.median([fact.median for fact in run.depth if fact.median] or [0.0]))
     if size:
         facts |= {"width": size[1], "height": size[0]}
-        cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file, "mend the poses")
+        cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file)
         if cameras:
             run.findings += camera_findings(cameras, usual, str(parts.camera_file))
         facts["cost"] = _cost(parts, size, config, run)._asdict()
@@ -101,10 +100,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
 def _pairing(parts: Parts, run: _Pass) -> None:
     for other in (parts.masks, parts.depth, parts.right):
         if other:
-            where = other[0].parent
-            run.tried(
-                lambda other=other: check_pairing(parts.images, other), "pairing", where, "supply or delete the file"
-            )
+            run.tried(lambda other=other: check_pairing(parts.images, other), "pairing", other[0].parent)
 
 
 def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
@@ -113,8 +109,7 @@ def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
     sampled = set(np.linspace(0, len(parts.images) - 1, min(SAMPLED, len(parts.images))).astype(int).tolist())
     size = None
     for i, file in enumerate(parts.images):
-        again = "copy or export the file again"
-        picture = run.tried(lambda file=file: colour_picture(read_picture(file), file), "picture", file, again, i)
+        picture = run.tried(lambda file=file: colour_picture(read_picture(file), file), "picture", file, i)
         if picture is None:
             continue
         size = size or picture.shape[:2]
@@ -140,19 +135,19 @@ def _paired(images: list[Path], files: list[Path]) -> list[Path | None]:
 
 def _other_size(file: Path, i: int, shape: tuple[int, ...], size: tuple[int, ...]) -> Finding:
     what = f"{shape[1]}x{shape[0]} pixels, the first picture has {size[1]}x{size[0]}"
-    return Finding("refusal", "size", str(file), i, what, "all files of a sequence have one size", "export it again")
+    return finding("size", file, what, i)
 
 
 def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, ...]) -> NDArray[np.bool_] | None:
     if file is None:
         return None
-    plane = run.tried(lambda: grey_plane(read_picture(file), file), "mask", file, "export the mask again", i)
+    plane = run.tried(lambda: grey_plane(read_picture(file), file), "mask", file, i)
     if plane is None or plane.shape != size:
         if plane is not None:
             run.findings.append(_other_size(file, i, plane.shape, size))
         return None
     read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
-    return run.tried(read, "mask-values", file, "store two values", i)
+    return run.tried(read, "mask-values", file, i)
 
 
 def _depth(
@@ -160,13 +155,13 @@ def _depth(
 ) -> NDArray[np.float32] | None:
     if file is None:
         return None
-    stored = run.tried(lambda: read_plane(file), "depth-file", file, "export the depth again", i)
+    stored = run.tried(lambda: read_plane(file), "depth-file", file, i)
     if stored is None:
         return None
     if stored.shape != size:
         run.findings.append(_other_size(file, i, stored.shape, size))
         return None
-    depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, "store lengths", i)
+    depth = run.tried(lambda: depth_plane(stored, parts.depth_scale, file), "depth-values", file, i)
     if depth is None:
         return None
     run.depth.append(depth_facts(file.name, depth, stored, tissue))
@@ -185,7 +180,7 @@ def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, 
     """The depth of the first frame against the disparity of its stereo pair."""
     from endotsr.opencv.stereo import match_pair
 
-    right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], "copy the file again", 0)
+    right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], 0)
     if right is not None and right.shape == picture.shape and picture.shape[1] > 128:
         match = match_pair(picture, right, 0, 64, smooth=False)
         disparity = np.where(match.disagreement <= 1, match.raw, np.nan)
@@ -199,18 +194,11 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
     masks, depth = (np.stack([sample[k] for sample in run.samples]) for k in (2, 3))
     where, allow = str(parts.masks[0].parent), config.sequence.allow_tissue_fraction
     excluded = parts.excluded_value
-    remedy = "set sequence.excluded_value, or mend the masks"
-    if (
-        run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where, remedy)
-        is None
-    ):
+    if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
         return
-    if (
-        run.tried(lambda: check_polarity(masks, depth, images, where, excluded, allow), "polarity", where, remedy)
-        is None
-    ):
+    if run.tried(lambda: check_polarity(masks, depth, images, where, excluded, allow), "polarity", where) is None:
         return
-    run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where, "mend this mask")
+    run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
 
 
 def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
@@ -218,17 +206,15 @@ def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Co
     height, width, count, wanted = *size[:2], len(parts.images), config.sequence
     between = config.training.bridge_target == "flow"
     cost = estimated_cost(count, width, height, config.training.iterations, wanted.scale, wanted.memory, between)
-    where, remedy = str(parts.folder), "endotsr prepare --scale 0.5, or fewer --frames"
-    run.tried(lambda: FrameStore(count, width, height, wanted.memory, where), "disk", where, remedy)
+    where = str(parts.folder)
+    run.tried(lambda: FrameStore(count, width, height, wanted.memory, where), "disk", where)
     if cost.file_bytes:
         what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and lie in a file while a training runs"
-        why = "they are more than half of sequence.memory"
-        run.findings.append(Finding("note", "frames-in-file", where, None, what, why, "none needed"))
+        run.findings.append(finding("frames-in-file", where, what))
     memory = memory_of_machine()
     if memory is not None and cost.total_bytes > memory:
         what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, this machine has {memory / 1e9:.1f} GB"
-        remedy = "endotsr prepare --scale 0.5, or a smaller --sequence.memory"
-        run.findings.append(Finding("warning", "memory", where, None, what, "it would be stopped", remedy))
+        run.findings.append(finding("memory", where, what))
     return cost
 
 
@@ -237,4 +223,4 @@ def _split(parts: Parts, config: Config, run: _Pass) -> None:
         frames = parse_frame_range(config.sequence.frames, len(parts.images))
         split_frames(len(frames), config.sequence.split, config.sequence.block_length)
 
-    run.tried(split, "frames", parts.folder, "more frames, or another split")
+    run.tried(split, "frames", parts.folder)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.sequences.checks.findings import Finding
+from endotsr.sequences.checks.findings import Finding, finding
 
 NEAREST, FARTHEST = 5.0, 500.0  # mm; medians outside are another unit
 FEW_LEVELS = 6  # whole millimetres, as published clips have them, give a dozen and more
@@ -58,128 +58,43 @@ def depth_findings(facts: list[DepthFacts], where: str, arbitrary: bool, near: f
     """Findings on the depth of a sequence."""
     with_depth = [fact for fact in facts if fact.median > 0]
     if not with_depth:
-        return [
-            Finding(
-                "refusal",
-                "no-depth",
-                where,
-                None,
-                "no pixel of any frame has depth",
-                "nothing can be placed in space",
-                "make depth with `endotsr depth`, or check its scale",
-            )
-        ]
-    found = []
+        return [finding("no-depth", where, "no pixel of any frame has depth")]
     usual = float(np.median([fact.median for fact in with_depth]))
-    found += _whole(with_depth, where)
+    found = _numbers(with_depth, where)
     if not arbitrary and not found:
         found += _unit(usual, where)
     if usual <= near:
-        found.append(
-            Finding(
-                "warning",
-                "near-plane",
-                where,
-                None,
-                f"median depth {usual:.4g} is before the near plane",
-                "what lies before the near plane is not drawn",
-                "check the unit of the depth",
-            )
-        )
-    for i, fact in enumerate(facts):
-        if fact.median == 0:
-            found.append(
-                Finding(
-                    "note",
-                    "frame-without-depth",
-                    where,
-                    i,
-                    f"{fact.name} has no depth",
-                    "it takes no part in the initialisation",
-                    "none needed if these are few",
-                )
-            )
-        elif not 1 / FAR_OFF <= fact.median / usual <= FAR_OFF:
-            ratio = fact.median / usual
-            found.append(
-                Finding(
-                    "warning",
-                    "depth-far-off",
-                    where,
-                    i,
-                    f"median of {fact.name} is {ratio:.3g} times the usual",
-                    "the depth of this frame may be in another unit or normalised",
-                    "write all frames with one scale",
-                )
-            )
+        found.append(finding("near-plane", where, f"median depth {usual:.4g} is before the near plane"))
+    found += [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, usual, where, i)]
     coverage = float(np.mean([fact.tissue_coverage for fact in facts]))
     if coverage < LITTLE:
-        found.append(
-            Finding(
-                "warning",
-                "little-depth",
-                where,
-                None,
-                f"{coverage:.1%} of the tissue has depth",
-                "the scene is initialised there only",
-                "another stereo method, or wider ranges",
-            )
-        )
+        found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
     return found
 
 
-def _whole(facts: list[DepthFacts], where: str) -> list[Finding]:
+def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Finding]:
+    """A frame without depth, or with depth of another size; `usual` is the median over the frames."""
+    if fact.median == 0:
+        return [finding("frame-without-depth", where, f"{fact.name} has no depth", i)]
+    ratio = fact.median / usual
+    if not 1 / FAR_OFF <= ratio <= FAR_OFF:
+        return [finding("depth-far-off", where, f"median of {fact.name} is {ratio:.3g} times the usual", i)]
+    return []
+
+
+def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
     """Depth that is a picture of depth, or was cut to a few numbers."""
     highest = {fact.stored_highest for fact in facts}
-    if all(fact.integers for fact in facts) and max(highest) <= 3:
-        return [
-            Finding(
-                "refusal",
-                "metres-cut",
-                where,
-                None,
-                f"the stored numbers are at most {max(highest):g}",
-                "metres were cut to whole numbers",
-                "store millimetres, or a smaller step with its scale",
-            )
-        ]
+    integers = all(fact.integers for fact in facts)
+    if integers and max(highest) <= 3:
+        return [finding("metres-cut", where, f"the stored numbers are at most {max(highest):g}")]
     if all(fact.lowest == fact.highest for fact in facts):
-        return [
-            Finding(
-                "refusal",
-                "constant-depth",
-                where,
-                None,
-                "every frame has one and the same depth everywhere",
-                "the scene would be a flat board",
-                "supply measured depth",
-            )
-        ]
-    if len(facts) > 2 and len(highest) == 1 and highest & set(FULL_SCALE) and all(fact.integers for fact in facts):
-        return [
-            Finding(
-                "warning",
-                "normalised-depth",
-                where,
-                None,
-                f"the largest number of every frame is {max(highest):g}",
-                "each frame looks stretched to the full range: such a picture of depth is no depth",
-                "store lengths with one scale for all frames",
-            )
-        ]
+        return [finding("constant-depth", where, "every frame has one and the same depth everywhere")]
+    if len(facts) > 2 and len(highest) == 1 and highest & set(FULL_SCALE) and integers:
+        return [finding("normalised-depth", where, f"the largest number of every frame is {max(highest):g}")]
     levels = int(np.median([fact.levels for fact in facts]))
     if levels < FEW_LEVELS:
-        return [
-            Finding(
-                "warning",
-                "coarse-depth",
-                where,
-                None,
-                f"a frame holds {levels} different depths",
-                "surfaces become steps",
-                "store 16 bits with a smaller step",
-            )
-        ]
+        return [finding("coarse-depth", where, f"a frame holds {levels} different depths")]
     return []
 
 
@@ -189,17 +104,7 @@ def _unit(usual: float, where: str) -> list[Finding]:
     guesses = ((256.0, "millimetres times 256"), (1e-3, "metres"), (0.1, "centimetres"), (1000.0, "micrometres"))
     likely = [text for factor, text in guesses if 20 <= usual / factor <= 200]
     guess = f"; it looks like {' or '.join(likely)}" if likely else ""
-    return [
-        Finding(
-            "warning",
-            "depth-unit",
-            where,
-            None,
-            f"the median depth is {usual:.4g} mm{guess}",
-            "learning rates and thresholds are in millimetres",
-            "state the unit: prepare --depth-unit and --depth-scale, or [depth] in sequence.toml",
-        )
-    ]
+    return [finding("depth-unit", where, f"the median depth is {usual:.4g} mm{guess}")]
 
 
 def inverted_finding(
@@ -212,14 +117,5 @@ def inverted_finding(
     correlation = float(np.corrcoef(depth[both], 1.0 / disparity[both])[0, 1])
     if correlation > -0.5:
         return []
-    return [
-        Finding(
-            "refusal",
-            "inverted-depth",
-            where,
-            frame,
-            f"depth falls where the stereo pair says far ({correlation:.2f})",
-            "near and far are exchanged: the file holds disparity, or an inverted picture",
-            "read it as disparity: endotsr depth --given FOLDER --kind disparity",
-        )
-    ]
+    what = f"depth falls where the stereo pair says far ({correlation:.2f})"
+    return [finding("inverted-depth", where, what, frame)]

@@ -1,15 +1,15 @@
 """A finding: what is wrong where, why it matters, and how to mend it."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-Level = Literal["refusal", "warning", "note"]
+from endotsr.sequences.checks.kinds import KINDS, Level
 
 
 class Finding(NamedTuple):
-    """One thing that a check found. A refusal is what `endotsr train` refuses as well."""
+    """One thing that a check found."""
 
     level: Level
-    code: str  # a short name, the same in every version: `black-frame`
+    code: str  # key of `KINDS`
     where: str  # file or folder
     frame: int | None  # number within the sequence, from 0
     what: str
@@ -23,7 +23,13 @@ class Finding(NamedTuple):
         return f"{place}: {self.what}; {self.why}; {self.remedy}"
 
 
+def finding(code: str, where: object, what: str, frame: int | None = None) -> Finding:
+    """A finding of a kind of `KINDS`, at a file or folder and, where it concerns one, a frame."""
+    kind = KINDS[code]
+    return Finding(kind.level, code, str(where), frame, what, kind.why, kind.remedy)
+
+
 def worst_first(findings: list[Finding]) -> list[Finding]:
     """Refusals, then warnings, then notes; each in the order found."""
     order = {"refusal": 0, "warning": 1, "note": 2}
-    return sorted(findings, key=lambda finding: order[finding.level])
+    return sorted(findings, key=lambda found: order[found.level])

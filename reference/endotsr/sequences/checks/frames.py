@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.sequences.checks.findings import Finding
+from endotsr.sequences.checks.findings import Finding, finding
 from endotsr.sequences.files import frame_numbers
 
 SMALL = 8  # pixels between the sampled rows and columns
@@ -37,83 +37,35 @@ def frame_facts(name: str, picture: NDArray[np.uint8]) -> FrameFacts:
 def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     """Findings on the pictures of a sequence, in time order."""
     means = np.array([float(fact.small.mean()) for fact in facts])
-    found = []
-    for i, fact in enumerate(facts):
-        if means[i] < BLACK:
-            found.append(
-                _finding(
-                    "black-frame",
-                    where,
-                    i,
-                    f"{fact.name} is black (mean {means[i]:.1f} of 255)",
-                    "a black frame teaches the model a black scene at its time",
-                )
-            )
-        elif means[i] > WHITE:
-            found.append(
-                _finding(
-                    "white-frame",
-                    where,
-                    i,
-                    f"{fact.name} is white (mean {means[i]:.1f} of 255)",
-                    "a white frame teaches the model a white scene at its time",
-                )
-            )
-        elif fact.clipped > CLIPPED:
-            found.append(
-                _finding(
-                    "clipped-frame",
-                    where,
-                    i,
-                    f"{fact.name}: {fact.clipped:.0%} of it is fully white",
-                    "colour is lost there",
-                )
-            )
-    dark = (means < BLACK) | (means > WHITE)
+    found = [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, float(means[i]), where, i)]
+    readable = (means >= BLACK) & (means <= WHITE)
     for i in range(1, len(facts)):
-        if dark[i] or dark[i - 1] or facts[i].small.shape != facts[i - 1].small.shape:
-            continue
-        if np.abs(facts[i].small - facts[i - 1].small).mean() < SAME:
-            found.append(
-                _finding(
-                    "duplicated-frame",
-                    where,
-                    i,
-                    f"{facts[i].name} repeats {facts[i - 1].name}",
-                    "a held-out frame that repeats a training frame makes the metrics too good, and time"
-                    " stands still there",
-                )
-            )
-        ratio = means[i] / means[i - 1]
-        if not 1 / JUMP < ratio < JUMP:
-            found.append(
-                Finding(
-                    "warning",
-                    "exposure-jump",
-                    where,
-                    i,
-                    f"brightness changes by {ratio:.2f} times",
-                    "the colour of the tissue follows the camera there",
-                    "fit exposures (model.exposure = true), or cut the clip with --frames",
-                )
-            )
+        if readable[i - 1] and readable[i] and facts[i].small.shape == facts[i - 1].small.shape:
+            found += _of_neighbours(facts[i - 1], facts[i], float(means[i] / means[i - 1]), where, i)
     if facts and all((fact.small == fact.small[:, :, :1]).all() for fact in facts):
-        found.append(
-            Finding(
-                "note",
-                "grey-pictures",
-                where,
-                None,
-                "every picture is grey",
-                "polarity cannot be checked by colour",
-                "none needed",
-            )
-        )
+        found.append(finding("grey-pictures", where, "every picture is grey"))
     return found
 
 
-def _finding(code: str, where: str, frame: int, what: str, why: str) -> Finding:
-    return Finding("warning", code, where, frame, what, why, "leave the frame out (prepare --frames, or delete it)")
+def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:
+    """A frame without a picture, or without colour in much of it."""
+    if mean < BLACK:
+        return [finding("black-frame", where, f"{fact.name} is black (mean {mean:.1f} of 255)", i)]
+    if mean > WHITE:
+        return [finding("white-frame", where, f"{fact.name} is white (mean {mean:.1f} of 255)", i)]
+    if fact.clipped > CLIPPED:
+        return [finding("clipped-frame", where, f"{fact.name}: {fact.clipped:.0%} of it is fully white", i)]
+    return []
+
+
+def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: str, i: int) -> list[Finding]:
+    """A repeated frame, a jump of the brightness; `ratio` is that of the means."""
+    found = []
+    if np.abs(fact.small - before.small).mean() < SAME:
+        found.append(finding("duplicated-frame", where, f"{fact.name} repeats {before.name}", i))
+    if not 1 / JUMP < ratio < JUMP:
+        found.append(finding("exposure-jump", where, f"brightness changes by {ratio:.2f} times", i))
+    return found
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:
@@ -127,14 +79,5 @@ def gap_findings(files: list[Path]) -> list[Finding]:
     if not wide.size:
         return []
     i = int(wide[0])
-    return [
-        Finding(
-            "warning",
-            "number-gap",
-            str(files[0].parent),
-            i + 1,
-            f"{wide.size} gaps in the numbers; the first is between {files[i].name} and {files[i + 1].name}",
-            "frames count as evenly spaced in time",
-            "supply the missing frames, or cut the clip there",
-        )
-    ]
+    what = f"{wide.size} gaps in the numbers; the first is between {files[i].name} and {files[i + 1].name}"
+    return [finding("number-gap", files[0].parent, what, i + 1)]

@@ -7,14 +7,14 @@ from typing import NamedTuple
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS
-from endotsr.sequences.checks.findings import Finding
+from endotsr.sequences.checks.findings import Finding, finding
 from endotsr.sequences.common import Contents, cameras_of
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.endonerf import NO_MASKS
 from endotsr.sequences.files import list_pictures
 from endotsr.sequences.layouts import readable_layout
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows
-from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, read_poses, read_sequence_file
+from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.splatting.camera import Camera
 
 
@@ -48,10 +48,7 @@ def _listed(folder: Path, endings: tuple[str, ...], what: str, findings: list[Fi
     try:
         return list_pictures(folder, endings)
     except InputError as error:
-        remedy = f"supply the {what}, one file a frame"
-        findings.append(
-            Finding("refusal", f"{what}-files", str(folder), None, str(error), "a training reads them", remedy)
-        )
+        findings.append(finding(f"{what}-files", folder, str(error)))
         return []
 
 
@@ -75,57 +72,14 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
     try:
         file = read_sequence_file(folder)
     except InputError as error:
-        findings.append(
-            Finding(
-                "refusal", "sequence-file", str(where), None, str(error), "it says what the files mean", "mend the key"
-            )
-        )
+        findings.append(finding("sequence-file", where, str(error)))
         return Parts(folder, [], [], [], [], "white", 1.0, False, where, lambda width, height: [])
+    findings += _stated(file, where)
     images = _listed(folder / IMAGES, PICTURE_ENDINGS, "images", findings)
     wanted = file.masks is not None and config.masks != NO_MASKS
     masks = _listed(folder / file.masks.folder, PICTURE_ENDINGS, "masks", findings) if file.masks and wanted else []
     depth = _listed(folder / file.depth.folder, DEPTH_ENDINGS, "depth", findings) if file.depth else []
     right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
-    if file.depth is None:
-        findings.append(
-            Finding(
-                "refusal",
-                "no-depth",
-                str(where),
-                None,
-                "[depth] is missing",
-                "nothing can be placed in space",
-                "endotsr depth makes it from the stereo pair",
-            )
-        )
-    if file.masks is None:
-        findings.append(
-            Finding(
-                "note",
-                "no-masks",
-                str(where),
-                None,
-                "there are no masks",
-                "instruments count as tissue",
-                "supply masks (endotsr prepare --masks), or let them be proposed (endotsr masks)",
-            )
-        )
-    elif file.masks.proposed:
-        what, why = "a program proposed the masks", "what it missed becomes tissue, and nobody has looked at them"
-        remedy = "look at proposed_masks.png"
-        findings.append(Finding("note", "proposed-masks", str(where), None, what, why, remedy))
-    if any(file.camera.distortion):
-        findings.append(
-            Finding(
-                "refusal",
-                "distortion",
-                str(where),
-                None,
-                "the pictures are distorted",
-                "the model is a pinhole camera",
-                "endotsr prepare straightens them",
-            )
-        )
 
     def cameras(width: int, height: int) -> list[Camera]:
         if (file.camera.width, file.camera.height) != (width, height):
@@ -139,3 +93,17 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
     scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
     excluded = file.masks.excluded_value if file.masks else "white"
     return Parts(folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras)
+
+
+def _stated(file: SequenceFile, where: Path) -> list[Finding]:
+    """Findings on what `sequence.toml` states, or leaves out."""
+    found = []
+    if file.depth is None:
+        found.append(finding("no-depth", where, "[depth] is missing"))
+    if file.masks is None:
+        found.append(finding("no-masks", where, "there are no masks"))
+    elif file.masks.proposed:
+        found.append(finding("proposed-masks", where, "a program proposed the masks"))
+    if any(file.camera.distortion):
+        found.append(finding("distortion", where, "the pictures are distorted"))
+    return found

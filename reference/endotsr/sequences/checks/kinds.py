@@ -1,0 +1,91 @@
+"""Everything that `endotsr check` can find: how serious it is, why it matters, and how it is mended.
+
+The code of a kind is its name in `--json` and stays the same in every version.
+"""
+
+from typing import Literal, NamedTuple
+
+Level = Literal["refusal", "warning", "note"]
+
+REFUSED = "a training refuses it"
+LEAVE_OUT = "leave the frame out (prepare --frames, or delete it)"
+SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
+
+
+class Kind(NamedTuple):
+    """One kind of finding. A refusal is what `endotsr train` refuses as well."""
+
+    level: Level
+    why: str
+    remedy: str
+
+
+KINDS: dict[str, Kind] = {
+    # files
+    "sequence-file": Kind("refusal", "sequence.toml says what the files mean", "mend the key"),
+    "images-files": Kind("refusal", "a training reads them", "supply the images, one file a frame"),
+    "masks-files": Kind("refusal", "a training reads them", "supply the masks, one file a frame"),
+    "depth-files": Kind("refusal", "a training reads them", "supply the depth, one file a frame"),
+    "pairing": Kind("refusal", REFUSED, "supply or delete the file"),
+    "size": Kind("refusal", "all files of a sequence have one size", "export it again"),
+    "frames": Kind("refusal", REFUSED, "more frames, or another split"),
+    "number-gap": Kind("warning", "frames count as evenly spaced in time",
+                       "supply the missing frames, or cut the clip there"),
+    # pictures
+    "picture": Kind("refusal", REFUSED, "copy or export the file again"),
+    "black-frame": Kind("warning", "a black frame teaches the model a black scene at its time", LEAVE_OUT),
+    "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
+    "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
+    "duplicated-frame": Kind("warning", "a held-out frame that repeats a training frame makes the metrics too good, and"
+                             " time stands still there", LEAVE_OUT),
+    "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
+                          "fit exposures (model.exposure = true), or cut the clip with --frames"),
+    "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
+    # masks
+    "no-masks": Kind("note", "instruments count as tissue",
+                     "supply masks (endotsr prepare --masks), or let them be proposed (endotsr masks)"),
+    "proposed-masks": Kind("note", "what the program missed becomes tissue, and nobody has looked at it",
+                           "look at proposed_masks.png"),
+    "mask": Kind("refusal", REFUSED, "export the mask again"),
+    "mask-values": Kind("refusal", REFUSED, "store two values"),
+    "tissue-fraction": Kind("refusal", REFUSED, "set sequence.excluded_value, or mend the masks"),
+    "polarity": Kind("refusal", REFUSED, "set sequence.excluded_value, or mend the masks"),
+    "single-mask": Kind("refusal", REFUSED, "mend this mask"),
+    # depth
+    "no-depth": Kind("refusal", "nothing can be placed in space", "make it with `endotsr depth`, or check its scale"),
+    "depth-file": Kind("refusal", REFUSED, "export the depth again"),
+    "depth-values": Kind("refusal", REFUSED, "store lengths"),
+    "frame-without-depth": Kind("note", "it takes no part in the initialisation", "none needed if these are few"),
+    "little-depth": Kind("warning", "the scene is initialised there only", "another stereo method, or wider ranges"),
+    "near-plane": Kind("warning", "what lies before the near plane is not drawn", "check the unit of the depth"),
+    "depth-unit": Kind("warning", "learning rates and thresholds are in millimetres",
+                       "state the unit: prepare --depth-unit and --depth-scale, or [depth] in sequence.toml"),
+    "depth-far-off": Kind("warning", "the depth of this frame may be in another unit or normalised",
+                          "write all frames with one scale"),
+    "metres-cut": Kind("refusal", "metres were cut to whole numbers",
+                       "store millimetres, or a smaller step with its scale"),
+    "constant-depth": Kind("refusal", "the scene would be a flat board", "supply measured depth"),
+    "normalised-depth": Kind("warning", "each frame looks stretched to the full range: such a picture of depth is no"
+                             " depth", "store lengths with one scale for all frames"),
+    "coarse-depth": Kind("warning", "surfaces become steps", "store 16 bits with a smaller step"),
+    "inverted-depth": Kind("refusal", "near and far are exchanged: the file holds disparity, or an inverted picture",
+                           "read it as disparity: endotsr depth --given FOLDER --kind disparity"),
+    # cameras
+    "cameras": Kind("refusal", REFUSED, "mend the poses"),
+    "distortion": Kind("refusal", "the model is a pinhole camera", "straighten them with endotsr prepare"),
+    "field-of-view": Kind("warning", "the focal length may belong to another picture size or be in millimetres",
+                          "state the focal length in pixels of these pictures"),
+    "principal-point": Kind("warning", "the calibration may belong to another picture size", "check width and height"),
+    "pixel-shape": Kind("warning", "pixels are rarely that oblong; pictures may have been stretched",
+                        "check the calibration against the picture size"),
+    "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", "check this pose, or leave the frame out"),
+    "pose-turn": Kind("warning", "between neighbouring frames this is most likely a wrong pose",
+                      "check axes and direction of the trajectory"),
+    "pose-unit": Kind("warning", "the poses may be in metres beside a depth in millimetres",
+                      "state the unit: prepare --trajectory-unit"),
+    "far-from-origin": Kind("note", "float32 is too coarse there", "none needed: the world is moved"),
+    # cost
+    "disk": Kind("refusal", REFUSED, SMALLER),
+    "frames-in-file": Kind("note", "that is more than half of sequence.memory", "none needed"),
+    "memory": Kind("warning", "the training would be stopped", "endotsr prepare --scale 0.5, or a smaller --sequence.memory"),
+}  # fmt: skip
