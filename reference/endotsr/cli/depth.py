@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
+
+if TYPE_CHECKING:
+    from endotsr.sequences.make_depth import DepthReport
 
 
 @dataclass
@@ -55,42 +58,32 @@ def run(words: list[str]) -> int:
         if not 0 < getattr(options, name) < float("inf"):
             key = name.replace("_", "-")
             raise InputError(f"--{key} {getattr(options, name):g} is not allowed; allowed: a number > 0")
+    report = _made(options)
+    print()
+    assert report.file.depth is not None
+    coverage, unit, step = report.coverage, report.file.depth.unit, report.file.depth.scale
+    lowest = min(range(len(coverage)), key=lambda i: coverage[i])
+    print(
+        f"depth of {len(coverage)} frames: {sum(coverage) / len(coverage):.1%} of the pixels on average,"
+        f" {coverage[lowest]:.1%} in frame {lowest}; median {report.median:.4g} {unit}, steps of {step:g}"
+    )
+    print(f"next: endotsr train {options.sequence} --out RUN")
+    write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
+    return 0
+
+
+def _made(options: DepthOptions) -> "DepthReport":
+    """Depth of another program, or that of the stereo pairs."""
     from endotsr.sequences.make_depth import make_stereo_depth, take_given_depth
     from endotsr.sequences.stereo_depth import StereoSettings
 
     if options.given is not None:
-        report = take_given_depth(
+        return take_given_depth(
             options.sequence, options.given, options.kind, options.unit_scale, options.replace, _said
         )
-    else:
-        settings = StereoSettings(
-            nearest=options.nearest,
-            farthest=options.farthest,
-            block=options.block,
-            smooth=options.smooth,
-            agreement=options.agreement,
-            confidence=options.confidence,
-            temporal=options.temporal,
-        )
-        report = make_stereo_depth(options.sequence, settings, options.replace, _said)
-    print()
-    lowest = min(range(len(report.coverage)), key=lambda i: report.coverage[i])
-    mean = sum(report.coverage) / len(report.coverage)
-    assert report.file.depth is not None
-    print(
-        f"depth of {len(report.coverage)} frames: {mean:.1%} of the pixels on average, {report.coverage[lowest]:.1%} in"
-        f" frame {lowest}; median {report.median:.4g} {report.file.depth.unit}, steps of {report.file.depth.scale:g}"
-    )
-    print(f"next: endotsr train {options.sequence} --out RUN")
-    write_result(
-        options.json,
-        sequence=options.sequence,
-        coverage=report.coverage,
-        median=report.median,
-        unit=report.file.depth.unit,
-        step=report.file.depth.scale,
-    )
-    return 0
+    names = ("nearest", "farthest", "block", "smooth", "agreement", "confidence", "temporal")
+    settings = StereoSettings(**{name: getattr(options, name) for name in names})
+    return make_stereo_depth(options.sequence, settings, options.replace, _said)
 
 
 def _said(done: int, total: int) -> None:

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
+
+if TYPE_CHECKING:
+    from endotsr.sequences.source_options import SourceOptions
 
 
 @dataclass
@@ -77,58 +80,55 @@ def run(words: list[str]) -> int:
     options = parse(PrepareOptions, words, "prepare")
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.prepare import PrepareSettings, prepare
-    from endotsr.sequences.source_options import SourceOptions
     from endotsr.sequences.writing import refuse_existing
 
     refuse_existing(options.out)
+    _check_numbers(options)
+    settings = PrepareSettings(
+        options.frames, options.rate, options.scale, options.gaps, options.pictures, options.points
+    )
+    recording = open_recording(options.source, _stated(options))
+    print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
+    refuse_unwritable(options.json)
+    found, notes = prepare(recording, options.out, settings)
+    for note in notes:
+        print(f"  {note}")
+    camera = found.camera
+    print(f"written: {options.out}, {found.frames} frames of {camera.width}x{camera.height}")
+    print(_next_step(options.out, found.depth is not None, camera.baseline > 0))
+    write_result(
+        options.json, source=options.source, layout=recording.layout, folder=options.out, frames=found.frames,
+        width=camera.width, height=camera.height, stereo=camera.baseline > 0, depth=found.depth is not None,
+        notes=list(notes),
+    )  # fmt: skip
+    return 0
+
+
+def _check_numbers(options: PrepareOptions) -> None:
+    """Raises: InputError for a number that is not positive, or intrinsics that are not four numbers."""
     for name in ("rate", "source_rate", "baseline", "depth_scale"):
         value = getattr(options, name)
         if value is not None and not 0 < value < float("inf"):
             raise InputError(f"--{name.replace('_', '-')} {value:g} is not allowed; allowed: a number > 0")
     if len(options.camera) not in (0, 4):
         raise InputError(f"--camera: {len(options.camera)} numbers; allowed: 4, FX FY CX CY")
-    stated = SourceOptions(
-        layout=options.layout,
-        stereo=options.stereo,
+
+
+def _stated(options: PrepareOptions) -> "SourceOptions":
+    """What the options state about the source."""
+    from endotsr.sequences.source_options import SourceOptions
+
+    same = (
+        "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
+        "excluded_value", "depth", "depth_unit", "depth_scale",
+    )  # fmt: skip
+    return SourceOptions(
+        **{name: getattr(options, name) for name in same},
         camera=options.camera or None,
-        distortion=options.distortion,
-        calibration=options.calibration,
-        baseline=options.baseline,
-        trajectory=options.trajectory,
         direction=options.trajectory_direction,
         axes=options.trajectory_axes,
-        trajectory_unit=options.trajectory_unit,
-        masks=options.masks,
-        excluded_value=options.excluded_value,
-        depth=options.depth,
-        depth_unit=options.depth_unit,
-        depth_scale=options.depth_scale,
         rate=options.source_rate,
     )
-    settings = PrepareSettings(
-        options.frames, options.rate, options.scale, options.gaps, options.pictures, options.points
-    )
-    recording = open_recording(options.source, stated)
-    print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
-    refuse_unwritable(options.json)
-    found, notes = prepare(recording, options.out, settings)
-    for note in notes:
-        print(f"  {note}")
-    print(f"written: {options.out}, {found.frames} frames of {found.camera.width}x{found.camera.height}")
-    print(_next_step(options.out, found.depth is not None, found.camera.baseline > 0))
-    write_result(
-        options.json,
-        source=options.source,
-        layout=recording.layout,
-        folder=options.out,
-        frames=found.frames,
-        width=found.camera.width,
-        height=found.camera.height,
-        stereo=found.camera.baseline > 0,
-        depth=found.depth is not None,
-        notes=list(notes),
-    )
-    return 0
 
 
 def _next_step(out: Path, depth: bool, stereo: bool) -> str:

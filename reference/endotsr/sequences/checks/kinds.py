@@ -87,5 +87,6 @@ KINDS: dict[str, Kind] = {
     # cost
     "disk": Kind("refusal", REFUSED, SMALLER),
     "frames-in-file": Kind("note", "that is more than half of sequence.memory", "none needed"),
-    "memory": Kind("warning", "the training would be stopped", "endotsr prepare --scale 0.5, or a smaller --sequence.memory"),
+    "memory": Kind("warning", "the training would be stopped",
+                   "endotsr prepare --scale 0.5, or a smaller --sequence.memory"),
 }  # fmt: skip
