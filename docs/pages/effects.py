@@ -24,6 +24,7 @@ import kept
 from marks import read_json, write_marked
 
 from endotsr.bench.suite import dated
+from endotsr.config import DEMO
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import now
@@ -34,7 +35,7 @@ FILES = {
     "detect": "effects_detect.json", "train": "effects_train.json", "real": "effects_real.json",
     "truth": "effects_truth.json", "bench": "bench_effects.json",
 }  # fmt: skip
-SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 5, 40, 24, 400, 1000
+SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 5, 40, 24, DEMO.training.iterations, 1000
 SCENES = {
     "still": ("noise",),
     "breathing": ("noise", "breathing"),
@@ -97,7 +98,6 @@ def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
     """Both settings on a real clip at half size."""
     import msgspec
 
-    from endotsr.config import DEMO
     from endotsr.sequences.endonerf import read_endonerf
 
     sequence = read_endonerf(folder, msgspec.structs.replace(DEMO.sequence, scale=0.5), DEMO.raster.near)

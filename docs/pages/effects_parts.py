@@ -99,7 +99,7 @@ def training(result: dict[str, Any]) -> str:
     heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
     note = (
         f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
-        f"preset `demo`, {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
+        f"preset `demo` with its {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
         f"the training ({machine(result)})."
     )
     if result["real"]:
