@@ -24,7 +24,7 @@ import kept
 from marks import read_json, write_marked
 
 from endotsr.bench.suite import dated
-from endotsr.config import DEMO
+from endotsr.config import DEMO, PAPER
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import now
@@ -146,7 +146,6 @@ def _pair(sequence: Any, seed: int, iterations: int) -> dict[str, Any]:
 
 def real(folders: list[Path]) -> dict[str, Any]:
     """Verdicts and plans on folders; clips that were inspected before and are not among them keep their results."""
-    from endotsr.config import PAPER
     from endotsr.effects.inspect import inspect_sequence, inspection_record
     from endotsr.effects.plan import make_plan, plan_record
 
@@ -162,7 +161,6 @@ def real(folders: list[Path]) -> dict[str, Any]:
 
 
 def _read_endonerf(folder: Path) -> Any:
-    from endotsr.config import PAPER
     from endotsr.sequences.endonerf import read_endonerf
 
     return read_endonerf(folder, PAPER.sequence, PAPER.raster.near)

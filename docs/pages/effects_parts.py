@@ -99,8 +99,8 @@ def training(result: dict[str, Any]) -> str:
     heads = ("Scene", "`everything`, dB", "`auto` against it, dB", "Time saved", "Memory saved")
     note = (
         f"Held-out tissue PSNR, mean of {result['seeds']} seeds with the 95 % interval of the paired difference; "
-        f"preset `demo` with its {result['iterations']} iterations, {result['frames']} frames of 160x128; processor time of "
-        f"the training ({machine(result)})."
+        f"preset `demo` with its {result['iterations']} iterations, {result['frames']} frames of 160x128; processor "
+        f"time of the training ({machine(result)})."
     )
     if result["real"]:
         names = ", ".join(f"`{name}`" for name in result["real"])
