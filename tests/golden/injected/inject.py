@@ -1,23 +1,29 @@
-"""Put single mistakes into ports and count how many the judge names: python tests/golden/injected/inject.py [PORT ...]
+"""Put single mistakes into ports and count how many the judge names.
+
+    python tests/golden/injected/inject.py [PORT ...] [--json docs/results/injected.json]
 
 PORT is c99, reference or torch; all of them by default. The port in PyTorch is run by the interpreter that
 ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. Every mistake is made
 alone. It is named rightly if the first mistake that the report names is this one. The right ports are judged as well:
-they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16 are named.
+they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16 are named. The result is a table of
+docs/guides/port.md, which docs/pages/injected.py writes.
 """
 
+import argparse
 import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.bench.suite import dated
 from endotsr.golden.judge.command import run_port, write_requests
 from endotsr.golden.judge.npy import write_npy
 from endotsr.golden.judge.store import Golden, golden_folder, in_precision, read_golden
@@ -25,6 +31,7 @@ from endotsr.golden.judge.verdict import Report, conclude, judge, judge_case
 from endotsr.golden.vectors.copies import changed_copy
 from endotsr.golden.vectors.reference import stored
 from endotsr.golden.vectors.registry import all_wrong_ports
+from endotsr.runs.files import write_json
 
 sys.path.insert(0, str(Path(__file__).parent))
 import autodiff
@@ -41,6 +48,9 @@ class Outcome(NamedTuple):
     flag: str
     named: tuple[str, ...]  # mistakes that the report names, best first
     refused: int  # outputs
+    likeliest: str  # the first candidate of the report, named or not; "" = none
+    agrees: int  # refused outputs that have the values of that candidate
+    differs: int  # refused outputs that it would change otherwise
 
     @property
     def right(self) -> bool:
@@ -51,7 +61,11 @@ class Outcome(NamedTuple):
 def said(port: str, flag: str, report: Report) -> Outcome:
     """The outcome of a report."""
     refused = sum(o.status == "refused" for case in report.cases for o in case.outputs)
-    return Outcome(port, flag, tuple(s.flag for s in report.suspects if s.named), refused)
+    named = tuple(s.flag for s in report.suspects if s.named)
+    if not report.suspects:
+        return Outcome(port, flag, named, refused, "", 0, 0)
+    first = report.suspects[0]
+    return Outcome(port, flag, named, refused, first.flag, len(first.evidence.agrees), len(first.evidence.differs))
 
 
 class CPort:
@@ -150,18 +164,26 @@ PORTS: dict[str, Callable[[Golden], Iterator[Outcome]]] = {"c99": in_c, "referen
 
 def main(words: list[str]) -> int:
     """Run, print a line for each mistake that is not named first, and count."""
-    golden, outcomes = read_golden(golden_folder()), []
-    for name in words or PORTS:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("ports", nargs="*", metavar="PORT", choices=[*PORTS, "all"], default="all")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args(words)
+    golden, outcomes, began = read_golden(golden_folder()), [], time.monotonic()
+    for name in PORTS if options.ports == "all" else options.ports:
         for outcome in PORTS[name](golden):
             outcomes.append(outcome)
             if outcome.flag == "":
                 print(f"{name}: the right port: {outcome.refused} outputs refused, named: {outcome.named or 'none'}")
             elif not outcome.right:
-                named = ", ".join(outcome.named[:3]) or "none of the known mistakes"
+                named = ", ".join(outcome.named[:3]) or f"none; {outcome.likeliest} comes first"
                 print(f"{name}: {outcome.flag}: {outcome.refused} outputs refused, named: {named}", flush=True)
     mistakes = [outcome for outcome in outcomes if outcome.flag]
     right = sum(outcome.right for outcome in mistakes)
     print(f"{right} of {len(mistakes)} single mistakes named rightly")
+    if options.json:
+        rows = [outcome._asdict() for outcome in outcomes]
+        version, seconds = golden.manifest.version, time.monotonic() - began
+        write_json(options.json, dated({"golden": version, "seconds": seconds, "outcomes": rows}))
     clean = all(not outcome.refused and not outcome.named for outcome in outcomes if not outcome.flag)
     return 0 if clean and 16 * right >= 15 * len(mistakes) else 1
 

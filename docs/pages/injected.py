@@ -1,0 +1,60 @@
+"""How often the judge names a mistake: the table of docs/guides/port.md, made by `python docs/pages/injected.py`.
+
+The counts are those of `python tests/golden/injected/inject.py --json docs/results/injected.json`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from effects_parts import machine
+from marks import read_json, write_marked
+
+from endotsr.report.tables import markdown
+
+DOCS = Path(__file__).parents[1]
+PAGE, FILE = DOCS / "guides" / "port.md", DOCS / "results" / "injected.json"
+MADE_BY = "python tests/golden/injected/inject.py --json docs/results/injected.json"
+PORTS = {
+    "c99": "in C99",
+    "reference": "the reference itself, float32",
+    "torch": "by automatic differentiation",
+}
+
+
+def fragments(result: dict[str, Any]) -> dict[str, str]:
+    """Counts by port, and every mistake that is not named, with the reason."""
+    mistakes = [o for o in result["outcomes"] if o["flag"]]
+    rows = [(title, str(len(of)), str(sum(map(_right, of)))) for name, title in PORTS.items()
+            if (of := [o for o in mistakes if o["port"] == name])]  # fmt: skip
+    rows.append(("together", str(len(mistakes)), str(sum(map(_right, mistakes)))))
+    missed = [(f"`{o['flag']}`", PORTS[o["port"]], _reason(o)) for o in mistakes if not _right(o)]
+    right_ports = [o for o in result["outcomes"] if not o["flag"]]
+    clean = sum(not o["refused"] and not o["named"] for o in right_ports)
+    note = (
+        f"Version {result['golden']}, {result['seconds'] / 60:.0f} minutes ({machine(result)}). Of the "
+        f"{len(right_ports)} right ports, {clean} pass with no mistake named."
+    )
+    counts = markdown(("Port", "Single mistakes", "Named rightly"), rows)
+    return {"counts": f"{counts}\n\n{note}", "missed": markdown(("Mistake", "Port", "What the report says"), missed)}
+
+
+def _right(outcome: dict[str, Any]) -> bool:
+    return outcome["named"][:1] == [outcome["flag"]]
+
+
+def _reason(outcome: dict[str, Any]) -> str:
+    """What the report says instead."""
+    others = [flag for flag in outcome["named"] if flag != outcome["flag"]]
+    if others:
+        second = "; it is named second" if outcome["named"][1:2] == [outcome["flag"]] else ""
+        return f"names `{others[0]}`, which changes the same outputs{second}"
+    if outcome["likeliest"] == outcome["flag"]:
+        return (
+            f"puts it first among the candidates and names none: {outcome['agrees']} of {outcome['refused']} refused "
+            f"outputs have its values, {outcome['differs']} have others"
+        )
+    return f"names none; `{outcome['likeliest']}` comes first"
+
+
+if __name__ == "__main__":
+    write_marked(PAGE, fragments(read_json(FILE, MADE_BY)), "injected")

@@ -1,0 +1,48 @@
+"""docs/guides/port.md: its table of injected mistakes is what the committed measurement says."""
+
+import importlib
+import re
+
+import pytest
+from marks import read_json, replaced
+
+made = importlib.import_module("injected")
+
+
+def test_page_is_what_the_measurement_says():
+    text = made.PAGE.read_text(encoding="utf-8")
+    if not made.FILE.exists():
+        pytest.skip(f"not measured yet: {made.MADE_BY}")
+    parts = made.fragments(read_json(made.FILE, made.MADE_BY))
+    assert sorted(re.findall(r"<!-- injected:(\w+):start -->", text)) == sorted(parts)
+    assert replaced(text, parts, made.PAGE, "injected") == text
+
+
+def test_right_ports_pass_and_at_least_15_of_16_mistakes_are_named():
+    if not made.FILE.exists():
+        pytest.skip(f"not measured yet: {made.MADE_BY}")
+    outcomes = read_json(made.FILE, made.MADE_BY)["outcomes"]
+    mistakes = [o for o in outcomes if o["flag"]]
+    assert len(mistakes) >= 80 and {o["port"] for o in mistakes} == set(made.PORTS)
+    assert 16 * sum(o["named"][:1] == [o["flag"]] for o in mistakes) >= 15 * len(mistakes)
+    assert all(o["refused"] == 0 and not o["named"] for o in outcomes if not o["flag"])
+
+
+@pytest.mark.parametrize(
+    "named, likeliest, says",
+    [
+        (["other", "flag"], "other", "names `other`, which changes the same outputs; it is named second"),
+        ([], "flag", "puts it first among the candidates and names none: 2 of 5"),
+        ([], "other", "names none; `other` comes first"),
+    ],
+)
+def test_a_mistake_that_is_not_named_has_its_reason(named, likeliest, says):
+    outcome = {
+        "port": "c99", "flag": "flag", "named": named, "refused": 5, "likeliest": likeliest, "agrees": 2, "differs": 3,
+    }  # fmt: skip
+    right = outcome | {"flag": "", "refused": 0, "named": []}
+    about = {"golden": "3.0.0", "seconds": 60.0, "machine": {"processor": "x", "cores": 2}, "date": "2026-11-23"}
+    found = {**about, "outcomes": [outcome, right]}
+    parts = made.fragments(found)
+    assert says in parts["missed"] and "| together | 1 | 0 |" in parts["counts"]
+    assert "Of the 1 right ports, 1 pass" in parts["counts"]
