@@ -9,13 +9,13 @@ from endotsr.config import PAPER, Config
 # Fraction of an iteration of the published settings that each part takes: `endotsr bench effects`, file
 # docs/results/bench_effects.json (a test compares the two).
 MEASURED = {
-    "deformation": 0.34,
-    "spectral_motion": 0.05,
-    "appearance": 0.05,
-    "harmonics": 0.07,
-    "laplacian": 0.03,
-    "depth": 0.02,
-    "smoothness": 0.04,
+    "deformation": 0.48,
+    "spectral_motion": 0.04,
+    "appearance": 0.04,
+    "harmonics": 0.05,
+    "laplacian": 0.02,
+    "depth": 0.03,
+    "smoothness": 0.06,
 }
 ALWAYS = 11  # numbers of a Gaussian without any part: position, quaternion, log-scale, opacity
 CHANNELS = 3
