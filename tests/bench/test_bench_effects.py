@@ -1,15 +1,26 @@
 """`bench effects`: a part that is off holds and allocates what a build without the part does."""
 
+import numba
 import numpy as np
 import pytest
 
 from endotsr.bench import effects
 from endotsr.bench.effects import PARTS, benchmark_effects, table
 from endotsr.fitting import objective
+from endotsr.kernels.threads import use_threads
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    """As the command: with several threads, it is chance whether two of them hold a buffer at the same time."""
+    before = numba.get_num_threads()
+    use_threads(1)
+    yield
+    use_threads(before)
 
 
 @pytest.fixture(scope="module")
-def result():
+def result(one_thread):
     return benchmark_effects(gaussians=60, repeats=1, width=48, height=32)
 
 

@@ -1,9 +1,10 @@
 """`endotsr bench effects`: what every part that can be switched off takes of an iteration, and that off is free.
 
 For each part two states of the common workload take turns, one with everything and one with the part off, so that other
-work on the machine disturbs both alike. A third takes turns with them: the part off, in a build in which the functions
-of the part do not exist. It must take the same time and memory as the second. Memory is what the Gaussians and their
-moments hold, and the most that one iteration allocates beside what is held before it.
+work on the machine disturbs both alike. A third build takes turns with them: the second state, while the functions of
+the part do not exist. It must take the same time and memory. It has the same arrays, because the place of an array in
+memory alone is worth a few percent of the time. Memory is what Gaussians and moments hold that were made in such a
+build, and the most that one iteration allocates beside what is held before it.
 """
 
 import statistics
@@ -58,21 +59,24 @@ def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, con
 
 def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
     case = Case(gaussians=gaussians, width=width, height=height)
-    everything, off, absent = (_prepared(case, c) for c in (config, changed(config, part), changed(config, part)))
+    everything, off = _prepared(case, config), _prepared(case, changed(config, part))
+    with _without(part.functions):
+        absent = _prepared(case, changed(config, part))
+    made = {"everything": (*everything, ()), "off": (*off, ()), "absent": (*absent, part.functions)}
+    sizes = {name: _numbers(state) for name, (state, _, _) in made.items()}
+    allocated = {name: _allocated(*entry) for name, entry in made.items()}  # each draws the same views so far
     builds: dict[str, tuple[Any, Any, tuple[tuple[Any, str], ...]]] = {
-        "everything": (*everything, ()), "off": (*off, ()), "absent": (*absent, part.functions),
+        "everything": (*everything, ()), "off": (*off, ()), "absent": (*off, part.functions),
     }  # fmt: skip
     seconds: dict[str, list[float]] = {name: [] for name in builds}
     for turn in range(repeats + 2):
         for name, (state, shop, missing) in builds.items():
-            _iteration(state, shop, missing)  # fills the caches, which the state before it has left with its own arrays
+            _iteration(state, shop, missing)  # fills the caches, which the state before it left with its own
             taken = _iteration(state, shop, missing)
             if turn >= 2:  # after compilation and one warm turn
                 seconds[name].append(taken)
     pairs = list(zip(seconds["off"], seconds["absent"]))
     medians = {name: statistics.median(values) for name, values in seconds.items()}
-    sizes = {name: _numbers(state) for name, (state, _, _) in builds.items()}
-    allocated = {name: _allocated(state, shop, missing) for name, (state, shop, missing) in builds.items()}
     return {
         "everything_ms": 1e3 * medians["everything"],
         "off_ms": 1e3 * medians["off"],
@@ -116,6 +120,8 @@ def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> f
 def _allocated(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> int:
     """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
     with _without(missing):
+        for _ in range(3):  # compiles, and allocates what stays
+            _step(state, shop)
         tracemalloc.start()
         try:
             _step(state, shop)
