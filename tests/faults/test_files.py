@@ -92,11 +92,11 @@ def test_every_piece_of_work_is_done_and_the_first_error_raised():
 
 
 STALLED = """
-import signal, threading
+import os, signal, threading
 signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where a shell runs the tests in the background
 from endotsr.untrusted.files import in_threads
 def work(k):
-    print("waiting", flush=True)
+    os.write(1, b"waiting\\n")  # in one piece: several threads write
     threading.Event().wait()  # a disk that does not answer
 in_threads(work, 3)
 """
