@@ -21,6 +21,7 @@ import effects_parts
 import effects_sinus
 import effects_truth
 import kept
+import msgspec
 from marks import read_json, write_marked
 
 from endotsr.bench.suite import dated
@@ -96,12 +97,7 @@ def train(seeds: int, names: list[str]) -> dict[str, Any]:
 
 def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
     """Both settings on a real clip at half size."""
-    import msgspec
-
-    from endotsr.sequences.endonerf import read_endonerf
-
-    sequence = read_endonerf(folder, msgspec.structs.replace(DEMO.sequence, scale=0.5), DEMO.raster.near)
-    return _pair(sequence, seed, REAL_ITERATIONS)
+    return _pair(_read_endonerf(folder, 0.5), seed, REAL_ITERATIONS)
 
 
 def _clip(name: str, seed: int) -> Any:
@@ -160,10 +156,10 @@ def real(folders: list[Path]) -> dict[str, Any]:
     return {"clips": found}
 
 
-def _read_endonerf(folder: Path) -> Any:
+def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
     from endotsr.sequences.endonerf import read_endonerf
 
-    return read_endonerf(folder, PAPER.sequence, PAPER.raster.near)
+    return read_endonerf(folder, msgspec.structs.replace(PAPER.sequence, scale=scale), PAPER.raster.near)
 
 
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:

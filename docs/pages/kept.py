@@ -6,20 +6,30 @@ The file stands beside the result, whose name it has with `.part`, until the res
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 import endotsr
 from endotsr.errors import InputError
+from endotsr.kernels.machine import usable_cores
 
 
 def measured(
-    result: Path, about: dict[str, Any], keys: Iterable[str], measure: Callable[[str], dict[str, Any]]
+    result: Path,
+    about: dict[str, Any],
+    keys: Iterable[str],
+    measure: Callable[[str], dict[str, Any]],
+    jobs: int = 1,
 ) -> dict[str, dict[str, Any]]:
     """The answers for all keys; those that are kept are read, the others are measured and kept.
 
     about    JSON-able; kept answers must have the same
+    jobs     processes that measure at a time, among which the cores are divided. More than one needs a `measure`
+             that can be sent to a process: a function of a module, or a `functools.partial` of one
 
     Raises: InputError naming the file, if it belongs to another measurement or is damaged.
     """
@@ -28,13 +38,32 @@ def measured(
     found = _read(path, about)
     if not path.exists():
         path.write_text(json.dumps(about) + "\n", encoding="utf-8")
+    missing = [key for key in keys if key not in found]
     with path.open("a", encoding="utf-8") as file:
-        for key in keys:
-            if key not in found:
-                found[key] = measure(key)
-                file.write(json.dumps({"key": key, "answer": found[key]}) + "\n")
-                file.flush()
+        for key, answer in _answers(missing, measure, jobs):
+            found[key] = answer
+            file.write(json.dumps({"key": key, "answer": answer}) + "\n")
+            file.flush()
     return found
+
+
+def _answers(
+    missing: list[str], measure: Callable[[str], dict[str, Any]], jobs: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Keys and answers, as they are found."""
+    if jobs < 2:
+        yield from ((key, measure(key)) for key in missing)
+        return
+    with ProcessPoolExecutor(
+        jobs, multiprocessing.get_context("spawn"), _with_threads, (usable_cores() // jobs,)
+    ) as pool:
+        running = {pool.submit(measure, key): key for key in missing}
+        yield from ((running[done], done.result()) for done in as_completed(running))
+
+
+def _with_threads(count: int) -> None:
+    """For a new process, before Numba is imported."""
+    os.environ["NUMBA_NUM_THREADS"] = str(max(1, count))
 
 
 def sources(*rooms: str) -> str:

@@ -1,13 +1,19 @@
-"""Train `sharp` with one of its changes taken back at a time, on simulated scenes over seeds, and write the table.
+"""Train `sharp`, `paper`, and `sharp` with one of its changes taken back at a time, over seeds, and write the tables.
 
-    python docs/pages/levers.py [--seeds 3] [--iterations 1500] [--table]
+    python docs/pages/levers.py [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
+    python docs/pages/levers.py --table    write the tables of the last result again
 
-The scenes, the points and the length are those of docs/pages/trajectories.py. Every run is kept when it ends, and a
-command that was stopped goes on with the runs that are missing. The result is docs/results/levers.json; the table
-stands in docs/results/README.md between its marks; --table writes it again.
+Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder; it is read at half size, and
+its held-out frames are left out: every eighth frame of the others is held out in their place. Every run has the
+length `--iterations` and the initial points of `demo`. Every run is kept when it ends, and a command that was stopped
+goes on with the runs that are missing. The result is docs/results/levers.json; the tables stand in
+docs/results/README.md between their marks.
 """
 
+import argparse
+from dataclasses import replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,71 +21,151 @@ import kept
 import numpy as np
 from marks import read_json, write_marked
 from scipy import stats
-from trajectories import SCENES, asked, measured
 
+from endotsr.config import DEMO
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
+from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.splits import every_eighth
 
 RESULTS = Path(__file__).parents[1] / "results"
 FILE = RESULTS / "levers.json"
-WHOLE = "`sharp`"
-TAKEN_BACK: dict[str, dict[str, dict[str, Any]]] = {
-    WHOLE: {},
+SIMULATED: dict[str, dict[str, Any]] = {
+    "demo": {},
+    "pull and breath": {
+        "frames": 40, "seed": 7, "width": 192, "height": 144,
+        "pulsation": {"on": False}, "brightening": {"on": False}, "pull": {"amplitude": 7.0},
+    },
+}  # fmt: skip
+POINTS = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
+SHARP, PAPER = "`sharp`", "`paper`"
+CHANGES: dict[str, dict[str, dict[str, Any]]] = {
+    SHARP: {},
+    PAPER: {},
     "no tracked motion": {"initialisation": {"motion": "none"}},
     "no targets between the frames": {"training": {"bridge_fraction": 0.0}},
+    "these targets at rest": {"training": {"bridge_target": "neighbour"}},
+    "these targets in half of the iterations": {"training": {"bridge_fraction": 0.5}},
     "rates not annealed": {"optimiser": {"annealed_factor": 1.0}},
     "position rate of `paper`": {"optimiser": {"deformation_position_factor": 1.0}},
     "`ssim_weight` of `paper`": {"loss": {"ssim_weight": 0.1}},
     "width of `paper`": {"model": {"initial_width": 0.01}},
+    "twice the initial points": {"initialisation": {key: 2 * count for key, count in POINTS.items()}},
 }
+"""Row of the table -> what is changed in the settings, by section; the first two rows are the presets."""
 SHOWN = (("psnr_tissue", "held-out PSNR tissue, dB", 2), ("scene_units", "trajectory error, mm", 3))
+MOTION = (
+    ("scene_units", "trajectory error, mm", 3),
+    ("pixels", "trajectory error, px", 2),
+    ("psnr_tissue", "held-out PSNR tissue, dB", 2),
+    ("cross_fade", "blend of its own renders, dB", 2),
+    ("flow", "optical flow, dB", 2),
+)
 
 
-def found(seeds: int, iterations: int) -> dict[str, Any]:
-    """Scene -> label -> seed -> numbers of the run; runs that are kept are not trained again."""
-    about = {"seeds": seeds, "iterations": iterations, "sources": kept.sources("")}
+def scene_of(name: str, clips: dict[str, str]) -> Sequence:
+    """A simulated scene, or the training frames of a clip {name: folder}, split among themselves."""
+    import endotsr
+
+    if name in SIMULATED:
+        return endotsr.load_sequence("simulated", simulator=SIMULATED[name])
+    return inner(endotsr.load_sequence(clips[name], scale=0.5))
+
+
+def inner(sequence: Sequence) -> Sequence:
+    """The training frames alone, of which every eighth is held out; they keep their times."""
+    own = sequence.train_index
+    train, test = every_eighth(len(own))
+    return replace(
+        sequence,
+        images=sequence.images[own], masks=sequence.masks[own], depth=sequence.depth[own], times=sequence.times[own],
+        cameras=[sequence.cameras[i] for i in own], names=[sequence.names[i] for i in own],
+        train_index=train, test_index=test,
+    )  # fmt: skip
+
+
+def measured(
+    key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str]
+) -> dict[str, float]:
+    """Train one run (scene, row of `CHANGES`, seed), and measure it; trajectories where their truth is known."""
+    import endotsr
+
+    scene, label, seed = runs[key]
+    sections: dict[str, dict[str, Any]] = {
+        "training": {"seed": seed},
+        "initialisation": POINTS,
+        "density": {"gradient_threshold": DEMO.density.gradient_threshold},
+    }
+    for section, values in CHANGES[label].items():
+        sections[section] = sections.get(section, {}) | values
+    config = endotsr.make_config("paper" if label == PAPER else "sharp", iterations=iterations, **sections)
+    metrics = endotsr.train(scene_of(scene, clips), config, on_message=lambda text: None).evaluate()
+    return (metrics["trajectories"] or {}) | {
+        "psnr_tissue": metrics["held_out"]["mean"]["psnr_tissue"],
+        "cross_fade": metrics["cross_fade"]["mean"]["psnr_tissue"],
+        "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
+    }
+
+
+def found(clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict[str, Any]:
+    """Scene -> row -> numbers of the runs in the order of their seeds; runs that are kept are not trained again."""
+    about = {"iterations": iterations, "sources": kept.sources("")}
+    scenes = (*SIMULATED, *clips)
     runs = {
         f"{scene}, {label}, seed {seed}": (scene, label, seed)
         for seed in range(seeds)
-        for scene in SCENES
-        for label in TAKEN_BACK
+        for scene in scenes
+        for label in CHANGES
+    }
+    train = partial(measured, runs=runs, iterations=iterations, clips=clips)
+    answers = kept.measured(FILE, about, runs, train, jobs)
+    return {
+        scene: {label: [answers[f"{scene}, {label}, seed {seed}"] for seed in range(seeds)] for label in CHANGES}
+        for scene in scenes
     }
 
-    def train(key: str) -> dict[str, float]:
-        scene, label, seed = runs[key]
-        return measured(SCENES[scene], "sharp", seed, iterations, TAKEN_BACK[label])
 
-    answers = kept.measured(FILE, about, runs, train)
-    scenes: dict[str, Any] = {}
-    for key, (scene, label, seed) in runs.items():
-        scenes.setdefault(scene, {}).setdefault(label, {})[str(seed)] = answers[key]
-    return scenes
+def motion_table(result: dict[str, Any]) -> str:
+    """Both presets on the simulated scenes: means, standard deviations, and what the tissue itself moves."""
+    rows = []
+    for scene in SIMULATED:
+        for label in (PAPER, SHARP):
+            runs = result["scenes"][scene][label]
+            cells = [_over(np.array([run[key] for run in runs]), digits) for key, _, digits in MOTION]
+            rows.append([f"{scene}, {label}", f"{runs[0]['motion_scene_units']:.3f}", *cells])
+    head = ["Scene and preset", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
+    return markdown(head, rows) + f"\n\nMean ± standard deviation; {_about(result)}"
 
 
 def table(result: dict[str, Any]) -> str:
-    """Means over the seeds of `sharp`, and the paired differences of what is taken back with 95 % intervals."""
+    """Means over the seeds of `sharp`, and the paired differences of the other rows with 95 % intervals."""
     rows = []
-    if not result:
-        return "Not measured yet."
     for scene, variants in result["scenes"].items():
         for label, runs in variants.items():
-            pairs = [(runs[seed], variants[WHOLE][seed]) for seed in sorted(runs)]
-            values = [np.array([[run[key] for run in pair] for pair in pairs]) for key, _, _ in SHOWN]
-            cells = [_cell(v, label, digits) for v, (_, _, digits) in zip(values, SHOWN, strict=True)]
-            rows.append([scene, label, str(len(pairs)), *cells])
-    about = (
-        f"Difference from `sharp` on the same seed, mean ± 95 % interval; {result['iterations']} iterations; "
-        f"{result['machine']['processor']}, {result['date']}."
-    )
-    return markdown(["Scene", "Settings", "seeds", *(name for _, name, _ in SHOWN)], rows) + "\n\n" + about
+            cells = [_cell(runs, variants[SHARP], key, digits) for key, _, digits in SHOWN]
+            rows.append([scene, label, *cells])
+    about = f"Difference from {SHARP} on the same seed, mean ± 95 % interval; {_about(result)}"
+    return markdown(["Scene", "Settings", *(name for _, name, _ in SHOWN)], rows) + "\n\n" + about
 
 
-def _cell(values: np.ndarray, label: str, digits: int) -> str:
-    """`values` has shape (seeds, 2): the run, and `sharp` on that seed."""
-    if label == WHOLE:
-        return f"{values[:, 0].mean():.{digits}f}"
-    apart = values[:, 0] - values[:, 1]
+def _about(result: dict[str, Any]) -> str:
+    where = f"{result['machine']['processor']}, {result['date']}"
+    return f"{result['seeds']} seeds, {result['iterations']} iterations; {where}."
+
+
+def _over(values: np.ndarray, digits: int) -> str:
+    return f"{values.mean():.{digits}f} ± {values.std(ddof=1) if values.size > 1 else 0:.{digits}f}"
+
+
+def _cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
+    """The mean for the row of `sharp`, the paired difference for the others, and a dash where nothing is known."""
+    if key not in runs[0]:
+        return "-"
+    values = np.array([run[key] for run in runs])
+    if runs is sharp:
+        return f"{values.mean():.{digits}f}"
+    apart = values - [run[key] for run in sharp]
     if apart.size < 2:
         return f"{apart.mean():+.{digits}f}"
     half = stats.t.ppf(0.975, apart.size - 1) * apart.std(ddof=1) / np.sqrt(apart.size)
@@ -88,14 +174,21 @@ def _cell(values: np.ndarray, label: str, digits: int) -> str:
 
 def main() -> None:
     """The command."""
-    options = asked(__doc__)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--iterations", type=int, default=1500)
+    parser.add_argument("--jobs", type=int, default=2, help="runs at a time; the numbers do not depend on it")
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args()
     if not options.table:
+        clips = {folder.name: str(folder.resolve()) for folder in options.clips}
+        scenes = found(clips, options.seeds, options.iterations, options.jobs)
         about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
-        scenes = found(options.seeds, options.iterations)
         write_json(FILE, about | {"machine": machine(), "scenes": scenes})
         kept.finished(FILE)
-    result = read_json(FILE, "docs/pages/levers.py") if FILE.exists() else {}
-    write_marked(RESULTS / "README.md", {"table": table(result)}, "levers")
+    result = read_json(FILE, "docs/pages/levers.py")
+    write_marked(RESULTS / "README.md", {"table": table(result), "motion": motion_table(result)}, "levers")
 
 
 if __name__ == "__main__":

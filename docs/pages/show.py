@@ -19,6 +19,7 @@ from marks import write_marked
 from endotsr.api import Run, open_run
 from endotsr.bench.suite import dated
 from endotsr.errors import InputError
+from endotsr.evaluation.metrics import psnr
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 
@@ -69,10 +70,10 @@ def _in_browser(run: Run, page: Path) -> dict[str, float]:
     from browser import drawn
     from frame_rate import milliseconds_a_picture
 
-    reference = np.clip(run.render(MOMENT).colour.transpose(1, 2, 0), 0.0, 1.0)
-    picture = drawn(page, f"t={MOMENT}") / 255.0
-    error = float(((picture - reference) ** 2).mean())
-    return {"milliseconds": milliseconds_a_picture(page), "psnr": -10 * float(np.log10(error))}
+    reference = np.clip(run.render(MOMENT).colour, 0.0, 1.0)
+    picture = drawn(page, f"t={MOMENT}").transpose(2, 0, 1) / 255.0
+    whole = np.ones(reference.shape[1:], bool)
+    return {"milliseconds": milliseconds_a_picture(page), "psnr": psnr(picture, reference, whole)}
 
 
 def table(result: dict[str, Any]) -> str:

@@ -56,6 +56,14 @@ def test_another_measurement_and_a_damaged_file_are_refused(tmp_path):
         kept.measured(result, {"frames": 3}, KEYS, lambda key: {})
 
 
+def test_processes_find_the_same_answers(tmp_path):
+    result = tmp_path / "result.json"
+    found = kept.measured(result, {"frames": 3}, KEYS, dict.fromkeys, jobs=2)
+    assert found == {key: {key: None} for key in KEYS}
+    again = kept.measured(result, {"frames": 3}, KEYS, lambda key: pytest.fail("measured twice"))
+    assert again == found
+
+
 def test_a_changed_source_is_another_measurement(tmp_path, monkeypatch):
     package = tmp_path / "endotsr"
     (package / "effects").mkdir(parents=True)

@@ -1,7 +1,7 @@
 """A moving camera: what a rigid scene explains is no motion of the tissue, and what it does not explain is."""
 
-import dataclasses
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +18,6 @@ from endotsr.effects.tracks import make_tracks
 from endotsr.simulator.simulate import simulate
 
 SWING = 3.0  # mm
-
-
-def _with(sequence, **changes):
-    fields = {f.name: getattr(sequence, f.name) for f in dataclasses.fields(sequence) if f.init}
-    return type(sequence)(**(fields | changes))
 
 
 def _motion(sequence):
@@ -58,7 +53,7 @@ def test_predicted_flow_is_that_of_the_simulated_tissue():
 
 def test_a_resting_scene_needs_no_depth():
     sequence = clip("noise", "camera_motion", amplitude=SWING)
-    verdict = _motion(_with(sequence, depth=np.zeros_like(sequence.depth)))
+    verdict = _motion(replace(sequence, depth=np.zeros_like(sequence.depth)))
     assert verdict.kind == "none" and verdict.statistic < 0.8
 
 
@@ -74,7 +69,7 @@ def _behind_a_round_stop(sequence, rim):
     radius = np.hypot(y - 0.5 * height, x - 0.5 * width) / (0.48 * height)
     images = np.where(radius < 1, sequence.images, 0)
     images = np.where((radius > 1 - rim) & (radius < 1), 255, images).astype(np.uint8)
-    return _with(sequence, images=images, masks=sequence.masks & (radius < 1))
+    return replace(sequence, images=images, masks=sequence.masks & (radius < 1))
 
 
 @pytest.mark.parametrize("rim", [0.0, 0.05])
@@ -88,7 +83,7 @@ def test_tiles_beside_excluded_pixels_are_left_out():
     sequence = clip("noise", "camera_motion", amplitude=SWING)
     masks = sequence.masks.copy()
     masks[:, 40:44, 72:76] = False
-    changed = training_clip(_with(sequence, masks=masks))
+    changed = training_clip(replace(sequence, masks=masks))
     noise = estimate_noise(sequence, changed)
     clear = fit_rigid(changed, make_tracks(changed, noise), noise).clear.reshape(128 // TILE, 160 // TILE)
     assert not clear[0].any() and not clear[:, -1].any()  # the edge of the picture
@@ -102,7 +97,7 @@ def test_flow_that_does_not_return_counts_as_noise():
     images = sequence.images.copy()
     rng = np.random.default_rng(3)
     images[:, :, 32:96, 32:128] = rng.integers(60, 200, images[:, :, 32:96, 32:128].shape, dtype=np.uint8)
-    changed = training_clip(_with(sequence, images=images))
+    changed = training_clip(replace(sequence, images=images))
     noise = estimate_noise(sequence, changed)
     tracks = make_tracks(changed, noise)
     inside = (slice(3, 5), slice(3, 7))

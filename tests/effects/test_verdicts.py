@@ -1,6 +1,6 @@
 """Each effect alone is found, and nothing else; noise is measured; held-out frames are not read."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,13 +36,8 @@ def test_noise_is_measured_and_moving_texture_adds_little_to_it(sigma, effects, 
     sequence = clip(*effects)
     rng = np.random.default_rng(0)
     noisy = np.clip(sequence.images + rng.normal(0, 255 * sigma, sequence.images.shape), 0, 255)
-    changed = _with(sequence, images=np.rint(noisy).astype(np.uint8))
+    changed = replace(sequence, images=np.rint(noisy).astype(np.uint8))
     assert 0.9 * sigma < estimate_noise(changed, training_clip(changed)).level < most * sigma
-
-
-def _with(sequence, **changes):
-    fields = {f.name: getattr(sequence, f.name) for f in dataclasses.fields(sequence) if f.init}
-    return type(sequence)(**(fields | changes))
 
 
 def test_held_out_frames_are_not_read():
@@ -52,7 +47,7 @@ def test_held_out_frames_are_not_read():
     images[sequence.test_index] = 255 - images[sequence.test_index]
     depth[sequence.test_index] = np.nan
     masks[sequence.test_index] = False
-    changed = inspect_sequence(_with(sequence, images=images, depth=depth, masks=masks))
+    changed = inspect_sequence(replace(sequence, images=images, depth=depth, masks=masks))
     assert inspection_record(changed) == inspection_record(inspected("noise", "exposure"))
 
 
@@ -86,7 +81,7 @@ def test_wider_views_determine_higher_degrees(amplitude, degree):
     """Millimetres of a camera that is 50 mm away."""
     sequence = clip("noise", "camera_motion")
     cameras = make_cameras(settings_of(("noise", "camera_motion"), 0, sequence.count, amplitude), sequence.times)
-    moved = _with(sequence, cameras=cameras)
+    moved = replace(sequence, cameras=cameras)
     assert view_verdict(moved, training_clip(moved)).details["degree"] == degree
 
 
@@ -95,22 +90,22 @@ def test_too_little_tissue_leaves_motion_open():
     sequence = clip("noise", "camera_motion")
     masks = np.zeros_like(sequence.masks)
     masks[:, 40:70, 40:70] = True
-    verdict = inspect_sequence(_with(sequence, masks=masks)).verdicts["motion"]
+    verdict = inspect_sequence(replace(sequence, masks=masks)).verdicts["motion"]
     assert verdict.present and verdict.kind == "unknown"
 
 
 def test_a_moving_camera_without_depth_keeps_every_degree_and_gives_numbers():
     sequence = clip("noise", "camera_motion")
-    verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["view change"]
+    verdict = inspect_sequence(replace(sequence, depth=np.zeros_like(sequence.depth))).verdicts["view change"]
     assert verdict.present and verdict.kind == "unknown" and verdict.details["degree"] == 3
     assert np.isfinite([verdict.statistic, verdict.details["angle_degrees"], *verdict.details["changes"]]).all()
 
 
 def test_depth_that_cannot_be_used_is_said():
     sequence = clip("noise")
-    verdict = inspect_sequence(_with(sequence, depth=np.zeros_like(sequence.depth))).verdicts["depth quality"]
+    verdict = inspect_sequence(replace(sequence, depth=np.zeros_like(sequence.depth))).verdicts["depth quality"]
     assert verdict.kind == "unusable" and not verdict.details["usable"]
-    steps = inspect_sequence(_with(sequence, depth=np.rint(sequence.depth))).verdicts["depth quality"]
+    steps = inspect_sequence(replace(sequence, depth=np.rint(sequence.depth))).verdicts["depth quality"]
     assert "quantised" in steps.kind and steps.details["step"] == 1.0
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from endotsr.config import DEMO, PAPER
 from endotsr.fitting import compile_ahead
-from endotsr.kernels.threads import len_cores
+from endotsr.kernels.machine import usable_cores
 
 COMPILE = """
 from endotsr.fitting import compile_ahead
@@ -42,7 +42,7 @@ print(json.dumps([missed, sum(bool(s.cache_hits) for s in stats.values())]))
 """
 
 
-@pytest.mark.skipif(len_cores() < 2, reason="one core: nothing is compiled ahead")
+@pytest.mark.skipif(usable_cores() < 2, reason="one core: nothing is compiled ahead")
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="the compiler is off")
 def test_a_training_finds_every_kernel_compiled(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
@@ -56,7 +56,7 @@ def test_a_training_finds_every_kernel_compiled(tmp_path):
 @pytest.mark.parametrize("program", ["false", "/nowhere/python"])
 def test_without_the_second_process_all_goes_on(tmp_path, monkeypatch, program):
     monkeypatch.setattr(compile_ahead, "done_before", lambda config: tmp_path / "marker")
-    monkeypatch.setattr(compile_ahead, "len_cores", lambda: 2)
+    monkeypatch.setattr(compile_ahead, "usable_cores", lambda: 2)
     monkeypatch.setattr(sys, "executable", program)
     said = []
     assert compile_ahead.compile_ahead(DEMO, said.append) == (os.environ.get("NUMBA_DISABLE_JIT") != "1")

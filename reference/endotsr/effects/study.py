@@ -176,9 +176,7 @@ def _spoiled(sequence: Sequence, count: int, change: Callable[[np.ndarray], np.n
     first = (len(sequence.train_index) - count) // 2
     for i in sequence.train_index[first : first + count]:
         images[i] = np.rint(change(images[i])).astype(np.uint8)
-    fields: dict[str, Any] = {f.name: getattr(sequence, f.name) for f in dataclasses.fields(sequence) if f.init}
-    fields["images"] = images
-    return Sequence(**fields)
+    return dataclasses.replace(sequence, images=images)
 
 
 def answers(inspection: Inspection) -> dict[str, bool]:

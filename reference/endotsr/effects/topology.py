@@ -14,12 +14,12 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from endotsr.effects.clip import LUMINANCE, Clip
+from endotsr.effects.clip import Clip
 from endotsr.effects.noise import Noise
-from endotsr.effects.tracks import inside, normalised
+from endotsr.effects.tracks import matched
 from endotsr.effects.verdict import UNKNOWN, Map, Verdict
 from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.opencv import dense_flow, warp_bilinear
+from endotsr.opencv import warp_bilinear
 
 WINDOW = 2.5  # Gaussian radius of the local structure, working pixels
 AGREES = 0.8  # least median correlation of the frames of the same end
@@ -56,7 +56,8 @@ def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: b
     if len(frames) < 2 * count:
         return _verdict(UNKNOWN, 0.0, clip, None, "There are too few clear frames to compare")
     first, last = frames[:count], frames[-count:][::-1]
-    ends = [_end(clip, first, last, noise), _end(clip, last, first, noise)]
+    grey, sigma = clip.luminance, float(noise.working.mean())
+    ends = [_end(clip, grey, *pair, sigma) for pair in ((first, last), (last, first))]
     needed = [LEAST_REGION * max(int((end.agrees & end.seen).sum()), 1) for end in ends]
     statistic, end = max(((e.region / n, e) for e, n in zip(ends, needed)), key=lambda pair: pair[0])
     if min(e.common for e in ends) < LEAST_COMMON:
@@ -66,12 +67,14 @@ def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: b
     return _verdict("suspected" if statistic >= 1.0 else "none", statistic, clip, end)
 
 
-def _end(clip: Clip, near: np.ndarray, far: np.ndarray, noise: Noise) -> End:
+def _end(clip: Clip, grey: FloatArray, near: np.ndarray, far: np.ndarray, sigma: float) -> End:
     """Compare the frames of both ends with the outermost frame of the near one."""
-    reference, others = int(near[0]), near[1:]
-    with np.errstate(all="ignore"):
-        own = np.nan_to_num(_median([local_correlation(clip, reference, int(k), noise) for k in others]), nan=-1.0)
-        best = np.fmax.reduce([local_correlation(clip, reference, int(k), noise) for k in far])
+
+    def with_reference(frames: np.ndarray) -> list[FloatArray]:
+        return [local_correlation(clip, grey, int(near[0]), int(k), sigma) for k in frames]
+
+    own = np.nan_to_num(_median(with_reference(near[1:])), nan=-1.0)
+    best = np.fmax.reduce(with_reference(far))
     agrees, seen = own > AGREES, np.isfinite(best)
     lost = _without_single_pixels(agrees & seen & (best < LOST))
     return End(agrees, seen, lost, _largest_region(lost))
@@ -86,19 +89,15 @@ def _median(rows: list[FloatArray]) -> FloatArray:
         return np.nanmedian(np.array(rows), axis=0)
 
 
-def local_correlation(clip: Clip, reference: int, other: int, noise: Noise) -> FloatArray:
+def local_correlation(clip: Clip, grey: FloatArray, reference: int, other: int, sigma: float) -> FloatArray:
     """Correlation (h, w) of the structure around each pixel of a frame with that of another frame moved onto it.
 
+    grey    (m, h, w) the luminance of the clip; sigma is the deviation of the noise in it
     In [-1, 1]; nan where either frame does not show tissue, or the flow leads out of the picture.
     """
-    sigma = float(noise.working.mean())
-    grey = [np.einsum("c,chw->hw", LUMINANCE, clip.images[k]) for k in (reference, other)]
-    common = clip.masks[reference] & clip.masks[other]
-    start, end = (normalised(g, common, sigma) for g in grey)
-    flow = dense_flow(start, end, "dis")
-    seen = common & inside(flow) & (warp_bilinear(clip.masks[other].astype(np.float32), flow) > 0.999)
-    moved = warp_bilinear(end.astype(np.float32)[None], flow)[0]
-    return np.where(seen, _correlation(start.astype(np.float32) - 128, moved - 128, seen), np.nan)
+    match = matched(clip, grey, reference, other, sigma)
+    moved = warp_bilinear(match.end.astype(np.float32)[None], match.flow)[0]
+    return np.where(match.seen, _correlation(match.start.astype(np.float32) - 128, moved - 128, match.seen), np.nan)
 
 
 def _correlation(a: FloatArray, b: FloatArray, seen: BoolArray) -> FloatArray:

@@ -34,35 +34,50 @@ class Tracks(NamedTuple):
     aligned: NDArray[np.float32]  # (m, 3, h, w) the frames moved onto the reference, display units
 
 
+class Match(NamedTuple):
+    """Two frames, and the flow from the first to the second, on the working grid."""
+
+    start: NDArray[np.uint8]  # (h, w) `normalised`
+    end: NDArray[np.uint8]  # (h, w)
+    flow: NDArray[np.float32]  # (2, h, w) working pixels; exactly 0 from a frame to itself
+    seen: BoolArray  # (h, w) tissue in the first and, where the flow leads, in the second
+
+
+def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) -> Match:
+    """The flow between two training frames by number. grey: the luminance of the clip (m, h, w)."""
+    common = clip.masks[start] & clip.masks[end]
+    before, after = (normalised(grey[k], common, sigma) for k in (start, end))
+    flow = np.zeros((2, *common.shape), np.float32) if start == end else dense_flow(before, after, "dis")
+    seen = common & inside(flow) & (warp_bilinear(clip.masks[end].astype(np.float32), flow) > 0.999)
+    return Match(before, after, flow, seen)
+
+
 def make_tracks(clip: Clip, noise: Noise) -> Tracks:
     """Flow, its mean in tiles, its null, and the aligned frames."""
-    reference = clip.reference
-    sigma = float(noise.working.mean())
-    grey, mask = clip.luminance, clip.masks[reference]
+    sigma, grey = float(noise.working.mean()), clip.luminance
     flow, valid, tiles, aligned = [], [], [], []
     for k in range(clip.count):
-        common = mask & clip.masks[k]
-        found = np.zeros((2, *mask.shape), np.float32)
-        if k != reference:
-            found = dense_flow(
-                normalised(grey[reference], common, sigma), normalised(grey[k], common, sigma), "dis"
-            )  # fmt: skip
-        seen = common & inside(found) & (warp_bilinear(clip.masks[k].astype(np.float32), found) > 0.999)
-        flow.append(found * clip.shrink)
-        valid.append(seen)
-        tiles.append(tile_means(flow[-1], seen)[0])
-        aligned.append(warp_bilinear(clip.images[k], found).astype(np.float32))
+        match = matched(clip, grey, clip.reference, k, sigma)
+        flow.append(match.flow * clip.shrink)
+        valid.append(match.seen)
+        tiles.append(tile_means(flow[-1], match.seen)[0])
+        aligned.append(warp_bilinear(clip.images[k], match.flow).astype(np.float32))
+    copies = min(MOST_NULL, clip.count)
+    null = noise_flow(grey[clip.reference], clip.masks[clip.reference], sigma, copies) * clip.shrink
     stacked = np.array(tiles)
-    usable = np.isfinite(stacked[:, 0]).mean(axis=0) >= VISIBLE_FRAMES
-    null = noise_flow(grey[reference], mask, sigma, min(MOST_NULL, clip.count)) * clip.shrink
-    return Tracks(np.array(flow), np.array(valid), stacked, usable & np.isfinite(null), null, np.array(aligned))
+    usable = _usable(stacked, null, clip.count)
+    return Tracks(np.array(flow), np.array(valid), stacked, usable, null, np.array(aligned))
 
 
 def without_frames(tracks: Tracks, spoiled: BoolArray) -> Tracks:
     """The tracks with some frames (m,) not seen; tiles that too few of the other frames see are dropped."""
     tiles = np.where(spoiled[:, None, None], np.nan, tracks.tiles)
-    seen = np.isfinite(tiles[:, 0]).sum(axis=0) >= VISIBLE_FRAMES * max(int((~spoiled).sum()), 1)
-    return tracks._replace(tiles=tiles, usable=seen & np.isfinite(tracks.null))
+    return tracks._replace(tiles=tiles, usable=_usable(tiles, tracks.null, max(int((~spoiled).sum()), 1)))
+
+
+def _usable(tiles: FloatArray, null: FloatArray, count: int) -> BoolArray:
+    """Tiles (T,) that enough of `count` frames see, and whose null is known."""
+    return (np.isfinite(tiles[:, 0]).sum(axis=0) / count >= VISIBLE_FRAMES) & np.isfinite(null)
 
 
 def inside(flow: FloatArray) -> BoolArray:

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 
 from endotsr.config import Config
-from endotsr.kernels.threads import len_cores
+from endotsr.kernels.machine import usable_cores
 
 READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # kept until this process ends, which does not wait for their last kernels
@@ -32,7 +32,7 @@ def compile_ahead(config: Config, say: Callable[[str], object] = lambda line: No
     """
     import numba
 
-    if numba.config.DISABLE_JIT or len_cores() < 2 or done_before(config).exists():  # type: ignore[attr-defined]
+    if numba.config.DISABLE_JIT or usable_cores() < 2 or done_before(config).exists():  # type: ignore[attr-defined]
         return False
     say("compiling for this machine, once; this takes about half a minute")
     helper = _second(config)

@@ -1,12 +1,13 @@
 """Memory: reuse of what an iteration frees, the limit for what a clip may keep, and values kept up to a limit."""
 
 import ctypes
-import os
 import sys
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 import numpy as np
+
+from endotsr.kernels.machine import memory_of_machine
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -28,14 +29,6 @@ def keep_freed_memory() -> bool:
     except (OSError, AttributeError):
         return False
     return bool(mallopt(_M_MMAP_MAX, 0) and mallopt(_M_TRIM_THRESHOLD, 2**31 - 1))
-
-
-def memory_of_machine() -> float | None:
-    """Bytes of memory of this machine; None where the system does not say."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return None
 
 
 def memory_limit(gigabytes: float) -> float:

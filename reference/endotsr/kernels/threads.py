@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numba
 
 from endotsr.errors import InputError
+from endotsr.kernels.machine import usable_cores
 
 RANGES_PER_THREAD = 16  # no range is shorter than tasks / (threads RANGES_PER_THREAD), so that there are few of them
 
@@ -81,14 +82,9 @@ def use_threads(asked: int) -> int:
         raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")
 
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
-    used = min(asked or len_cores(), most)
+    used = min(asked or usable_cores(), most)
     numba.set_num_threads(used)
     return used
-
-
-def len_cores() -> int:
-    """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _distribute(

@@ -3,13 +3,13 @@
 import contextlib
 import datetime
 import importlib.metadata
-import os
 import platform
 import sys
 from pathlib import Path
 from typing import Any
 
 from endotsr import __version__
+from endotsr.kernels.machine import memory_of_machine, usable_cores
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless")
 
@@ -31,11 +31,12 @@ def machine() -> dict[str, Any]:
             if line.startswith("model name"):
                 processor = line.split(":", 1)[1].strip()
                 break
-    memory = None
-    with contextlib.suppress(AttributeError, ValueError, OSError):
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return {"processor": processor, "cores": cores, "memory_bytes": memory, "system": platform.platform()}
+    return {
+        "processor": processor,
+        "cores": usable_cores(),
+        "memory_bytes": memory_of_machine(),
+        "system": platform.platform(),
+    }
 
 
 def peak_memory_bytes() -> int | None:

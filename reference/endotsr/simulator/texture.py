@@ -19,7 +19,6 @@ FAT = np.array([0.85, 0.62, 0.28])
 ARTERY = np.array([0.42, 0.03, 0.03])
 VEIN = np.array([0.26, 0.05, 0.10])
 FINEST_STEP = 0.08  # mm; half the radius of the thinnest vessel
-BLOCK_ROWS = 32
 SPLINE_DEVIATION = 0.479  # of a cubic B-spline field over independent unit normals, two dimensions
 
 

@@ -1,10 +1,9 @@
 """How many runs a machine takes at a time, and the threads of each: no core and no memory is given out twice."""
 
-import os
 from pathlib import Path
 from typing import NamedTuple
 
-from endotsr.kernels.memory import memory_of_machine
+from endotsr.kernels.machine import memory_of_machine, usable_cores
 from endotsr.sequences.checks.cost import estimated_cost
 
 MARGIN = 1.4  # measured peaks of a training over the estimate, both presets
@@ -57,11 +56,6 @@ def capacity(
     chosen = workers or max(1, min(len(sizes), by_memory, by_cores))
     reason = f"{cores} cores, {needed / 1e9:.1f} GB a run" + (f", {free / 1e9:.1f} GB free" if free else "")
     return Capacity(chosen, threads or max(1, cores // chosen), reason)
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def free_memory() -> float | None:

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
+from endotsr.kernels.machine import usable_cores
 from endotsr.runs.machine import versions
 from endotsr.sequences.sequence import Sequence
-from endotsr.sweeps.capacity import usable_cores
 from endotsr.sweeps.execute import FAILED, Outcome, execute
 from endotsr.sweeps.jobs import Job
 

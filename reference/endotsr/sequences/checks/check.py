@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.kernels.memory import memory_of_machine
+from endotsr.kernels.machine import memory_of_machine
 from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.cost import Cost, estimated_cost
