@@ -16,12 +16,14 @@
 # The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the
 # projection at the centre (EWA). The result is an ellipse on the screen.
 #
-# The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`.
+# The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`. The optional correction of the camera pose,
+# {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.equations.pose import pose_forward, pose_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.covariance import Shape, covariance_forward
@@ -347,16 +349,71 @@ for name in ("position", "rotation", "scale"):
     )
 
 # %% [markdown]
+# ## The correction of the pose
+#
+# $$
+# E=I+\alpha\,[\boldsymbol\omega]_\times+\beta\,[\boldsymbol\omega]_\times^2,\qquad
+# \alpha=\frac{\sin r}{r},\quad\beta=\frac{1-\cos r}{r^2},\qquad
+# W'=E\,W,\qquad\mathbf d'=E\,\mathbf d+\boldsymbol\tau .
+# $$
+#
+# The gradients by $W'$ and $\mathbf d'$ are those that the projection returned above. Every entry of $E$ depends on
+# $\boldsymbol\omega$ through $[\boldsymbol\omega]_\times$ and through both factors, whose derivatives by $\omega_i$ are
+# $\omega_i\alpha'$ and $\omega_i\beta'$.
+
+
+# %% tags=["transcription"]
+def cross(w):
+    """[w]_x"""
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+def pose_text(W, d, omega, tau):
+    """W' and d'."""
+    r, K = np.linalg.norm(omega), cross(omega)
+    alpha, beta = np.sin(r) / r, (1 - np.cos(r)) / r**2
+    E = np.eye(3) + alpha * K + beta * K @ K
+    return E @ W, E @ d + tau, (E, K, r, alpha, beta)
+
+
+def pose_reverse_text(g_W, g_d, W, d, omega, E, K, r, alpha, beta):
+    """g_W, g_d, g_omega and g_tau."""
+    G = g_W @ W.T + np.outer(g_d, d)
+    alpha_prime, beta_prime = (np.cos(r) - alpha) / r**2, (alpha - 2 * beta) / r**2
+    g_omega = [
+        ((alpha * G + beta * (G @ K.T + K.T @ G)) * cross(e)).sum()
+        + omega[i] * (G * (alpha_prime * K + beta_prime * K @ K)).sum()
+        for i, e in enumerate(np.eye(3))
+    ]
+    return E.T @ g_W, E.T @ g_d, g_omega, g_d
+
+
+# %%
+W, d, omega, tau = (
+    camera.rotation,
+    camera.translation,
+    np.array([0.3, -0.2, 0.5]),
+    np.array([0.1, 0.0, -0.2]),
+)
+*corrected, saved_pose = pose_forward(W, d, omega, tau)
+*expected, factors = pose_text(W, d, omega, tau)
+for array, text in zip(corrected, expected):
+    np.testing.assert_allclose(array, text, rtol=1e-13)
+found = pose_reverse(g_W, g_d, saved_pose)
+for array, text in zip(found, pose_reverse_text(g_W, g_d, W, d, omega, *factors)):
+    np.testing.assert_allclose(array, text, rtol=1e-11)
+
+# %% [markdown]
 # ## The gradient check
 #
 # The check runs with the clamp and without it. The inputs include Gaussians beyond the clamp on all four sides and one
-# behind the camera.
+# behind the camera. The correction of the pose is checked at a wide and at a small angle.
 
 # %%
 with one_thread():
     reports = [
         check_pair(all_pairs()[name], pair_stream(name, 0))
-        for name in ("projection_exact", "projection_paper")
+        for name in ("projection_exact", "projection_paper", "pose", "pose_small")
     ]
 print(table(reports))
 assert all(report.passed for report in reports)

@@ -111,7 +111,7 @@ for size in (1.0, 1e-10):
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
-# \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
+# \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure, poses}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
 # $$
 
 

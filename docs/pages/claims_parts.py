@@ -5,11 +5,10 @@ I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced;
 opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0.
 """
 
-import math
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from over_seeds import interval
 
 from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
@@ -72,11 +71,8 @@ def level_verdict(published: float, low: float | None, high: float | None, large
 
 def student(values: list[float]) -> tuple[float, float | None, float | None]:
     """Mean and 95 % interval (Student) of values of several seeds; no interval for one."""
-    mean = float(np.mean(values))
-    if len(values) < 2:
-        return mean, None, None
-    half = float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / math.sqrt(len(values)))
-    return mean, mean - half, mean + half
+    mean, half = interval(values)
+    return (mean, None, None) if len(values) < 2 else (mean, mean - half, mean + half)
 
 
 def full_runs(found: Record | None, runs: list[Record], key: str) -> list[float]:

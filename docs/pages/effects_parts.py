@@ -1,7 +1,8 @@
 """Generated parts of docs/effects.md as Markdown, from the JSON of docs/pages/effects.py and `bench effects`."""
 
-import math
 from typing import Any
+
+from over_seeds import interval
 
 from endotsr.effects.study import ANSWERS, UNITS
 from endotsr.report.tables import markdown
@@ -106,18 +107,6 @@ def training(result: dict[str, Any]) -> str:
         names = ", ".join(f"`{name}`" for name in result["real"])
         note += f" Real, at half size with {result['real_iterations']} iterations: {names}."
     return f"{markdown(heads, rows)}\n\n{note}"
-
-
-def interval(values: list[float]) -> tuple[float, float]:
-    """Mean and half width of its 95 % interval (t distribution); nan for one value."""
-    from scipy import stats
-
-    n = len(values)
-    mean = sum(values) / n
-    if n < 2:
-        return mean, math.nan
-    spread = math.sqrt(sum((v - mean) ** 2 for v in values) / (n - 1) / n)
-    return mean, float(stats.t.ppf(0.975, n - 1)) * spread
 
 
 def real(result: dict[str, Any]) -> str:

@@ -11,7 +11,8 @@ from typing import Any
 
 import kept
 import numpy as np
-from effects_parts import interval, machine
+from effects_parts import machine
+from over_seeds import shown
 
 from endotsr.report.tables import markdown
 
@@ -157,14 +158,9 @@ def table(result: dict[str, Any]) -> str:
 
 def _means(rows: list[dict[str, float]], names: tuple[str, ...]) -> list[str]:
     """Mean and interval of every number over the seeds."""
-    return [_with_interval([row[name] for row in rows], 2) for name in names]
+    return [shown([row[name] for row in rows], 2) for name in names]
 
 
 def _part(rows: list[dict[str, float]], error: str, whole: str, power: int) -> str:
     """1 - (error / whole)^power in percent: power 2 for a fraction of the variance, 1 for one of the length."""
-    return _with_interval([100 * (1 - (row[error] / row[whole]) ** power) for row in rows], 0) + " %"
-
-
-def _with_interval(values: list[float], digits: int) -> str:
-    mean, half = interval(values)
-    return f"{mean:.{digits}f}" + (f" ± {half:.{digits}f}" if len(values) > 1 else "")
+    return shown([100 * (1 - (row[error] / row[whole]) ** power) for row in rows], 0) + " %"

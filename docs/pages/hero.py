@@ -16,7 +16,7 @@ from endotsr.errors import InputError
 from endotsr.export.scene import MovingScene, open_scene
 from endotsr.report.figures import ByteImage, bytes_image
 from endotsr.runs.files import replace_file
-from endotsr.runs.sources import load_run_sequence, remembered_cameras
+from endotsr.runs.sources import load_run_sequence
 from endotsr.views.cameras import fitted, path_cameras, pivot_depth_of
 from endotsr.views.panels import GAP
 from endotsr.views.preview import encoded
@@ -31,7 +31,7 @@ def pictures(scene: MovingScene) -> list[ByteImage]:
     assert scene.folder is not None
     sequence = load_run_sequence(scene.folder, None)
     size = WIDTH, round(WIDTH * sequence.height / sequence.width)
-    cameras = [fitted(camera, *size) for camera in remembered_cameras(scene.record)]
+    cameras = [fitted(camera, *size) for camera in scene.cameras]
     first = scene.render(float(sequence.times[0]), cameras[0])
     moving = path_cameras("sway", cameras, ANGLE, pivot_depth_of(first.depth, first.opacity))
     found = []

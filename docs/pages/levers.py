@@ -20,7 +20,7 @@ from typing import Any
 import kept
 import numpy as np
 from marks import read_json, write_marked
-from scipy import stats
+from over_seeds import shown
 
 from endotsr.config import DEMO
 from endotsr.report.tables import markdown
@@ -46,12 +46,10 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "no tracked motion": {"initialisation": {"motion": "none"}},
     "no targets between the frames": {"training": {"bridge_fraction": 0.0}},
     "these targets at rest": {"training": {"bridge_target": "neighbour"}},
-    "these targets in half of the iterations": {"training": {"bridge_fraction": 0.5}},
     "rates not annealed": {"optimiser": {"annealed_factor": 1.0}},
     "position rate of `paper`": {"optimiser": {"deformation_position_factor": 1.0}},
     "`ssim_weight` of `paper`": {"loss": {"ssim_weight": 0.1}},
     "width of `paper`": {"model": {"initial_width": 0.01}},
-    "twice the initial points": {"initialisation": {key: 2 * count for key, count in POINTS.items()}},
 }
 """Row of the table -> what is changed in the settings, by section; the first two rows are the presets."""
 SHOWN = (("psnr_tissue", "held-out PSNR tissue, dB", 2), ("scene_units", "trajectory error, mm", 3))
@@ -127,15 +125,15 @@ def found(clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict
 
 
 def motion_table(result: dict[str, Any]) -> str:
-    """Both presets on the simulated scenes: means, standard deviations, and what the tissue itself moves."""
+    """Both presets on the simulated scenes: means with intervals, and what the tissue itself moves."""
     rows = []
     for scene in SIMULATED:
         for label in (PAPER, SHARP):
             runs = result["scenes"][scene][label]
-            cells = [_over(np.array([run[key] for run in runs]), digits) for key, _, digits in MOTION]
+            cells = [shown([run[key] for run in runs], digits) for key, _, digits in MOTION]
             rows.append([f"{scene}, {label}", f"{runs[0]['motion_scene_units']:.3f}", *cells])
     head = ["Scene and preset", "the tissue moves, mm", *(label for _, label, _ in MOTION)]
-    return markdown(head, rows) + f"\n\nMean ± standard deviation; {_about(result)}"
+    return markdown(head, rows) + f"\n\nMean ± 95 % interval; {_about(result)}"
 
 
 def table(result: dict[str, Any]) -> str:
@@ -154,22 +152,13 @@ def _about(result: dict[str, Any]) -> str:
     return f"{result['seeds']} seeds, {result['iterations']} iterations; {where}."
 
 
-def _over(values: np.ndarray, digits: int) -> str:
-    return f"{values.mean():.{digits}f} ± {values.std(ddof=1) if values.size > 1 else 0:.{digits}f}"
-
-
 def _cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
     """The mean for the row of `sharp`, the paired difference for the others, and a dash where nothing is known."""
     if key not in runs[0]:
         return "-"
-    values = np.array([run[key] for run in runs])
     if runs is sharp:
-        return f"{values.mean():.{digits}f}"
-    apart = values - [run[key] for run in sharp]
-    if apart.size < 2:
-        return f"{apart.mean():+.{digits}f}"
-    half = stats.t.ppf(0.975, apart.size - 1) * apart.std(ddof=1) / np.sqrt(apart.size)
-    return f"{apart.mean():+.{digits}f} ± {half:.{digits}f}"
+        return f"{np.mean([run[key] for run in runs]):.{digits}f}"
+    return shown([run[key] - other[key] for run, other in zip(runs, sharp, strict=True)], digits, "+")
 
 
 def main() -> None:

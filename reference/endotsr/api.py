@@ -39,7 +39,7 @@ from endotsr.config import (
     with_iterations,
 )
 from endotsr.errors import InputError
-from endotsr.fitting.model import render_at
+from endotsr.fitting.model import corrected_cameras, render_at
 from endotsr.runs import folder as run_folders
 from endotsr.runs import sources
 from endotsr.runs.log import RunLog
@@ -403,9 +403,10 @@ class Run:
     def _camera(self, time: float, camera: Camera | int | None) -> Camera:
         if isinstance(camera, Camera):
             return camera
-        cameras = sources.remembered_cameras(self.sequence_record)
+        record = self.sequence_record
+        cameras = corrected_cameras(self.model.frames, sources.remembered_cameras(record), record["times"])
         if camera is None:
-            return cameras[sources.nearest_frame(self.sequence_record["times"], time)]
+            return cameras[sources.nearest_frame(record["times"], time)]
         if not isinstance(camera, Integral) or not 0 <= int(camera) < len(cameras):
             allowed = f"a Camera, or a frame from 0 to {len(cameras) - 1}"
             raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")

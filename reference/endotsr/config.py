@@ -66,6 +66,8 @@ class ModelConfig(Section, frozen=True, kw_only=True):
     """flexible deformation model; off = a rigid scene"""
     exposure: bool = False
     """gain and bias of each colour channel for every training frame, eq. (B13)"""
+    pose_correction: bool = False
+    """rotation and translation on top of the given pose of every training frame, eq. (B16)"""
     basis: Literal["quartic", "gaussian"] = "quartic"
     """FDM time basis: `quartic` is what the released code computes"""
     bases: PositiveCount = 17
@@ -151,6 +153,8 @@ class OptimiserConfig(Section, frozen=True, kw_only=True):
     """quaternion"""
     exposure: NonNegative = 1e-3
     """log gain and bias of the exposures, decaying"""
+    pose: NonNegative = 1e-3
+    """corrections of poses, decaying: rotation in rad, translation in median depths of the tissue"""
     spectral_motion_factor: NonNegative = 0.1
     """translation residual C, times `deformation`, decaying"""
     appearance_factor: NonNegative = 31.25 / 16.0

@@ -4,8 +4,9 @@ import math
 import re
 
 import pytest
-from effects_parts import ANSWERED, interval
+from effects_parts import ANSWERED
 from marks import replaced
+from over_seeds import interval, shown
 
 import effects
 from endotsr.effects.inspect import EFFECTS
@@ -52,6 +53,7 @@ def test_interval_of_a_mean():
     mean, half = interval([1.0, 2.0, 3.0])
     assert mean == 2.0 and half == pytest.approx(4.302653 / math.sqrt(3), rel=1e-6)
     assert math.isnan(interval([1.0])[1])
+    assert shown([1.0, 2.0, 3.0], 1, "+") == "+2.0 ± 2.5" and shown([1.0], 1) == "1.0" and shown([], 1) == "-"
 
 
 def test_unknown_words_and_missing_results_are_refused(tmp_path):

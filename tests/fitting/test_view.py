@@ -1,6 +1,7 @@
 """One readable training view: the fused step of training equals its gradients put to Adam, bit by bit."""
 
 import copy
+import dataclasses
 
 import msgspec
 import numpy as np
@@ -24,7 +25,7 @@ from endotsr.fitting.trainer import training_step
 from endotsr.fitting.view import view_gradients
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.scene.parameters import column_gradients, exposure_of, trained
+from endotsr.scene.parameters import exposure_gradients, exposure_of, pose_at, pose_gradients, trained
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
@@ -46,6 +47,15 @@ def sequence():
     return simulate(SimulatorSettings(width=48, height=32, frames=8)).sequence
 
 
+@pytest.fixture(scope="module")
+def turning(sequence):
+    """The same frames with a pose for each."""
+    cameras = [
+        camera._replace(translation=camera.translation + [0.1 * i, 0, 0]) for i, camera in enumerate(sequence.cameras)
+    ]
+    return dataclasses.replace(sequence, cameras=cameras, static_camera=False)
+
+
 def warm(sequence, config, iterations):
     """State and workshop after some iterations: coefficients, moments and exposures are off zero."""
     state, shop = new_training(sequence, config), workshop(sequence, config)
@@ -63,22 +73,27 @@ def plain_step(state, shop):
     weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)
     view = view_gradients(
         state.gaussians, shop.spectral, shop.targets_of(index), weights, config, shop.sequence.cameras[index], t,
-        exposure=exposure_of(state.frames, column), degree=min(3, iteration // 2),
+        exposure=exposure_of(state.frames, column), pose=pose_at(state.frames, t), degree=min(3, iteration // 2),
     )  # fmt: skip
     gradients = dict(view.gradients)
-    if state.frames is not None:
-        gradients |= column_gradients(state.frames, column, view.d_exposure)
+    if view.d_exposure is not None:
+        gradients |= exposure_gradients(state.frames, column, view.d_exposure)
+    if view.d_pose is not None:
+        gradients |= pose_gradients(state.frames, t, view.d_pose)
     parameters = arrays(state.gaussians) | trained(state.frames)
     rates = learning_rates(iteration, config)
+    if config.model.pose_correction:
+        rates["pose_translation"] *= shop.depth
     adam_update(state.adam, parameters, gradients, rates, o.beta1, o.beta2, o.epsilon)
     return index, view
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-@pytest.mark.parametrize("exposure", [False, True])
-def test_a_step_of_training_equals_the_view_gradients_put_to_adam_bitwise(sequence, precision, exposure):
-    config = settings(precision, exposure=exposure)
-    state, shop = warm(sequence, config, 6)
+@pytest.mark.parametrize("frames", ["none", "exposure", "poses", "both"])
+def test_a_step_of_training_equals_the_view_gradients_put_to_adam_bitwise(sequence, turning, precision, frames):
+    poses = frames in ("poses", "both")
+    config = settings(precision, exposure=frames in ("exposure", "both"), pose_correction=poses)
+    state, shop = warm(turning if poses else sequence, config, 6)
     plain = copy.deepcopy(state)
     index, view = plain_step(plain, shop)
     entry = training_step(state, shop)

@@ -195,6 +195,7 @@ def read_sequence(path: Path) -> object:
     from endotsr.export.scene import RECORD
     from endotsr.export.times import Times
     from endotsr.runs.folder import RunFolder
+    from endotsr.runs.sources import remembered_cameras
     from endotsr.views.plan import Request, check_request, views_of
 
     folder = RunFolder(path.parent)
@@ -204,7 +205,7 @@ def read_sequence(path: Path) -> object:
         check_request(request, record)
     folder.sequence_record(*RECORD)  # as the model asks when it is loaded
     for request in requests:
-        for view in views_of(request, record, pivot_depth=50.0):
+        for view in views_of(request, record, remembered_cameras(record), pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
             assert view.camera.width > 0

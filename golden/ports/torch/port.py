@@ -54,6 +54,14 @@ def exposure(i, s):
     return {"exposed": torch.exp(i["log_gain"])[:, None, None] * i["colour"] + i["bias"][:, None, None]}
 
 
+def pose(i, s):
+    x, y, z = i["rotation_vector"]
+    zero = torch.zeros_like(x)
+    e = torch.linalg.matrix_exp(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3))
+    moved = e @ i["translation"] + i["offset"]
+    return {"corrected_rotation": e @ i["rotation"], "corrected_translation": moved}
+
+
 # ---- losses; a masked value is selected before it is used ----
 
 
@@ -228,8 +236,8 @@ def render(i, s):
 
 
 OPERATIONS = {f.__name__: f for f in (
-    dictionary, appearance, motion, matern, deformation, exposure, masked_l1, masked_ssim, normalised_depth, smoothness,
-    covariance, projection, harmonics, composite, render,
+    dictionary, appearance, motion, matern, deformation, exposure, pose, masked_l1, masked_ssim, normalised_depth,
+    smoothness, covariance, projection, harmonics, composite, render,
 )}  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from endotsr.errors import InputError
 from endotsr.evaluation.depth import held_out_depth
 from endotsr.evaluation.flicker import flicker
 from endotsr.evaluation.right_view import right_view
-from endotsr.fitting.model import render_at
+from endotsr.fitting.model import render_at, with_corrected_cameras
 from endotsr.runs.model import Model
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
@@ -43,6 +43,8 @@ def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str
     source   folder of the sequence, or `simulated`
     Raises:  InputError for a name that is not in MEASURES, and for a right picture that cannot be read.
     """
+
+    sequence = with_corrected_cameras(sequence, model.frames)
 
     def render(index: int, camera: Camera) -> RenderOut:
         time = float(sequence.times[index])

@@ -15,7 +15,7 @@ from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.measures import measured
 from endotsr.evaluation.trajectories import TruePositions, trajectory_error
-from endotsr.fitting.model import render_at, without
+from endotsr.fitting.model import render_at, with_corrected_cameras, without
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder
 from endotsr.runs.model import Model, load_model
@@ -94,6 +94,8 @@ def measure_model(
              neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`, or None;
              `components`, the means with one residual left out
     """
+
+    sequence = with_corrected_cameras(sequence, model.frames)
 
     def render(index: int, taken_out: str = "") -> RenderOut:
         shown = without(model.gaussians, **({taken_out: False} if taken_out else {}))

@@ -16,7 +16,6 @@ from endotsr.errors import InputError
 from endotsr.evaluation.depth import LEAST_OPACITY, normalised_depth
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import FloatArray
-from endotsr.runs.sources import remembered_cameras
 from endotsr.splatting.camera import Camera, backproject, project
 
 MOST_VOXELS = 1 << 24
@@ -57,7 +56,7 @@ def surface(scene: MovingScene, time: float, voxel: float | None = None, taken_o
     taken_out    spectral components to leave out
     Raises: InputError without scikit-image, without a surface, or for a voxel that is too small.
     """
-    cameras = remembered_cameras(scene.record)
+    cameras = scene.cameras
     chosen = cameras[:1] if scene.record["static_camera"] else cameras[:: -(-len(cameras) // MOST_VIEWS)]
     return fused([depth_view(scene, time, camera, taken_out) for camera in chosen], voxel)
 

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from endotsr.config import config_from_dict
 from endotsr.errors import InputError
-from endotsr.fitting.model import spectral_from
+from endotsr.fitting.model import corrected_cameras, spectral_from
 from endotsr.runs.files import replace_file
 from endotsr.runs.model import Model
 from endotsr.runs.records import check_sequence_record
+from endotsr.runs.sources import remembered_cameras
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
-from endotsr.scene.parameters import FrameParameters, trained
+from endotsr.scene.parameters import FrameParameters, pose_at, trained
 from endotsr.untrusted.arrays import Refused, open_npz
 from endotsr.untrusted.json import integer, parsed
 
@@ -47,16 +48,17 @@ def save_slim_model(path: Path, model: Model, record: dict[str, Any]) -> None:
     record   sequence.json
     A number beyond the range of float16 (65504) becomes the largest one.
     """
+    exposures = _exposures(model.frames)
     header = {
         "format": FORMAT,
         "version": VERSION,
         "iteration": model.iteration,
         "config": msgspec.to_builtins(model.config),
-        "sequence": {key: record[key] for key in RECORD},
-        "frame_times": None if model.frames is None else model.frames.times.tolist(),
+        "sequence": {key: record[key] for key in RECORD} | {"cameras": _cameras(model, record)},
+        "frame_times": None if exposures is None else exposures.times.tolist(),
     }
     entries = {f"gaussians.{name}": a for name, a in arrays(model.gaussians).items()}
-    entries |= {f"frames.{name}": a for name, a in trained(model.frames).items()}
+    entries |= {f"frames.{name}": a for name, a in trained(exposures).items()}
     stored = {name: a.astype(np.float32) if name in KEPT_WHOLE else _half(a) for name, a in entries.items()}
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
 
@@ -140,6 +142,22 @@ def _refuse_odd_shapes(found: dict[str, NDArray], path: Path) -> None:
         array = found[name]
         if array is not None and (array.ndim != 3 or array.shape[0] != 3 or array.shape[1] % 2):
             raise InputError(f"{path}: gaussians.{name} has the shape {array.shape}")
+
+
+def _exposures(frames: FrameParameters | None) -> FrameParameters | None:
+    """The parameters of frames that the file keeps; corrections of poses are part of its cameras."""
+    if frames is None or frames.exposure_log_gain is None:
+        return None
+    return frames._replace(pose_rotation=None, pose_translation=None)
+
+
+def _cameras(model: Model, record: dict[str, Any]) -> list[dict[str, Any]]:
+    """The entries of `cameras` with the corrections of the model."""
+    if pose_at(model.frames, 0.0) is None:
+        return record["cameras"]
+    cameras = corrected_cameras(model.frames, remembered_cameras(record), record["times"])
+    vectors = ("rotation", "translation")
+    return [c._asdict() | {name: getattr(c, name).tolist() for name in vectors} for c in cameras]
 
 
 def _frames(entries: dict[str, NDArray], times: Any, path: Path) -> FrameParameters | None:

@@ -15,10 +15,11 @@ from endotsr.config import PAPER, ModelConfig
 from endotsr.errors import InputError
 from endotsr.export.model import load_slim_model
 from endotsr.export.ply import read_gaussians
-from endotsr.fitting.model import render_at, scene_at, spectral_from, without
+from endotsr.fitting.model import corrected_cameras, render_at, scene_at, spectral_from, without
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.runs.model import Model, load_model
+from endotsr.runs.sources import remembered_cameras
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut, Scene
@@ -49,6 +50,11 @@ class MovingScene:
         model = load_model(self.folder)
         self.folder.sequence_record(*RECORD)
         return model
+
+    @cached_property
+    def cameras(self) -> list[Camera]:
+        """The cameras of the frames, with the corrections of the model."""
+        return corrected_cameras(self.model.frames, remembered_cameras(self.record), self.record["times"])
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
         """Render at a time in [0, 1]; `taken_out` names spectral components to leave out."""

@@ -31,14 +31,22 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
     "motion_coefficients": (3, "2F"),
     "exposure_log_gain": (CHANNELS,),
     "exposure_bias": (CHANNELS,),
+    "pose_rotation": (3,),
+    "pose_translation": (3,),
 }
+
+TOGETHER = (
+    ("fdm_weight", "fdm_centre", "fdm_width"),
+    ("exposure_log_gain", "exposure_bias"),
+    ("pose_rotation", "pose_translation"),
+)
 
 
 def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters | None = None) -> None:
     """Check axes, precision and lengths. Raises ValueError.
 
     Every array has the axes of `SHAPES` and one column for each Gaussian, or for each training frame; its moments have
-    its shape. All are of one precision. The three arrays of the deformation are there together or not at all.
+    its shape. All are of one precision. The arrays of a line of `TOGETHER` are there together or not at all.
     """
     named = arrays(gaussians) | trained(frames)
     lengths: dict[str, int] = {}
@@ -46,8 +54,9 @@ def check_shapes(gaussians: Gaussians, adam: AdamState, frames: FrameParameters 
         _check_axes(name, array, lengths)
         if array.dtype != gaussians.position.dtype or array.dtype.name not in PRECISIONS:
             raise ValueError(f"{name}: {array.dtype}; allowed: {' or '.join(PRECISIONS)}, the same in every array")
-    if len({array is None for array in (gaussians.fdm_weight, gaussians.fdm_centre, gaussians.fdm_width)}) > 1:
-        raise ValueError("fdm_weight, fdm_centre, fdm_width: some are missing; allowed: all three or none")
+    for together in TOGETHER:
+        if 0 < len(named.keys() & set(together)) < len(together):
+            raise ValueError(f"{', '.join(together)}: some are missing; allowed: all {len(together)} or none")
     if lengths["K"] not in HARMONICS or lengths.get("2F", 0) % 2:
         raise ValueError(
             f"harmonics: {lengths['K']} coefficients, 2F = {lengths.get('2F')}; allowed: 1, 4, 9, 16; even"

@@ -7,6 +7,7 @@ A component whose arrays are None is not evaluated and gets no gradient array. I
 `Scene` that the rasteriser takes, or gradients by field name.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +26,14 @@ from endotsr.equations.dictionary import (
 from endotsr.equations.exposure import ExposureSaved, exposure_forward, exposure_reverse
 from endotsr.equations.matern import matern_weights
 from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.equations.pose import PoseSaved, pose_forward, pose_reverse
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.gaussians import LOG_SCALE_CHANNELS, POSITION_CHANNELS, QUATERNION_CHANNELS, Gaussians
-from endotsr.scene.parameters import Exposure, FrameParameters, exposure_at
-from endotsr.splatting.camera import Camera
+from endotsr.scene.parameters import Exposure, FrameParameters, Pose, exposure_at, pose_at
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.render import RenderGrads, RenderOut, Scene, check_scene, render_forward
 from endotsr.splatting.settings import PRESETS, RasterSettings
 
@@ -182,6 +185,36 @@ def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[
         return d_colour, None
     grads = exposure_reverse(d_colour, saved)
     return grads.d_colour, Exposure(grads.d_log_gain, grads.d_bias)
+
+
+def corrected(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | None]:
+    """The camera with the correction of its pose, equation (B16); without one, the camera itself."""
+    if pose is None:
+        return camera, None
+    rotation, translation, saved = pose_forward(camera.rotation, camera.translation, *pose)
+    return camera._replace(rotation=rotation, translation=translation), saved
+
+
+def corrected_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> Pose | None:
+    """Gradients by the correction, from those by the corrected pose."""
+    if saved is None or d_camera is None:
+        return None
+    grads = pose_reverse(*d_camera, saved)
+    return Pose(grads.d_rotation_vector, grads.d_offset)
+
+
+def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], times: FloatArray) -> list[Camera]:
+    """The cameras of frames at their times with the corrections of a model; those given if the model has none."""
+    if pose_at(frames, 0.0) is None:
+        return cameras
+    return [corrected(camera, pose_at(frames, float(t)))[0] for camera, t in zip(cameras, times, strict=True)]
+
+
+def with_corrected_cameras(sequence: Sequence, frames: FrameParameters | None) -> Sequence:
+    """The sequence as a model sees it: its cameras with the corrections of their poses."""
+    if pose_at(frames, 0.0) is None:
+        return sequence
+    return replace(sequence, cameras=corrected_cameras(frames, sequence.cameras, sequence.times))
 
 
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:

@@ -21,7 +21,7 @@ from endotsr.equations.laplacian import (
     support_masks,
 )
 from endotsr.equations.pyramid import Upsampling
-from endotsr.fitting.model import Spectral, render_at
+from endotsr.fitting.model import Spectral, corrected, render_at
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
@@ -31,7 +31,7 @@ from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_s
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
-from endotsr.scene.parameters import FrameParameters
+from endotsr.scene.parameters import FrameParameters, pose_at
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
 
@@ -176,7 +176,7 @@ def calibrate_on(
     """Equation (7) on a trained scene: lambda_lap from the image gradients of up to 16 training views.
 
     The views are rendered without the spectral components, even if the scene has them, because equation (7) is
-    defined on the base model. The exposures of `frames` belong to the base model.
+    defined on the base model. The parameters of `frames` belong to the base model.
 
     Raises: CalibrationError with a per-view table when no view gives a ratio.
     """
@@ -184,7 +184,7 @@ def calibrate_on(
     views = []
     for index in chosen:
         frame = sequence.frame(int(index), gaussians.position.dtype)
-        at = (frame.camera, frame.time)
+        at = (corrected(frame.camera, pose_at(frames, frame.time))[0], frame.time)
         rendered = render_at(gaussians, spectral, config, *at, frames=frames, appearance=False, spectral_motion=False)
         targets = frame_targets(frame, config)
         supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)

@@ -54,14 +54,15 @@ def annealing(iteration: int, config: Config) -> float:
 def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     """Adam rates by field name of `Gaussians` and `FrameParameters` at this iteration.
 
-    The rates of the spectral residuals are listed only while they are active, those of the exposures only if the model
-    has them.
+    The rates of the spectral residuals are listed only while they are active, those of exposures and poses only if
+    the model has them.
 
     position, fdm_*   decay exponentially from their rate to `final_factor` of it over the whole run
     harmonics         constant up to `annealing`; degree 0 and the higher degrees have their own rate
     quaternion, log_scale, opacity_logit    constant up to `annealing`
     fdm_weight        the position channels have the extra `deformation_position_factor`
     exposure_*        decay like `position`
+    pose_*            decay like `position`; the rate of the translation is in median depths of the tissue
     *_coefficients    their factor x deformation rate x `residual_decay`
     """
     o = config.optimiser
@@ -82,6 +83,8 @@ def learning_rates(iteration: int, config: Config) -> dict[str, Rate]:
     }
     if config.model.exposure:
         rates["exposure_log_gain"] = rates["exposure_bias"] = o.exposure * decay
+    if config.model.pose_correction:
+        rates["pose_rotation"] = rates["pose_translation"] = o.pose * decay
     residual = o.deformation * residual_decay(iteration, config)
     if residuals_active(iteration, config):
         rates["appearance_coefficients"] = residual * o.appearance_factor

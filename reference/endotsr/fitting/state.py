@@ -7,12 +7,14 @@ and the configuration, so a resumed run equals an uninterrupted one bit by bit. 
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import numpy as np
 
 from endotsr.config import Config
-from endotsr.fitting.adam import AdamState, adam_state
+from endotsr.errors import InputError
+from endotsr.fitting.adam import AdamState, Rate, adam_state
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.fitting.moments import Moments
@@ -53,6 +55,7 @@ class Workshop:
     extent: float
     targets: Kept[int, Targets]  # by frame, filled at first use
     moments: Moments  # between the frames, filled at first use
+    depth: float = 1.0  # median depth of the tissue, scene units; known where poses are corrected
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
         """What the render of a view is compared with, and the camera that it is seen by."""
@@ -60,6 +63,19 @@ class Workshop:
             return self.targets_of(view.index), self.sequence.cameras[view.index]
         frame = self.moments.frame(view.moment, self.config.training.precision)
         return frame_targets(frame, self.config), frame.camera
+
+    def column(self, view: View) -> int:
+        """The place of the compared frame among the training frames."""
+        return int(np.searchsorted(self.sequence.train_index, view.index))
+
+    def camera_time(self, view: View) -> float:
+        """The time whose pose is corrected: that of the compared frame, or of the moment between two frames."""
+        return view.t if view.moment is not None else float(self.sequence.times[view.index])
+
+    def in_scene_units(self, rates: dict[str, Rate]) -> dict[str, Rate]:
+        """The rates of `learning_rates`, with that of the translations of poses in scene units."""
+        given = rates.get("pose_translation")
+        return rates if given is None else rates | {"pose_translation": cast(float, given) * self.depth}
 
     def targets_of(self, index: int) -> Targets:
         """The loss targets of a frame, computed once, or again where they were dropped."""
@@ -77,11 +93,27 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
     moments = Moments(sequence, config.training.bridge_flow, Kept(limit))
-    return Workshop(sequence, config, spectral, extent, Kept(limit), moments)
+    depth = _depth_of_tissue(sequence, config) if config.model.pose_correction else 1.0
+    return Workshop(sequence, config, spectral, extent, Kept(limit), moments, depth)
+
+
+def _depth_of_tissue(sequence: Sequence, config: Config) -> float:
+    """Median over the training frames of their median depth; 1 where no depth is known."""
+    frames = (sequence.frame(int(i), config.training.precision) for i in sequence.train_index)
+    medians = [np.median(d) for frame in frames if (d := frame.depth[frame.mask & (frame.depth > 0)]).size]
+    return float(np.median(medians)) if medians else 1.0
 
 
 def new_training(sequence: Sequence, config: Config) -> TrainingState:
-    """Initialise from the training frames, seeded. Raises InputError when the frames hold no usable pixel."""
+    """Initialise from the training frames, seeded.
+
+    Raises: InputError when the frames hold no usable pixel, or poses are to be corrected that do not change.
+    """
+    if config.model.pose_correction and sequence.static_camera:
+        raise InputError(
+            "model.pose_correction = true: the camera of this sequence does not move, and a correction would take the"
+            " motion of the tissue for its own; allowed: a sequence with a pose for each frame"
+        )
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     gaussians = initialise(sequence, config.initialisation, config.model, rng, dtype)
     frames = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)

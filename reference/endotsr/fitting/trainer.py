@@ -20,6 +20,8 @@ from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
     SceneGrads,
     SceneSaved,
+    corrected,
+    corrected_reverse,
     exposed,
     exposed_reverse,
     raster_settings,
@@ -44,7 +46,7 @@ from endotsr.kernels.timer import NO_TIMER, Timer, timed
 from endotsr.scene.density_control import densify, gather_statistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals
-from endotsr.scene.parameters import Exposure, column_gradients, exposure_of, trained
+from endotsr.scene.parameters import Exposure, Pose, exposure_gradients, exposure_of, pose_at, pose_gradients, trained
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
@@ -107,14 +109,16 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
         _activate_residuals(state, config)
     view = draw_view(state.rng, shop.sequence, config.training)
     targets, camera = shop.observed(view)
-    column = int(np.searchsorted(shop.sequence.train_index, view.index))
     scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, view.t, state.ahead, timer)
     degree = active_degree(iteration, config)
+    camera, pose_saved = corrected(camera, pose_at(state.frames, shop.camera_time(view)))
     rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
-    rendered, exposure_saved = exposed(rendered, exposure_of(state.frames, column))
+    rendered, exposure_saved = exposed(rendered, exposure_of(state.frames, shop.column(view)))
     loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
     d_colour, d_exposure = exposed_reverse(loss.d_colour, exposure_saved)
-    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, timer=timer)
+    moving = pose_saved is not None
+    d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, pose_gradient=moving, timer=timer)
+    d_pose = corrected_reverse(d_scene.d_camera, pose_saved)
     watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
         lambda: scene_reverse(d_scene, scene_saved, coefficients=False),
@@ -126,7 +130,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     dense, state.ahead = densify_now(iteration, config), None
     if not (dense and config.optimiser.legacy_skip):
         _optimise(state, shop, scene_saved, d_scene, back, iteration, timer)
-        _optimise_frames(state, config, column, d_exposure, iteration)
+        _optimise_frames(state, shop, view, d_exposure, d_pose, iteration)
     if dense:
         with timer.stage("density control"):
             _control_density(state, shop)
@@ -185,13 +189,18 @@ def _optimise(
 
 
 def _optimise_frames(
-    state: TrainingState, config: Config, column: int, d_exposure: Exposure | None, iteration: int
+    state: TrainingState, shop: Workshop, view: View, d_exposure: Exposure | None, d_pose: Pose | None, iteration: int
 ) -> None:
     """One Adam step of the parameters of frames: of all columns, with gradient 0 for the frames that were not seen."""
-    if state.frames is not None and d_exposure is not None:
-        o, gradients = config.optimiser, column_gradients(state.frames, column, d_exposure)
-        rates = learning_rates(iteration, config)
-        adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
+    if state.frames is None:
+        return
+    gradients, o = {}, shop.config.optimiser
+    if d_exposure is not None:
+        gradients |= exposure_gradients(state.frames, shop.column(view), d_exposure)
+    if d_pose is not None:
+        gradients |= pose_gradients(state.frames, shop.camera_time(view), d_pose)
+    rates = shop.in_scene_units(learning_rates(iteration, shop.config))
+    adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
 
 
 def _control_density(state: TrainingState, shop: Workshop) -> None:

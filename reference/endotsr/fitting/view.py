@@ -1,6 +1,7 @@
 """One training view, equation (6), made of the documented pairs only: the definition of one iteration.
 
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
+                            camera --(B16)--^
 
 In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and its gradient by every array. The
 gradient check and the golden family `objective` call this function. Training computes the same with the same functions
@@ -16,11 +17,20 @@ from numpy.typing import NDArray
 from endotsr.config import Config
 from endotsr.equations.deformation import deformation_reverse
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
-from endotsr.fitting.model import Spectral, exposed, exposed_reverse, raster_settings, scene_at, scene_reverse
+from endotsr.fitting.model import (
+    Spectral,
+    corrected,
+    corrected_reverse,
+    exposed,
+    exposed_reverse,
+    raster_settings,
+    scene_at,
+    scene_reverse,
+)
 from endotsr.fitting.objective import LossWeights, Targets, image_loss
 from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
-from endotsr.scene.parameters import Exposure
+from endotsr.scene.parameters import Exposure, Pose
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Compositor, RenderOut, render_forward, render_reverse
 from endotsr.splatting.settings import RasterSettings
@@ -33,6 +43,7 @@ class ViewGradients(NamedTuple):
     terms: dict[str, float]  # unweighted; only those evaluated
     gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
     d_exposure: Exposure | None  # gradients by the exposure of this frame
+    d_pose: Pose | None  # gradients by the correction of its pose
     rendered: RenderOut  # the images that were compared
 
 
@@ -47,6 +58,7 @@ def view_gradients(
     edges: NDArray[np.bool_] | None = None,
     *,
     exposure: Exposure | None = None,
+    pose: Pose | None = None,
     raster: RasterSettings | None = None,
     degree: int | None = None,
     compositor: Compositor = "auto",
@@ -57,6 +69,7 @@ def view_gradients(
     t         normalised time; any value is allowed, [0, 1] is the sequence
     edges     (H, W) bool, where the depth is not smoothed; None = Canny edges of the rendered depth
     exposure  of this frame, equation (B13); None = none
+    pose      correction of the pose of `camera`, equation (B16); None = none
     raster    None = that of `config`;  degree   active harmonic degree, None = the model's
 
     Edges:  a term of weight 0 is not evaluated; a component without arrays gets no gradient.
@@ -66,12 +79,14 @@ def view_gradients(
     degree = config.model.harmonics_degree if degree is None else degree
 
     scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
+    camera, pose_saved = corrected(camera, pose)
     rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor)
     rendered, exposure_saved = exposed(rendered, exposure)
     loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
 
     d_colour, d_exposure = exposed_reverse(d_colour, exposure_saved)
-    d_scene = render_reverse(d_colour, d_depth, None, render_saved)
+    d_scene = render_reverse(d_colour, d_depth, None, render_saved, pose_gradient=pose is not None)
+    d_pose = corrected_reverse(d_scene.d_camera, pose_saved)
     gradients, d_offsets = scene_reverse(d_scene, scene_saved)
     if scene_saved.deformation is not None and d_offsets is not None:
         fdm = deformation_reverse(d_offsets, scene_saved.deformation)
@@ -80,4 +95,4 @@ def view_gradients(
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
         gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)
-    return ViewGradients(loss, terms, gradients, d_exposure, rendered)
+    return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered)

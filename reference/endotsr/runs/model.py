@@ -122,12 +122,15 @@ def _named(settings: Any) -> Iterator[tuple[str, Any]]:
 def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[str, Any]]:
     """The settings that can be read from the arrays themselves."""
     from endotsr.fitting.schedules import residuals_active
+    from endotsr.scene.parameters import trained
 
     gaussians, active = checkpoint.gaussians, residuals_active(checkpoint.iteration, config)
     yield "training.precision", gaussians.position.dtype.name
     yield "model.harmonics_degree", math.isqrt(len(gaussians.harmonics)) - 1
     yield "model.deformation", gaussians.fdm_weight is not None
-    yield "model.exposure", checkpoint.frames is not None
+    frames = trained(checkpoint.frames)
+    yield "model.exposure", "exposure_log_gain" in frames
+    yield "model.pose_correction", "pose_rotation" in frames
     if gaussians.fdm_weight is not None:
         yield "model.bases", gaussians.fdm_weight.shape[1]
     residuals = {"appearance": gaussians.appearance_coefficients, "spectral_motion": gaussians.motion_coefficients}

@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from endotsr.config import ModelConfig
 from endotsr.kernels.arrays import FloatArray
 
-CHANNELS = 3
+CHANNELS = 3  # of colours; rotation vectors and translations have as many entries
 
 
 class Exposure(NamedTuple):
@@ -27,23 +27,35 @@ class Exposure(NamedTuple):
     bias: FloatArray  # (3,) display units
 
 
+class Pose(NamedTuple):
+    """Correction of the camera pose of one frame or of one moment, equation (B16)."""
+
+    rotation: FloatArray  # (3,) rotation vector, rad, camera axes
+    translation: FloatArray  # (3,) scene units, camera axes
+
+
 class FrameParameters(NamedTuple):
     """Parameters of n training frames; held-out frames have none."""
 
     times: NDArray[np.float64]  # (n,) normalised times of the training frames, ascending; not trained
     exposure_log_gain: FloatArray | None = None  # (3, n) [channel, training frame]
     exposure_bias: FloatArray | None = None  # (3, n) display units
+    pose_rotation: FloatArray | None = None  # (3, n) rotation vectors, rad
+    pose_translation: FloatArray | None = None  # (3, n) scene units
 
 
 def frame_parameters(model: ModelConfig, train_times: FloatArray, dtype: DTypeLike) -> FrameParameters | None:
-    """Parameters at the start of training: every exposure is the identity. None if the model has no such parameter.
+    """Parameters at the start of training: every one is the identity. None if the model has no such parameter.
 
     train_times  (n,) normalised times of the training frames, ascending
     """
-    if not model.exposure:
-        return None
+    found = FrameParameters(np.array(train_times, np.float64))
     shape = (CHANNELS, len(train_times))
-    return FrameParameters(np.array(train_times, np.float64), np.zeros(shape, dtype), np.zeros(shape, dtype))
+    if model.exposure:
+        found = found._replace(exposure_log_gain=np.zeros(shape, dtype), exposure_bias=np.zeros(shape, dtype))
+    if model.pose_correction:
+        found = found._replace(pose_rotation=np.zeros(shape, dtype), pose_translation=np.zeros(shape, dtype))
+    return found if trained(found) else None
 
 
 def trained(frames: FrameParameters | None) -> dict[str, FloatArray]:
@@ -66,14 +78,41 @@ def exposure_at(frames: FrameParameters | None, t: float) -> Exposure | None:
     """
     if frames is None or frames.exposure_log_gain is None or frames.exposure_bias is None:
         return None
-    rows = [np.array([np.interp(t, frames.times, row) for row in array], array.dtype)
-            for array in (frames.exposure_log_gain, frames.exposure_bias)]  # fmt: skip
-    return Exposure(*rows)
+    return Exposure(*(_at(frames, t, array) for array in (frames.exposure_log_gain, frames.exposure_bias)))
 
 
-def column_gradients(frames: FrameParameters, k: int, exposure: Exposure) -> dict[str, FloatArray]:
-    """Gradients by the trained arrays from those by the exposure of frame k: zero in every other column."""
-    gradients = {name: np.zeros_like(array) for name, array in trained(frames).items()}
-    gradients["exposure_log_gain"][:, k] = exposure.log_gain
-    gradients["exposure_bias"][:, k] = exposure.bias
-    return gradients
+def pose_at(frames: FrameParameters | None, t: float) -> Pose | None:
+    """Correction of the pose at any time: both vectors are linear in t between two training frames, as `exposure_at`.
+
+    None if the model has none.
+    """
+    if frames is None or frames.pose_rotation is None or frames.pose_translation is None:
+        return None
+    return Pose(*(_at(frames, t, array) for array in (frames.pose_rotation, frames.pose_translation)))
+
+
+def _at(frames: FrameParameters, t: float, array: FloatArray) -> FloatArray:
+    """A parameter (3, n) of frames at time t, (3,)."""
+    return np.array([np.interp(t, frames.times, row) for row in array], array.dtype)
+
+
+def exposure_gradients(frames: FrameParameters, k: int, exposure: Exposure) -> dict[str, FloatArray]:
+    """Gradients by the arrays of the exposures from those by the exposure of frame k: zero in every other column."""
+    return {f"exposure_{name}": _in_columns(frames, {k: vector}) for name, vector in exposure._asdict().items()}
+
+
+def pose_gradients(frames: FrameParameters, t: float, pose: Pose) -> dict[str, FloatArray]:
+    """Gradients by the arrays of the poses from those by the correction at time t: the transpose of `pose_at`."""
+    parts = [float(np.interp(t, frames.times, unit)) for unit in np.eye(frames.times.size)]
+    return {
+        f"pose_{name}": _in_columns(frames, {k: part * vector for k, part in enumerate(parts) if part})
+        for name, vector in pose._asdict().items()
+    }
+
+
+def _in_columns(frames: FrameParameters, columns: dict[int, FloatArray]) -> FloatArray:
+    """An array (3, n) that holds vectors (3,) in the given columns and 0 in the others."""
+    found = np.zeros((CHANNELS, frames.times.size), next(iter(trained(frames).values())).dtype)
+    for k, vector in columns.items():
+        found[:, k] = vector
+    return found

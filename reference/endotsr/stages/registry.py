@@ -12,6 +12,7 @@ STAGE_MODULES = (
     "compositing",
     "losses",
     "exposure",
+    "pose",
     "scene",
     "optimiser",
 )

@@ -93,12 +93,15 @@ def simulated_scene(
 def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run that has none."""
     from endotsr.errors import InputError
+    from endotsr.fitting.model import corrected_cameras
     from endotsr.runs.folder import open_run
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence, remembered_cameras
 
     folder = open_run(path)
-    model, record = load_model(folder), folder.sequence_record("names", "test_index", "cameras", "static_camera")
+    model = load_model(folder)
+    record = folder.sequence_record("names", "times", "test_index", "cameras", "static_camera")
+    cameras = corrected_cameras(model.frames, remembered_cameras(record), record["times"])
     frame = int(record["test_index"][len(record["test_index"]) // 2])
     try:
         noise = sensor_noise(load_run_sequence(folder))
@@ -111,7 +114,7 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
         model.spectral,
         model.config.model,
         float(record["times"][frame]),
-        scaled(remembered_cameras(record)[frame], scale),
+        scaled(cameras[frame], scale),
         model.config.raster.near,
         noise,
     )

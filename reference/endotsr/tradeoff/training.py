@@ -20,7 +20,7 @@ from endotsr.errors import InputError
 from endotsr.evaluation.evaluate import evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.fitting.compile_ahead import rehearse
-from endotsr.fitting.model import render_at, spectral_from
+from endotsr.fitting.model import render_at, spectral_from, with_corrected_cameras
 from endotsr.fitting.state import TrainingState, new_training, workshop
 from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.files import write_json
@@ -120,9 +120,10 @@ def measured(
     full       the frames that are predicted
     """
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+    seen = with_corrected_cameras(full, state.frames)
 
     def render(index: int) -> Any:
-        at = (full.cameras[index], float(full.times[index]))
+        at = (seen.cameras[index], float(full.times[index]))
         return render_at(state.gaussians, spectral, config, *at, frames=state.frames).colour
 
     found = evaluate_frames(full, full.test_index, render, weights).mean

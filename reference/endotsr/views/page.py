@@ -20,7 +20,6 @@ from endotsr.export.scene import MovingScene
 from endotsr.fitting.model import raster_settings
 from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode_transparent
 from endotsr.runs.files import replace_file
-from endotsr.runs.sources import remembered_cameras
 from endotsr.sequences.sequence import Sequence
 from endotsr.views.cameras import pivot_depth_of
 from endotsr.views.panels import ERROR_SCALE
@@ -78,7 +77,7 @@ def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = 
 def _about(scene: MovingScene) -> dict[str, Any]:
     """Cameras, rules of the rasteriser, colours, and the depths that they span."""
     record, settings = scene.record, raster_settings(scene.model.config)
-    cameras = remembered_cameras(record)
+    cameras = scene.cameras
     out = scene.render(float(record["times"][0]), cameras[0])
     low, high = depth_range(normalised_depth(out))
     shown = cameras[:1] if record["static_camera"] else cameras

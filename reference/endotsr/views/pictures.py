@@ -20,7 +20,7 @@ from endotsr.report.figures import ByteImage
 from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
 from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
 from endotsr.runs.folder import refuse_existing
-from endotsr.runs.sources import load_run_sequence, remembered_cameras
+from endotsr.runs.sources import load_run_sequence
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
@@ -67,9 +67,9 @@ def requested_views(scene: MovingScene, request: Request, default: str) -> list[
     pivot_depth, _ = 1.0, scene.model
     if request.camera in TURNING:
         time, frame, _, _ = moments("render", request.times, scene.record, default)[0]
-        out = scene.render(time, remembered_cameras(scene.record)[frame])
+        out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
-    return views_of(request, scene.record, pivot_depth, default)
+    return views_of(request, scene.record, scene.cameras, pivot_depth, default)
 
 
 def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.export.times import Times, moments
-from endotsr.runs.sources import remembered_cameras
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
@@ -53,18 +52,20 @@ def check_request(request: Request, record: dict[str, Any], default: str = "test
         raise InputError(f"render: --camera {camera!r} is not allowed; allowed: {allowed}")
 
 
-def views_of(request: Request, record: dict[str, Any], pivot_depth: float, default: str = "test") -> list[View]:
+def views_of(
+    request: Request, record: dict[str, Any], observed: list[Camera], pivot_depth: float, default: str = "test"
+) -> list[View]:
     """The views of a request.
 
     request       checked by `check_request`
     record        sequence.json
+    observed      the cameras of its frames
     pivot_depth   depth of the point around which `orbit` and `sway` turn, scene units
     default       frames to show if no times are chosen
 
     Raises: InputError for a file of cameras that cannot be used.
     """
     wanted = moments("render", request.times, record, default)
-    observed = remembered_cameras(record)
     cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth)
     if any(request.offset):
         cameras = [shifted(camera, request.offset) for camera in cameras]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from endotsr.equations.exposure import exposure_forward
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import FloatArray
-from endotsr.runs.sources import nearest_frame, remembered_cameras
+from endotsr.runs.sources import nearest_frame
 from endotsr.scene.parameters import exposure_at
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.harmonics import harmonics_forward
@@ -47,7 +47,7 @@ def key_times(scene: MovingScene, most: int) -> FloatArray:
 
 def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     """The Gaussians that can be seen, at the key times."""
-    cameras, known = remembered_cameras(scene.record), scene.record["times"]
+    cameras, known = scene.cameras, scene.record["times"]
     opacity = 1 / (1 + np.exp(-scene.model.gaussians.opacity_logit.astype(np.float64)))
     seen = opacity >= OPACITY_STEP
     values = np.empty((9, times.size, np.count_nonzero(seen)), np.float32)

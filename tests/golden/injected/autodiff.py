@@ -27,6 +27,8 @@ MISTAKES: list[Injected] = [
     ("matern_without_two_pi", (('s["correlation_length"] * 2 * math.pi', 's["correlation_length"]'),)),
     ("penalty_over_two", (("c**2).sum() / c.numel()", "c**2).sum() * 3 / c.numel()"),)),
     ("basis_gaussian_without_half", (("torch.exp(-u / 2)", "torch.exp(-u)"),)),
+    ("rotation_vector_reversed", (('= i["rotation_vector"]', '= -i["rotation_vector"]'),)),
+    ("rotation_after_pose", (('e @ i["rotation"]', 'i["rotation"] @ e'),)),
     ("gain_not_exponential", (('torch.exp(i["log_gain"])', '(1 + i["log_gain"])'),)),
     (
         "exposure_clamped",

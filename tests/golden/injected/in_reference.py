@@ -7,7 +7,13 @@ port that makes it computes in float32, with the fast compositor.
 from endotsr.golden.vectors.wrong import WrongPort, edit, port
 
 L1, SSIM, DEPTH, SMOOTH = "losses.masked_l1", "losses.masked_ssim", "losses.depth", "losses.smoothness"
-EXPOSURE, ADAM, SCHEDULES, CONTROL = "equations.exposure", "fitting.adam", "fitting.schedules", "scene.density_control"
+POSE, EXPOSURE, ADAM, SCHEDULES, CONTROL = (
+    "equations.pose",
+    "equations.exposure",
+    "fitting.adam",
+    "fitting.schedules",
+    "scene.density_control",
+)
 FIRST, MODEL, RENDER, OBJECTIVE = "scene.initialisation", "fitting.model", "splatting.render", "fitting.objective"
 VIEW, TRAINER, STAGE = "fitting.view", "fitting.trainer", "stages.optimiser"
 
@@ -166,6 +172,19 @@ LOSSES = [
         "exposure",
         (EXPOSURE, "    return exposed, ExposureSaved", "    return np.clip(exposed, 0, 1), ExposureSaved"),
     ),
+    mistake(
+        "rotation_vector_reversed",
+        "pose",
+        (POSE, "_factors(float(vector @ vector))\n", "_factors(float(vector @ vector))\n    vector = -vector\n"),
+        (POSE, "d_vector, d_d.copy())", "-d_vector, d_d.copy())"),
+    ),
+    mistake(
+        "offset_before_rotation",
+        "pose",
+        (POSE, "a * k + b * (k @ k)\n", "a * k + b * (k @ k)\n    d, offset = d + offset, 0 * d\n"),
+        (POSE, "d_vector, d_d.copy())", "d_vector, d_d @ saved.exponential)"),
+    ),
+    mistake("radial_gradient_dropped", "pose", (POSE, "(a1 * k + b1 * (k @ k))", "(0 * k)")),
 ]
 TRAINING = [
     mistake(

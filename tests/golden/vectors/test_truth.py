@@ -15,6 +15,7 @@ from oracle import (
     laplacian_oracle,
     losses,
     matern_oracle,
+    pose_oracle,
     residuals_oracle,
     splatting_oracle,
 )
@@ -121,6 +122,14 @@ def exposure(i, s, right):
     gradients = exposure_oracle.gradients(*arrays, i["d_exposed"])
     named = dict(zip(("d_colour", "d_log_gain", "d_bias"), gradients, strict=True))
     return {"exposed": exposure_oracle.exposed(*arrays, i["bias"])} | named
+
+
+def pose(i, s, right):
+    given = [i[name] for name in ("rotation", "translation", "rotation_vector", "offset")]
+    gradients = pose_oracle.gradients(*given, i["d_corrected_rotation"], i["d_corrected_translation"])
+    names = ("d_rotation", "d_translation", "d_rotation_vector", "d_offset")
+    found = dict(zip(("corrected_rotation", "corrected_translation"), pose_oracle.corrected(*given), strict=True))
+    return found | dict(zip(names, gradients, strict=True))
 
 
 def smoothness(i, s, right):
@@ -245,7 +254,7 @@ ORACLES = {
     "frequencies": frequencies, "dictionary": dictionary, "atoms": atoms, "appearance": appearance, "motion": motion,
     "matern": matern, "laplacian": laplacian, "calibration": calibration, "deformation": deformation_case,
     "adam": adam_case, "masked_l1": masked_l1, "masked_ssim": masked_ssim, "normalised_depth": normalised_depth,
-    "exposure": exposure,
+    "exposure": exposure, "pose": pose,
     "smoothness": smoothness, "covariance": covariance, "projection": projection, "harmonics": harmonics,
     "composite": composite, "render": render, "scene": scene, "objective": objective,
     "schedule": schedule, "density": density, "initialisation": initialisation,
@@ -273,7 +282,7 @@ def test_every_named_oracle_exists():
     modules = {
         m.__name__.rsplit(".", 1)[-1]: m
         for m in (adam, calibration_oracle, deformation, exposure_oracle, fitting_oracle, fourier_oracle,
-                  laplacian_oracle, losses, matern_oracle, residuals_oracle, splatting_oracle)
+                  laplacian_oracle, losses, matern_oracle, pose_oracle, residuals_oracle, splatting_oracle)
     }  # fmt: skip
     for case in GOLDEN.cases:
         for output in case.outputs.values():

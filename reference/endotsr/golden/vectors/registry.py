@@ -28,6 +28,7 @@ FAMILIES = (
     "depth",
     "smoothness",
     "exposure",
+    "pose",
     "covariance",
     "projection",
     "harmonics",

@@ -1,0 +1,54 @@
+"""Stage of the correction of a camera pose (B16)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.equations.pose import PoseSaved, pose_forward, pose_reverse
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
+
+
+def _pose(inputs: Inputs, settings: Settings) -> tuple[Found, PoseSaved]:
+    rotation, translation, saved = pose_forward(
+        inputs["rotation"], inputs["translation"], inputs["rotation_vector"], inputs["offset"]
+    )
+    return {"corrected_rotation": rotation, "corrected_translation": translation}, saved
+
+
+def _reverse(cotangents: Inputs, saved: PoseSaved) -> Found:
+    return pose_reverse(cotangents["corrected_rotation"], cotangents["corrected_translation"], saved)._asdict()
+
+
+def _inputs(rng: np.random.Generator, angle: float) -> dict[str, NDArray]:
+    """A rotation by `angle` rad; the given matrix is no rotation, since its nine entries are independent."""
+    axis = rng.normal(0, 1, 3)
+    return {
+        "rotation": rng.normal(0, 1, (3, 3)),
+        "translation": rng.normal(0, 2, 3),
+        "rotation_vector": angle * axis / np.linalg.norm(axis),
+        "offset": rng.normal(0, 1, 3),
+    }
+
+
+STAGES = [
+    Stage(
+        name="pose",
+        equation="B16",
+        text="correction of a camera pose",
+        function="endotsr.equations.pose.pose_forward",
+        inputs={"rotation": "1", "translation": "scene", "rotation_vector": "rad", "offset": "scene"},
+        forward=_pose,
+        asked={
+            "corrected_rotation": Asked(1, oracle="pose_oracle.corrected"),
+            "corrected_translation": Asked(1, "scene", oracle="pose_oracle.corrected"),
+            "d_rotation": Asked(2, "loss", oracle="pose_oracle.gradients"),
+            "d_translation": Asked(2, "loss per scene", oracle="pose_oracle.gradients"),
+            "d_rotation_vector": Asked(2, "loss per rad", oracle="pose_oracle.gradients"),
+            "d_offset": Asked(2, "loss per scene", oracle="pose_oracle.gradients"),
+        },
+        reverse=_reverse,
+        variants=(
+            Variant("pose", lambda rng: _inputs(rng, 1.7)),
+            Variant("pose_small", lambda rng: _inputs(rng, 0.02)),
+        ),
+    )
+]
