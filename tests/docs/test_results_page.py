@@ -1,0 +1,27 @@
+"""docs/results/README.md: its tables are what the committed results say."""
+
+import json
+from pathlib import Path
+
+import levers
+import pytest
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+TABLES = {"table": levers.table, "motion": levers.motion_table}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_of_the_levers_is_what_the_result_says(name):
+    found = json.loads(levers.FILE.read_text(encoding="utf-8"))
+    assert TABLES[name](found) in (RESULTS / "README.md").read_text(encoding="utf-8")
+
+
+def test_differences_are_paired_by_seed():
+    """The same offset on both seeds has no width, however far apart the seeds are."""
+    runs = {
+        levers.SHARP: [{"psnr_tissue": 30.0}, {"psnr_tissue": 40.0}],
+        levers.PAPER: [{"psnr_tissue": 29.0}, {"psnr_tissue": 39.0}],
+    }
+    found = {"scenes": {"clip": runs}, "seeds": 2, "iterations": 9, "date": "-", "machine": {"processor": "x"}}
+    rows = [line for line in levers.table(found).splitlines() if line.startswith("| clip")]
+    assert rows == ["| clip | `sharp` | 35.00 | - |", "| clip | `paper` | -1.00 ± 0.00 | - |"]
