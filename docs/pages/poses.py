@@ -119,7 +119,7 @@ def found(clips: dict[str, str], seeds: int, jobs: int) -> dict[str, Any]:
     rows = [
         (scene, label, poses)
         for scene in (*SCENES, *clips)
-        for label in ((MOVING,) if SCENES.get(scene) else SETTINGS)
+        for label in (SETTINGS if SCENES.get(scene) == () else (MOVING,))
         for poses in (POSES if scene in SCENES else POSES[1:])
     ]
     runs = {f"{', '.join(row)}, seed {seed}": (*row, seed) for seed in range(seeds) for row in rows}

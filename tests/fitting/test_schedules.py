@@ -42,6 +42,15 @@ def test_rates_of_the_paper_preset():
     assert (rates["opacity_logit"], rates["log_scale"], rates["quaternion"]) == (0.05, 0.005, 0.001)
 
 
+def test_corrections_of_poses_have_a_rate_only_where_the_model_has_them_and_decay_like_the_position():
+    config = changed("model", pose_correction=True)
+    start, last = (learning_rates(i, config) for i in (0, config.training.iterations))
+    assert start["pose_rotation"] == start["pose_translation"] == config.optimiser.pose > 0
+    assert last["pose_rotation"] == last["pose_translation"]
+    assert last["pose_rotation"] == pytest.approx(config.optimiser.pose * config.optimiser.final_factor)
+    assert not {"pose_rotation", "pose_translation"} & set(learning_rates(0, PAPER))
+
+
 def test_exposure_has_a_rate_only_where_the_model_has_it_and_decays_like_the_position():
     config = changed("model", exposure=True)
     start, last = (learning_rates(i, config) for i in (0, 6000))

@@ -9,7 +9,7 @@ MODULES = (
     "kernels.exponential",
     "kernels.gather",
     *(f"equations.{name}" for name in ("dictionary", "atom_sums", "appearance", "motion", "matern")),
-    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure")),
+    *(f"equations.{name}" for name in ("pyramid", "laplacian", "calibration", "deformation", "exposure", "pose")),
     *(f"splatting.{name}" for name in ("camera", "camera_model", "covariance", "projection")),
     *(f"splatting.{name}" for name in ("projection_formulas", "projection_kernels", "harmonics", "harmonics_formulas")),
     "kernels.sums",

@@ -15,6 +15,7 @@ from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+ATTEMPTS = 3  # on a loaded machine the browser can hand back the document before the picture is drawn
 VIRTUAL_MILLISECONDS = 30000  # of the page's own clock; the browser ends as soon as nothing is left to do
 
 
@@ -40,8 +41,11 @@ def dom(page: Path, moment: str) -> str:
 
 def drawn(page: Path, moment: str) -> np.ndarray:
     """The picture of the page at `t=0.4&layer=depth`, (H, W, 3) uint8."""
-    content = dom(page, f"{moment}&probe")
-    found = re.search(r'<pre id="probe"[^>]*>(.*?)</pre>', content, re.S)
+    for _ in range(ATTEMPTS):
+        content = dom(page, f"{moment}&probe")
+        found = re.search(r'<pre id="probe"[^>]*>(.*?)</pre>', content, re.S)
+        if found:
+            break
     assert found, content[-2000:] if "WebGL" not in content else re.findall(r'id="failure"[^>]*>([^<]*)', content)
     probe = json.loads(html.unescape(found[1]))
     assert probe["errors"] == 0, "an error of WebGL"

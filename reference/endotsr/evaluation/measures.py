@@ -43,16 +43,15 @@ def measured(names: Iterable[str], model: Model, sequence: Sequence, source: str
     source   folder of the sequence, or `simulated`
     Raises:  InputError for a name that is not in MEASURES, and for a right picture that cannot be read.
     """
-
-    sequence = with_corrected_cameras(sequence, model.frames)
-
-    def render(index: int, camera: Camera) -> RenderOut:
-        time = float(sequence.times[index])
-        return render_at(model.gaussians, model.spectral, model.config, camera, time, frames=model.frames)
-
     names = list(names)
     check_measures(names)
-    return {name: MEASURES[name](model, sequence, source, render) for name in names}
+    seen = with_corrected_cameras(sequence, model.frames)
+
+    def render(index: int, camera: Camera) -> RenderOut:
+        time = float(seen.times[index])
+        return render_at(model.gaussians, model.spectral, model.config, camera, time, frames=model.frames)
+
+    return {name: MEASURES[name](model, seen, source, render) for name in names}
 
 
 def measure_lines(found: dict[str, dict[str, Any]]) -> list[str]:

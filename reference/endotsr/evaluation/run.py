@@ -14,6 +14,7 @@ from endotsr.evaluation.baselines import neighbours
 from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.measures import measured
+from endotsr.evaluation.poses import pose_change
 from endotsr.evaluation.trajectories import TruePositions, trajectory_error
 from endotsr.fitting.model import render_at, with_corrected_cameras, without
 from endotsr.kernels.arrays import FloatArray
@@ -92,10 +93,11 @@ def measure_model(
 
     returns  the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at the
              neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`, or None;
+             `pose_correction`, that of `pose_change`;
              `components`, the means with one residual left out
     """
 
-    sequence = with_corrected_cameras(sequence, model.frames)
+    given, sequence = sequence, with_corrected_cameras(sequence, model.frames)
 
     def render(index: int, taken_out: str = "") -> RenderOut:
         shown = without(model.gaussians, **({taken_out: False} if taken_out else {}))
@@ -107,6 +109,7 @@ def measure_model(
     metrics["cross_fade"] = _cross_fade(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
     metrics["trajectories"] = None if motion is None else motion._asdict() | {"unit": sequence.unit}
+    metrics["pose_correction"] = pose_change(given, sequence)
     metrics["components"] = _components(model, sequence, render, metrics["held_out"]["mean"])
     return metrics, held_out
 

@@ -205,16 +205,19 @@ def corrected_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> 
 
 def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], times: FloatArray) -> list[Camera]:
     """The cameras of frames at their times with the corrections of a model; those given if the model has none."""
-    if pose_at(frames, 0.0) is None:
-        return cameras
-    return [corrected(camera, pose_at(frames, float(t)))[0] for camera, t in zip(cameras, times, strict=True)]
+    return [camera_at(frames, camera, float(t)) for camera, t in zip(cameras, times, strict=True)]
+
+
+def camera_at(frames: FrameParameters | None, camera: Camera, t: float) -> Camera:
+    """A camera with the correction of a model at time t; the camera itself if the model has none."""
+    return corrected(camera, pose_at(frames, t))[0]
 
 
 def with_corrected_cameras(sequence: Sequence, frames: FrameParameters | None) -> Sequence:
     """The sequence as a model sees it: its cameras with the corrections of their poses."""
-    if pose_at(frames, 0.0) is None:
-        return sequence
-    return replace(sequence, cameras=corrected_cameras(frames, sequence.cameras, sequence.times))
+    cameras = corrected_cameras(frames, sequence.cameras, sequence.times)
+    same = all(one is other for one, other in zip(cameras, sequence.cameras, strict=True))
+    return sequence if same else replace(sequence, cameras=cameras)
 
 
 def without(gaussians: Gaussians, *, appearance: bool = True, spectral_motion: bool = True) -> Gaussians:

@@ -21,7 +21,7 @@ from endotsr.equations.laplacian import (
     support_masks,
 )
 from endotsr.equations.pyramid import Upsampling
-from endotsr.fitting.model import Spectral, corrected, render_at
+from endotsr.fitting.model import Spectral, camera_at, render_at
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
@@ -31,7 +31,7 @@ from endotsr.losses.masked_ssim import SsimTarget, masked_ssim_forward, masked_s
 from endotsr.losses.smoothness import smoothness_forward, smoothness_reverse
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
-from endotsr.scene.parameters import FrameParameters, pose_at
+from endotsr.scene.parameters import FrameParameters
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.render import RenderOut
 
@@ -184,7 +184,7 @@ def calibrate_on(
     views = []
     for index in chosen:
         frame = sequence.frame(int(index), gaussians.position.dtype)
-        at = (corrected(frame.camera, pose_at(frames, frame.time))[0], frame.time)
+        at = (camera_at(frames, frame.camera, frame.time), frame.time)
         rendered = render_at(gaussians, spectral, config, *at, frames=frames, appearance=False, spectral_motion=False)
         targets = frame_targets(frame, config)
         supports = targets.supports or support_masks(frame.mask, LEVELS, config.loss.upsampling)

@@ -62,6 +62,8 @@ def held_out_table(metrics: dict[str, Any]) -> str:
         lines.append(f"training frames: PSNR tissue {_number(inside, 2)} dB")
     if motion := metrics.get("trajectories"):
         lines.append(trajectory_sentence(motion))
+    if change := metrics.get("pose_correction"):
+        lines.append(pose_sentence(change))
     if frames := left_out(metrics):
         lines.append(f"left out of the means of the tissue, without a finite value there: {', '.join(frames)}")
     if "run" in metrics and metrics["run"]["iteration"] < metrics["run"]["iterations_planned"]:
@@ -77,6 +79,14 @@ def trajectory_sentence(motion: dict[str, Any]) -> str:
         f"True motion: mean trajectory error {motion['scene_units']:.3f} {motion['unit']} "
         f"({motion['pixels']:.2f} px), where the tissue moves {motion['motion_scene_units']:.3f} {motion['unit']} "
         f"({motion['motion_pixels']:.2f} px)."
+    )
+
+
+def pose_sentence(change: dict[str, Any]) -> str:
+    """How far the cameras were moved."""
+    return (
+        f"Poses: corrected by {change['degrees']:.2f} degrees and {change['scene_units']:.2f} {change['unit']} in the "
+        f"mean, which moves the picture by {change['pixels']:.2f} px."
     )
 
 

@@ -8,7 +8,7 @@ from endotsr.evaluation.evaluate import left_out
 from endotsr.report import curves, figures
 from endotsr.report import parts as parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
-from endotsr.report.run_text import trajectory_sentence
+from endotsr.report.run_text import pose_sentence, trajectory_sentence
 from endotsr.report.tables import html_table
 
 Column = tuple[str, str, int, int]  # of COLUMNS
@@ -184,6 +184,8 @@ def _motion(data: ReportData) -> str:
         )
     if motion := data.evaluation.get("trajectories"):
         sentences.append(trajectory_sentence(motion))
+    if change := data.evaluation.get("pose_correction"):
+        sentences.append(pose_sentence(change))
     return "".join(f"<p>{parts.text(sentence)}</p>" for sentence in sentences)
 
 

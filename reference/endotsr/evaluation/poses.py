@@ -1,0 +1,40 @@
+"""How far the training moved the cameras of a run (B16).
+
+In: a sequence with its given poses, and with those that the model sees it by. Out: means over the training frames. A
+common motion of all cameras counts too, although it changes no picture.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera, backproject, camera_centre, project
+
+POINTS = 8  # along each side of the picture
+
+
+def pose_change(given: Sequence, seen: Sequence) -> dict[str, Any] | None:
+    """Mean change of the training cameras; None if both are the same sequence.
+
+    returns  `degrees` between the rotations, `scene_units` between the optical centres, `pixels` between the places of
+             points at the median depth of the tissue, and the `unit` of the scene
+    """
+    if seen is given:
+        return None
+    rows = [_change(given, int(i), seen.cameras[i]) for i in given.train_index]
+    names = ("degrees", "scene_units", "pixels")
+    return dict(zip(names, np.mean(rows, axis=0).tolist(), strict=True)) | {"unit": given.unit}
+
+
+def _change(sequence: Sequence, index: int, seen: Camera) -> tuple[float, float, float]:
+    """Angle in degrees, distance in scene units, and mean displacement in pixels of one frame."""
+    camera, depth = sequence.cameras[index], sequence.depth[index][sequence.masks[index]]
+    known = depth[depth > 0]
+    cosine = (np.trace(seen.rotation @ camera.rotation.T) - 1) / 2
+    moved = float(np.linalg.norm(camera_centre(seen) - camera_centre(camera)))
+    ends = (np.linspace(0, size - 1, POINTS) for size in (camera.height, camera.width))
+    row, column = (a.ravel() for a in np.meshgrid(*ends, indexing="ij"))
+    points = backproject(camera, column, row, np.full(row.size, float(np.median(known)) if known.size else 1.0))
+    apart = np.subtract(project(seen, points)[:2], project(camera, points)[:2])
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), moved, float(np.hypot(*apart).mean())
