@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 from endotsr.equations.pose import PoseSaved, pose_forward, pose_reverse
 from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
 
+ALWAYS_DOUBLE = "a pose is computed in float64, whatever the precision of its inputs"
+
 
 def _pose(inputs: Inputs, settings: Settings) -> tuple[Found, PoseSaved]:
     rotation, translation, saved = pose_forward(
@@ -47,8 +49,8 @@ STAGES = [
         },
         reverse=_reverse,
         variants=(
-            Variant("pose", lambda rng: _inputs(rng, 1.7)),
-            Variant("pose_small", lambda rng: _inputs(rng, 0.02)),
+            Variant("pose", lambda rng: _inputs(rng, 1.7), single=ALWAYS_DOUBLE),
+            Variant("pose_small", lambda rng: _inputs(rng, 0.02), single=ALWAYS_DOUBLE),
         ),
     )
 ]
