@@ -29,12 +29,11 @@ def pose_change(given: Sequence, seen: Sequence) -> dict[str, Any] | None:
 
 def _change(sequence: Sequence, index: int, seen: Camera) -> tuple[float, float, float]:
     """Angle in degrees, distance in scene units, and mean displacement in pixels of one frame."""
-    camera, depth = sequence.cameras[index], sequence.depth[index][sequence.masks[index]]
-    known = depth[depth > 0]
+    camera, depth = sequence.cameras[index], sequence.tissue_depth(index) or 1.0
     cosine = (np.trace(seen.rotation @ camera.rotation.T) - 1) / 2
     moved = float(np.linalg.norm(camera_centre(seen) - camera_centre(camera)))
     ends = (np.linspace(0, size - 1, POINTS) for size in (camera.height, camera.width))
     row, column = (a.ravel() for a in np.meshgrid(*ends, indexing="ij"))
-    points = backproject(camera, column, row, np.full(row.size, float(np.median(known)) if known.size else 1.0))
+    points = backproject(camera, column, row, np.full(row.size, depth))
     apart = np.subtract(project(seen, points)[:2], project(camera, points)[:2])
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), moved, float(np.hypot(*apart).mean())

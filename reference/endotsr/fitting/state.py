@@ -93,14 +93,13 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
     moments = Moments(sequence, config.training.bridge_flow, Kept(limit))
-    depth = _depth_of_tissue(sequence, config) if config.model.pose_correction else 1.0
+    depth = _depth_of_tissue(sequence) if config.model.pose_correction else 1.0
     return Workshop(sequence, config, spectral, extent, Kept(limit), moments, depth)
 
 
-def _depth_of_tissue(sequence: Sequence, config: Config) -> float:
+def _depth_of_tissue(sequence: Sequence) -> float:
     """Median over the training frames of their median depth; 1 where no depth is known."""
-    frames = (sequence.frame(int(i), config.training.precision) for i in sequence.train_index)
-    medians = [np.median(d) for frame in frames if (d := frame.depth[frame.mask & (frame.depth > 0)]).size]
+    medians = [m for i in sequence.train_index if (m := sequence.tissue_depth(int(i))) is not None]
     return float(np.median(medians)) if medians else 1.0
 
 

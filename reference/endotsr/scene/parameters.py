@@ -98,21 +98,25 @@ def _at(frames: FrameParameters, t: float, array: FloatArray) -> FloatArray:
 
 def exposure_gradients(frames: FrameParameters, k: int, exposure: Exposure) -> dict[str, FloatArray]:
     """Gradients by the arrays of the exposures from those by the exposure of frame k: zero in every other column."""
-    return {f"exposure_{name}": _in_columns(frames, {k: vector}) for name, vector in exposure._asdict().items()}
+    return _in_columns(frames, "exposure", exposure, {k: 1.0})
 
 
 def pose_gradients(frames: FrameParameters, t: float, pose: Pose) -> dict[str, FloatArray]:
     """Gradients by the arrays of the poses from those by the correction at time t: the transpose of `pose_at`."""
-    parts = [float(np.interp(t, frames.times, unit)) for unit in np.eye(frames.times.size)]
-    return {
-        f"pose_{name}": _in_columns(frames, {k: part * vector for k, part in enumerate(parts) if part})
-        for name, vector in pose._asdict().items()
-    }
+    last = frames.times.size - 1
+    left = int(np.clip(np.searchsorted(frames.times, t, side="right") - 1, 0, last))
+    right = min(left + 1, last)
+    part = float(np.interp(t, frames.times[[left, right]], (0.0, 1.0))) if right > left else 0.0
+    return _in_columns(frames, "pose", pose, {right: part, left: 1.0 - part})
 
 
-def _in_columns(frames: FrameParameters, columns: dict[int, FloatArray]) -> FloatArray:
-    """An array (3, n) that holds vectors (3,) in the given columns and 0 in the others."""
-    found = np.zeros((CHANNELS, frames.times.size), next(iter(trained(frames).values())).dtype)
-    for k, vector in columns.items():
-        found[:, k] = vector
+def _in_columns(
+    frames: FrameParameters, group: str, vectors: Exposure | Pose, weights: dict[int, float]
+) -> dict[str, FloatArray]:
+    """For every array (3, n) of a group one that holds its vector (3,), weighted, in some columns, and 0 elsewhere."""
+    found = {}
+    for name, vector in vectors._asdict().items():
+        array = found[f"{group}_{name}"] = np.zeros_like(getattr(frames, f"{group}_{name}"))
+        for k, weight in weights.items():
+            array[:, k] = weight * vector
     return found

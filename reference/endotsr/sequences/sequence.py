@@ -83,6 +83,12 @@ class Sequence:
         """Fraction of all pixels of all frames that is tissue."""
         return float(self.masks.mean())
 
+    def tissue_depth(self, index: int) -> float | None:
+        """Median depth of the tissue of a frame, scene units; None where no depth is known."""
+        depth = self.depth[index][self.masks[index]]
+        known = depth[depth > 0]
+        return float(np.median(known)) if known.size else None
+
     def frame(self, index: int, dtype: DTypeLike = np.float32) -> Frame:
         """Frame `index` with image and depth in `dtype`; image = 8-bit value / 255.
 
