@@ -14,8 +14,9 @@ The result is docs/results/any_clip.json; the table stands in docs/guides/prepar
 import argparse
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,11 +85,10 @@ def measured(root: Path, way: str) -> dict[str, float]:
         "ssim": metrics["held_out"]["mean"]["ssim_full"],
         "flow": metrics["baselines"]["flow_interpolation"]["mean"]["psnr_tissue"],
     }
-    return (
-        found
-        if way == "endonerf"
-        else found | depth_error(clean, root / way) | {"video": video_psnr(clean, root / way)}
-    )
+    if way == "endonerf":
+        return found
+    depth = depth_error(root / way, partial(true_depth, clean))
+    return found | depth | {"video": video_psnr(clean, root / way)}
 
 
 def frames_of(clean: Path, other: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -103,19 +103,27 @@ def video_psnr(clean: Path, prepared: Path) -> float:
     return float(10 * np.log10(255**2 / error)) if error else float("inf")
 
 
-def depth_error(clean: Path, prepared: Path) -> dict[str, float]:
-    """Median absolute error in mm of the stereo depth on tissue, and the fraction of the tissue that has depth."""
+def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> dict[str, float]:
+    """Median absolute error in mm of the depth on tissue, and the fraction of the tissue that has depth.
+
+    wanted    frame -> depth to compare with, (H, W) in mm; where it is 0, nothing is compared
+    """
     recording = open_common(prepared)
     errors, covered = [], []
     assert recording.depth is not None and recording.masks is not None
     for i in range(recording.count):
-        with np.load(clean / "truth" / "frames" / f"{i:06d}.npz") as truth:
-            true = truth["depth"]
-        depth, tissue = recording.depth(i), recording.masks(i)
-        assert depth is not None and tissue is not None
-        errors.append(np.abs(depth - true)[(depth > 0) & tissue])
-        covered.append((depth > 0)[tissue].mean())
+        depth, tissue, known = recording.depth(i), recording.masks(i), wanted(i)
+        assert depth is not None and tissue is not None and known is not None
+        compared = tissue & (known > 0)
+        errors.append(np.abs(depth - known)[compared & (depth > 0)])
+        covered.append((depth > 0)[compared].mean())
     return {"depth_mm": float(np.median(np.concatenate(errors))), "coverage": float(np.mean(covered))}
+
+
+def true_depth(clean: Path, frame: int) -> np.ndarray:
+    """Depth of a simulated frame, (H, W) in mm."""
+    with np.load(clean / "truth" / "frames" / f"{frame:06d}.npz") as truth:
+        return truth["depth"]
 
 
 def table(result: dict[str, Any]) -> str:

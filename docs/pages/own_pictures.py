@@ -18,7 +18,7 @@ from typing import Any
 
 import kept
 import numpy as np
-from any_clip import said, video_psnr
+from any_clip import depth_error, said, video_psnr
 from marks import read_json, write_marked
 from over_seeds import shown
 
@@ -40,6 +40,8 @@ WAYS = {
     "jpg": f"jpg of quality {QUALITY}, `depth`",
     "mp4": "video, left above right, `depth`",
 }
+RUN = (("own", 2), ("lossless", 2), ("ssim", 4))  # measured in every run, and the decimals in the table
+INPUT = (("pictures", 1), ("depth_mm", 1), ("coverage", 2))  # the same for every seed
 
 
 def rectified_pair(clip: Path) -> tuple[Camera, float]:
@@ -106,34 +108,27 @@ def measured(key: str, clips: dict[str, Path], iterations: int) -> dict[str, flo
         said("evaluate", "--pictures", Path(scratch) / "renders" / "colour", "--sequence", clean, "--json", report)
         own = json.loads((run / "metrics.json").read_text(encoding="utf-8"))["held_out"]["mean"]
         against = json.loads(report.read_text(encoding="utf-8"))["held_out"]["mean"]
-    found = {"own": own["psnr_tissue"], "lossless": against["psnr_tissue"], "ssim": against["ssim_tissue"]}
-    return found | ({} if way == GIVEN else about_input(clean, clips[way]))
+    return {"own": own["psnr_tissue"], "lossless": against["psnr_tissue"], "ssim": against["ssim_tissue"]}
 
 
-def about_input(clean: Path, clip: Path) -> dict[str, float]:
+def about_input(clips: dict[str, Path], way: str) -> dict[str, float]:
     """Pictures against those without loss, and depth against the given one on tissue."""
-    own, given = open_common(clip), open_common(clean)
-    assert own.depth is not None and given.depth is not None and given.masks is not None
-    apart, covered = [], []
-    for i in range(given.count):
-        depth, wanted, tissue = own.depth(i), given.depth(i), given.masks(i)
-        assert depth is not None and wanted is not None and tissue is not None
-        both = tissue & (wanted > 0)
-        apart.append(np.abs(depth - wanted)[both & (depth > 0)])
-        covered.append((depth > 0)[both].mean())
-    found = {"depth_mm": float(np.median(np.concatenate(apart))), "coverage": float(np.mean(covered))}
-    loss = video_psnr(clean, clip)
-    return found | ({"pictures": loss} if np.isfinite(loss) else {})
+    if way == GIVEN:
+        return {}
+    given = open_common(clips[GIVEN]).depth
+    assert given is not None
+    loss = video_psnr(clips[GIVEN], clips[way])
+    return depth_error(clips[way], given) | ({"pictures": loss} if np.isfinite(loss) else {})
 
 
 def table(result: dict[str, Any]) -> str:
     """One way a row."""
-    columns = (("own", 2), ("lossless", 2), ("ssim", 4), ("pictures", 1), ("depth_mm", 1), ("coverage", 2))
     rows = []
-    for way, runs in result["ways"].items():
-        values = [(key, digits, [run[key] for run in runs if key in run]) for key, digits in columns]
-        once = {"pictures", "depth_mm", "coverage"}  # do not depend on the seed
-        rows.append([WAYS[way], *(shown(v[:1] if key in once else v, digits) for key, digits, v in values)])
+    for way, found in result["ways"].items():
+        runs = [[run[key] for run in found["runs"]] for key, _ in RUN]
+        inputs = [[found["input"][key]] if key in found["input"] else [] for key, _ in INPUT]
+        digits = [digits for _, digits in RUN + INPUT]
+        rows.append([WAYS[way], *map(shown, runs + inputs, digits)])
     head = ["Way", "PSNR tissue, dB", "against the lossless pictures, dB", "SSIM tissue, as well",
             "PSNR of the prepared pictures, dB", "depth from the given one, mm", "coverage of the tissue"]  # fmt: skip
     about = (
@@ -160,7 +155,10 @@ def main() -> None:
             clips = prepared(options.clip, Path(root))
             sources = {"iterations": options.iterations, "sources": kept.sources("")}
             found = kept.measured(FILE, sources, keys, lambda key: measured(key, clips, options.iterations))
-        ways = {way: [found[f"{way}, seed {seed}"] for seed in range(options.seeds)] for way in WAYS}
+            inputs = {way: about_input(clips, way) for way in WAYS}
+        seeds = range(options.seeds)
+        runs = {way: [found[f"{way}, seed {seed}"] for seed in seeds] for way in WAYS}
+        ways = {way: {"input": inputs[way], "runs": runs[way]} for way in WAYS}
         write_json(FILE, about | {"date": date.today().isoformat(), "machine": machine(), "ways": ways})
         kept.finished(FILE)
     write_marked(PAGE, {"ways": table(read_json(FILE, "docs/pages/own_pictures.py CLIP"))}, "own_pictures")
