@@ -3,6 +3,7 @@
 docs/results/faults.json   python tests/faults/campaign.py --kills 50 --json docs/results/faults.json
 docs/results/fuzz.json     python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json
 docs/results/soak.json     python tests/faults/soak.py --json docs/results/soak.json --plot docs/results/soak.png
+docs/results/large.json    python tests/faults/large.py --json docs/results/large.json
 """
 
 from pathlib import Path
@@ -17,12 +18,13 @@ MAKERS = {
     "faults": "python tests/faults/campaign.py --kills 50 --json docs/results/faults.json",
     "fuzz": "python tests/fuzz/campaign_of_inputs.py --json docs/results/fuzz.json",
     "soak": "python tests/faults/soak.py --json docs/results/soak.json",
+    "large": "python tests/faults/large.py --json docs/results/large.json",
 }
 
 
 def parts() -> dict[str, str]:
     """The generated parts of the page by name."""
-    written = {"faults": faults, "fuzz": fuzz, "soak": soak}
+    written = {"faults": faults, "fuzz": fuzz, "soak": soak, "large": large}
     return {
         name: written[name](read_json(RESULTS / f"{name}.json", command))
         if (RESULTS / f"{name}.json").exists()
@@ -59,6 +61,21 @@ def soak(result: dict[str, Any]) -> str:
             made(result),
             "",
             "![Resident memory over the iterations, a horizontal line](../results/soak.png)",
+        ]
+    )
+
+
+def large(result: dict[str, Any]) -> str:
+    """A million Gaussians, and more threads than cores, in a sentence each."""
+    many, threads = result["many"], result["threads"]
+    return "\n".join(
+        [
+            f"{many['gaussians']} Gaussians in pictures of {many['width']}x{many['height']}: an iteration takes"
+            f" {many['iteration_seconds']:.2f} s, the process {many['peak_bytes'] / 1e9:.2f} GB, the checkpoint"
+            f" {many['checkpoint_bytes'] / 1e9:.2f} GB.",
+            f"A tiny training with {threads['threads']} threads on {threads['cores']} cores gives the bits of one"
+            f" thread, in {threads['seconds']:.1f} s in place of {threads['seconds_of_one']:.1f} s.",
+            made(result),
         ]
     )
 

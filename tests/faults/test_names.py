@@ -1,5 +1,7 @@
 """Names from a file become the name of one file or nothing; text for a terminal holds no control character."""
 
+import pickle
+
 import pytest
 
 from endotsr.errors import InputError
@@ -64,3 +66,9 @@ def test_a_path_below_its_folder_stays_as_it_is():
 def test_a_line_for_a_terminal_holds_no_control_character():
     assert plain_line("  two\n lines\t\x1b[31mred\u202e ") == "two lines \\u001b[31mred\\u202e"
     assert plain_line("Größe 図") == "Größe 図"
+
+
+def test_no_message_of_unusable_input_can_move_the_cursor():
+    error = InputError("a\x1b[2J.png: cannot be read\nsecond\u202eline")
+    assert str(error) == "a\\u001b[2J.png: cannot be read\nsecond\\u202eline"
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)

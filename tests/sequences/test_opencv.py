@@ -8,6 +8,8 @@ import pytest
 
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, canny_edges, dis_flow, read_png, warp_bilinear, write_png
+from endotsr.opencv.pictures import read_picture
+from endotsr.opencv.video import video_facts
 
 RNG = np.random.default_rng(1)
 
@@ -92,3 +94,36 @@ def test_area_resize_is_the_mean_of_what_is_covered():
 def test_opencv_is_imported_on_first_use_only():
     code = "import sys, endotsr.opencv, endotsr.sequences.endonerf; sys.exit('cv2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "text", [b"#EXTM3U\n#EXT-X-VERSION:3\nfile:///etc/passwd\n", b"ffconcat version 1.0\nfile a.mp4\n"]
+)
+def test_a_play_list_is_no_video(text, tmp_path):
+    (tmp_path / "a.mp4").write_bytes(text)
+    with pytest.raises(InputError, match=r"a\.mp4: not a video by its first bytes"):
+        video_facts(tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize("quality", [60, 95])
+@pytest.mark.parametrize("shape", [(33, 47, 3), (16, 9)])
+def test_a_jpeg_has_the_pixels_that_opencv_decodes(shape, quality, tmp_path):
+    import cv2
+
+    pixels = cv2.GaussianBlur(RNG.integers(0, 255, shape, np.uint8), (0, 0), 2.0)
+    cv2.imwrite(str(tmp_path / "a.jpg"), pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    stored = cv2.imread(str(tmp_path / "a.jpg"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.jpg"), stored[..., ::-1] if stored.ndim == 3 else stored)
+
+
+def test_a_picture_of_more_pixels_than_allowed_is_refused_before_it_is_decoded(tmp_path):
+    import struct
+
+    import cv2
+
+    data = bytearray(cv2.imencode(".jpg", np.zeros((16, 16, 3), np.uint8))[1].tobytes())
+    place = data.index(b"\xff\xc0")
+    data[place + 5 : place + 9] = struct.pack(">HH", 60000, 60000)
+    (tmp_path / "a.jpg").write_bytes(data)
+    with pytest.raises(InputError, match=r"a\.jpg: 60000x60000 pixels; allowed: at most 67108864"):
+        read_picture(tmp_path / "a.jpg")

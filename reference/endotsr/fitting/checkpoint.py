@@ -30,6 +30,7 @@ from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, trained
 from endotsr.untrusted.arrays import NpzFile, Refused, open_npz
 from endotsr.untrusted.json import parsed
+from endotsr.untrusted.names import shown
 
 FORMAT = "endotsr checkpoint"
 VERSION = 2
@@ -242,7 +243,7 @@ def _read_entries(path: Path, file: NpzFile, listed: dict[str, Any]) -> dict[str
         array = _read(path, file, key)
         if not isinstance(expected, list) or [array.dtype.str, list(array.shape)] != expected[:2]:
             raise DamagedCheckpoint(
-                f"{path}: {key}: {array.dtype.str} {array.shape} found, the header says {str(expected)[:80]}"
+                f"{path}: {key}: {array.dtype.str} {array.shape} found, the header says {shown(expected)}"
             )
         if len(expected) != 3 or expected[2] not in (None, digest(array)):
             raise DamagedCheckpoint(f"{path}: {key}: its SHA-256 is not the one in the header")

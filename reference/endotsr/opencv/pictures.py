@@ -4,6 +4,7 @@ Comes in: a path; goes out: RGB or grey pixels as stored. Every reader refuses a
 silence: a JPEG that was cut off decodes to a picture whose lower part is grey.
 """
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from endotsr.kernels.arrays import Array
 from endotsr.opencv import decoded, read_png
 from endotsr.opencv.library import cv2_library
 from endotsr.untrusted.files import read_bytes
-from endotsr.untrusted.png import LARGEST_FILE
+from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.png import LARGEST_FILE, MOST_PIXELS
 
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")
@@ -36,7 +38,24 @@ def read_picture(path: Path) -> Array:
         raise InputError(f"{path}: no picture by its name; allowed: .png, .jpg, .jpeg, .tif, .tiff, .exr")
     data = read_bytes(Path(path), LARGEST_FILE)
     _check_start_and_end(data, ending, path)
+    if ending in JPEG_ENDINGS:
+        return _jpeg(data, path)
     return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
+
+
+def _jpeg(data: bytes, path: Path) -> Array:
+    """Pixels of a JPEG file. Pillow returns those of OpenCV, which prints complaints about a damaged file itself."""
+    from PIL.JpegImagePlugin import JpegImageFile  # without the limit of `Image.open`, which prints a warning
+
+    try:
+        with JpegImageFile(io.BytesIO(data)) as picture:
+            if picture.width * picture.height > MOST_PIXELS:
+                raise InputError(f"{path}: {picture.width}x{picture.height} pixels; allowed: at most {MOST_PIXELS}")
+            return np.array(picture if picture.mode == "L" else picture.convert("RGB"))
+    except InputError:
+        raise
+    except Exception as error:  # Pillow raises whatever its parsers of metadata meet
+        raise InputError(f"{path}: damaged JPEG: {plain_line(str(error))}") from None
 
 
 def _check_start_and_end(data: bytes, ending: str, path: Path) -> None:

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
 from endotsr.opencv.library import cv2_library
+from endotsr.untrusted.files import open_regular
 
+LARGEST_FILE = 1 << 40  # bytes: a video is decoded picture by picture
+# First bytes of the containers: the ending of a name says nothing of what a decoder would do with a play list.
+STARTS = {
+    0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"G", b"0&\xb2u"),  # avi, mkv and webm, mpeg, ts, wmv
+    4: (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # mp4 and mov
+}
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv")
 
 
@@ -69,8 +76,10 @@ def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]
 
 
 def _opened(path: Path):
-    if not Path(path).is_file():
-        raise InputError(f"{path}: file not found")
+    with open_regular(Path(path), LARGEST_FILE) as file:
+        begin = file.read(16)
+    if not any(begin.startswith(starts, place) for place, starts in STARTS.items()):
+        raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
     capture = cv2_library().VideoCapture(str(path))
     if not capture.isOpened():
         raise InputError(f"{path}: not a video that OpenCV can decode; allowed: {', '.join(VIDEO_ENDINGS)}")

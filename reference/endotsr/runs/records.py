@@ -32,14 +32,14 @@ class _Part(msgspec.Struct, kw_only=True):
 class InputPart(_Part, kw_only=True):
     """`input` of run.json."""
 
-    source: Text | None = None
-    frames: Count | None = None
-    width: Side | None = None
-    height: Side | None = None
-    training_frames: Count | None = None
-    held_out_frames: Count | None = None
-    tissue_fraction: Moment | None = None
-    static_camera: bool | None = None
+    source: Text | msgspec.UnsetType = msgspec.UNSET
+    frames: Count | msgspec.UnsetType = msgspec.UNSET
+    width: Side | msgspec.UnsetType = msgspec.UNSET
+    height: Side | msgspec.UnsetType = msgspec.UNSET
+    training_frames: Count | msgspec.UnsetType = msgspec.UNSET
+    held_out_frames: Count | msgspec.UnsetType = msgspec.UNSET
+    tissue_fraction: Moment | msgspec.UnsetType = msgspec.UNSET
+    static_camera: bool | msgspec.UnsetType = msgspec.UNSET
     notes: list[Text] = []
     arrays_sha256: dict[Text, Text] = {}
     files_sha256: dict[Text, Text] = {}
@@ -49,10 +49,10 @@ class InputPart(_Part, kw_only=True):
 class MachinePart(_Part, kw_only=True):
     """`machine` of run.json."""
 
-    processor: Text | None = None
-    cores: Count | None = None
+    processor: Text | msgspec.UnsetType = msgspec.UNSET
+    cores: Count | msgspec.UnsetType = msgspec.UNSET
     memory_bytes: Count | None = None
-    system: Text | None = None
+    system: Text | msgspec.UnsetType = msgspec.UNSET
 
 
 class RunRecord(_Part, kw_only=True):

@@ -14,7 +14,9 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.sequences.recording import Lens, Rig, lens_of_matrix
 from endotsr.sequences.sequence_file import checked_rotation
+from endotsr.untrusted.files import read_text
 
+LARGEST_FILE = 1 << 20  # bytes
 COEFFICIENTS = 8  # kc_0 .. kc_7; files without the last ones have five or four
 FEWEST = (8, 5, 4)
 
@@ -25,11 +27,9 @@ def read_rig(path: Path) -> Rig:
     Raises:  InputError naming the file, the section and the key.
     """
     parser = configparser.ConfigParser(interpolation=None)
+    text = read_text(Path(path), LARGEST_FILE)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
         parser.read_string(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     except configparser.Error as error:
         raise InputError(f"{path}: not a calibration in ini form: {str(error).splitlines()[0]}") from None
     for section in ("StereoLeft", "StereoRight"):

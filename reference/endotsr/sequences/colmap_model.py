@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import Lens, Pose, checked_lens
+from endotsr.untrusted.files import read_bytes, read_text
+
+LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
 
 # Name -> (number in binary files, where fx fy cx cy and the distortion k1 k2 p1 p2 ... are among the parameters).
 MODELS: dict[str, tuple[int, tuple[int, int, int, int], tuple[int | None, ...]]] = {
@@ -58,7 +61,7 @@ def read_model(folder: Path) -> Model:
 
     Raises:  InputError naming the file and the line, or the byte, at which it departs from the format.
     """
-    text = (folder / "cameras.txt").is_file()
+    text = (folder / "cameras.txt").exists()
     ending = ".txt" if text else ".bin"
     for name in ("images", "points3D"):
         if not (folder / f"{name}{ending}").is_file():
@@ -96,11 +99,8 @@ def _pose(values: list[float] | FloatArray, where: str) -> Pose:
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    return [(number, line) for number, line in enumerate(text.splitlines(), 1) if not line.startswith("#")]
+    lines = read_text(path, LARGEST_FILE).splitlines()
+    return [(number, line) for number, line in enumerate(lines, 1) if not line.startswith("#")]
 
 
 def _cameras_text(path: Path) -> dict[int, Lens]:
@@ -148,11 +148,7 @@ class _Bytes:
     """A binary file, read from its beginning."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.place = path, 0
-        try:
-            self.data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        self.path, self.place, self.data = path, 0, read_bytes(path, LARGEST_FILE)
 
     def take(self, form: str) -> tuple:
         """The next values of a form of `struct`, little-endian. Raises InputError at the end of the file."""

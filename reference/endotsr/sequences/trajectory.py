@@ -14,6 +14,7 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Pose
 from endotsr.sequences.sequence_file import OPENGL, inverse_pose
+from endotsr.untrusted.files import read_text
 
 NORM_TOLERANCE = 1e-2  # of a quaternion written with few digits
 
@@ -53,12 +54,8 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
 
 
 def _rows(path: Path) -> tuple[FloatArray, list[int]]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     rows, lines = [], []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.replace(",", " ").split()
         if not words or words[0].startswith("#"):
             continue

@@ -13,8 +13,6 @@ user input: `read_truth` checks them and raises an `InputError` that names file 
 """
 
 import json
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,9 +29,13 @@ from endotsr.simulator.gain import GainSpectrum, gain_series, gain_spectrum
 from endotsr.simulator.scenes import effects_on
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.trajectories import MaterialTracks
+from endotsr.untrusted.arrays import read_npz
+from endotsr.untrusted.json import read_json
+from endotsr.untrusted.names import shown
 
 TRUTH = "truth"
 FORMAT = 1
+LARGEST_FILE = 1 << 31  # bytes, of the arrays together as well
 MAY_BE_NAN = ("pixel", "position", "material")
 
 
@@ -141,13 +143,9 @@ def _record(path: Path) -> tuple[str, SimulatorSettings]:
     """Name and settings of truth.json."""
     if not path.is_file():
         raise InputError(f"{path}: file not found; allowed: a sequence folder that `endotsr simulate` wrote")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else data
-        raise InputError(f"{path}: format = {found!r} is not allowed; allowed: {FORMAT}")
+    data = read_json(path)
+    if data.get("format") != FORMAT:
+        raise InputError(f"{path}: format = {shown(data.get('format'))} is not allowed; allowed: {FORMAT}")
     settings = data.get("settings")
     if not isinstance(settings, dict):
         raise InputError(f"{path}: settings is missing; allowed: the settings that `endotsr simulate` wrote")
@@ -156,13 +154,7 @@ def _record(path: Path) -> tuple[str, SimulatorSettings]:
 
 def _arrays(path: Path, shapes: dict[str, tuple[Any, ...]]) -> dict[str, Any]:
     """The arrays of a file, with checked names, shapes, kinds and finite numbers. A length "P" is any, once."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in shapes if name in file.files}
-    except FileNotFoundError:
-        raise InputError(f"{path}: file not found") from None
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: not a plain NumPy archive: {str(error).splitlines()[0]}") from None
+    found = read_npz(path, shapes, LARGEST_FILE)
     free: int | None = None
     for name, expected in shapes.items():
         if name not in found:

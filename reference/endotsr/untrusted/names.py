@@ -4,15 +4,13 @@ import os
 import re
 import unicodedata
 
-from endotsr.errors import InputError
+from endotsr.errors import INVISIBLE, InputError, visible
 
 LONGEST_NAME = 200  # bytes in UTF-8: file systems allow 255, and endings such as `_comparison.png` are appended
 ALLOWED = f"allowed: the name of one file, without folders and control characters, at most {LONGEST_NAME} bytes"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}
 SEPARATORS = "/\\"  # of any system: a run folder may be read on another one
 REFUSED_ON_WINDOWS = '<>:"|?*'
-# Categories of Unicode: control characters, formats (which can reverse the reading order), surrogates, line separators.
-INVISIBLE = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 def file_name(name: object, where: str) -> str:
@@ -69,6 +67,5 @@ def shown(value: object, longest: int = 80) -> str:
 
 
 def plain_line(text: str) -> str:
-    """Text on one line, in which no character can move the cursor or change the reading order of a terminal."""
-    joined = re.sub(r"[ \t\n\r\f\v]+", " ", text).strip()
-    return "".join(c if unicodedata.category(c) not in INVISIBLE else f"\\u{ord(c):04x}" for c in joined)
+    """Text on one line, `visible`; every run of spaces, tabs and ends of lines becomes one space."""
+    return visible(re.sub(r"[ \t\n\r\f\v]+", " ", text).strip())

@@ -22,7 +22,7 @@ LONGEST_HEADER = 4096
 LARGEST = 1 << 28  # bytes of an array that is read
 _HEADER = re.compile(
     r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), "
-    r"'shape': \(((?:\d{1,12},? ?){0,8})\),? ?\}\s*"
+    r"'shape': \(((?:\d{1,12}(?:, ?\d{1,12}){0,7})?,?)\),? ?\}\s*"
 )
 
 

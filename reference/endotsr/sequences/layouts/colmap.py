@@ -14,6 +14,7 @@ from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import ARBITRARY, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import pictures_from_files, stated_masks
+from endotsr.untrusted.names import relative_path
 
 
 def recognises(path: Path) -> bool:
@@ -57,9 +58,7 @@ def open_colmap(path: Path, options: SourceOptions) -> Recording:
 
 def _file(path: Path, name: str) -> Path:
     """The file of a registered picture. Raises InputError if it is missing or lies outside of the folder."""
-    inner = Path(name)
-    if inner.is_absolute() or ".." in inner.parts:
-        raise InputError(f"{path}: picture {name!r}: allowed: a file inside the folder")
+    inner = relative_path(name, f"{path}: a picture of the COLMAP model")
     for place in (path / "images" / inner, path / inner):
         if place.is_file():
             return place

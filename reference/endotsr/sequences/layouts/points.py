@@ -5,7 +5,6 @@ cameras_points.npz   w2c (n, 4, 4) world-to-camera, OpenCV axes; K (3, 3), OpenC
 mask.png             white = inside the field of view, one for all frames (optional)
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,10 @@ from endotsr.sequences.recording import ARBITRARY, Pose, Recording, colour_pictu
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import mask_reader, pictures_from_files
+from endotsr.untrusted.arrays import read_npz
 
 CAMERAS = "cameras_points.npz"
+LARGEST_FILE = 1 << 31  # bytes, of the arrays together as well
 KEYS = ("w2c", "K", "points", "visible", "frame_ids")
 
 
@@ -30,12 +31,11 @@ def recognises(path: Path) -> bool:
 
 def read_cameras(path: Path, frames: list[Path]) -> dict[str, np.ndarray]:
     """The arrays of the file, checked against the frames. Raises InputError."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {key: archive[key] for key in KEYS}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: cannot be read as arrays {', '.join(KEYS)}: {error}") from None
-    n, m = len(frames), len(found["points"])
+    found = read_npz(path, KEYS, LARGEST_FILE)
+    missing = [key for key in KEYS if key not in found]
+    if missing:
+        raise InputError(f"{path}: {', '.join(missing)} missing; allowed: an npz with {', '.join(KEYS)}")
+    n, m = len(frames), len(found["points"]) if found["points"].ndim else 0
     shapes = {"w2c": (n, 4, 4), "K": (3, 3), "points": (m, 3), "visible": (m, n), "frame_ids": (n,)}
     for key, shape in shapes.items():
         if found[key].shape != shape:

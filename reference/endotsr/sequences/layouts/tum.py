@@ -15,6 +15,8 @@ from endotsr.sequences.recording import Lens, Pose, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_depth, stated_masks
 from endotsr.sequences.trajectory import poses_at, read_trajectory
+from endotsr.untrusted.files import read_text
+from endotsr.untrusted.names import relative_path
 
 LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
 STEP = 1000.0 / 5000.0  # mm of one step of the stored depth
@@ -30,11 +32,7 @@ def recognises(path: Path) -> bool:
 def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
     """Times and files of a list, in time order. Raises InputError naming the line."""
     times, files = [], []
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split(maxsplit=1)
         if not words or words[0].startswith("#"):
             continue
@@ -44,11 +42,8 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
             time = float("nan")
         if len(words) != 2 or not np.isfinite(time):
             raise InputError(f"{path}: line {number}: allowed: a time in seconds and the name of a file")
-        file = Path(words[1].strip())
-        if file.is_absolute() or ".." in file.parts:
-            raise InputError(f"{path}: line {number}: {file}: allowed: a file inside the folder")
         times.append(time)
-        files.append(path.parent / file)
+        files.append(path.parent / relative_path(words[1].strip(), f"{path}: line {number}"))
     if not times:
         raise InputError(f"{path}: names no picture")
     order = np.argsort(times, kind="stable")
