@@ -35,7 +35,9 @@ def test_a_damaged_truth_is_refused_before_the_training(tmp_path, capsys):
     assert main(["simulate", "still", "--out", str(out), *SMALL]) == 0
     capsys.readouterr()
     (out / "truth" / "tracks.npz").write_bytes(b"PK nothing")
-    assert_refused(capsys, ["train", str(out), "--out", str(tmp_path / "run"), *SETTINGS], "tracks.npz", "not a plain")
+    assert_refused(
+        capsys, ["train", str(out), "--out", str(tmp_path / "run"), *SETTINGS], "tracks.npz", "not an .npz file"
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["scene"]
 
 

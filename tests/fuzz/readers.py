@@ -7,7 +7,6 @@ into `InputError`). Anything else is a finding.
 import io
 import json
 import random
-import struct
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -19,6 +18,7 @@ sys.path[:0] = [str(Path(__file__).parent)]
 import msgspec  # noqa: E402
 import mutate  # noqa: E402
 import numpy as np  # noqa: E402
+import recordings  # noqa: E402
 
 from endotsr.errors import InputError  # noqa: E402
 
@@ -270,203 +270,6 @@ def golden_json(kind: str) -> Callable[[Path], object]:
 
 
 @cache
-def jpeg_seeds() -> list[bytes]:
-    """Colour and grey pictures of two qualities, one of them progressive."""
-    import cv2
-
-    rng = np.random.default_rng(0)
-    colour, grey = rng.integers(0, 255, (17, 23, 3), np.uint8), rng.integers(0, 255, (16, 9), np.uint8)
-    ways = ((colour, [cv2.IMWRITE_JPEG_QUALITY, 90]), (grey, []), (colour, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]))
-    return [cv2.imencode(".jpg", pixels, way)[1].tobytes() for pixels, way in ways]
-
-
-@cache
-def tiff_seeds() -> list[bytes]:
-    """Planes of 8 and 16 bits and of real numbers."""
-    import cv2
-
-    planes = [np.arange(63, dtype=kind).reshape(7, 9) for kind in (np.uint8, np.uint16, np.float32)]
-    return [cv2.imencode(".tiff", plane)[1].tobytes() for plane in planes]
-
-
-def pfm_seeds() -> list[bytes]:
-    return [b"Pf\n5 4\n-1.0\n" + np.arange(20, dtype="<f4").tobytes()]
-
-
-@cache
-def video_seeds() -> list[bytes]:
-    """Three pictures as .mp4, without loss and with."""
-    import tempfile
-
-    from endotsr.opencv.video import write_video
-
-    pictures = list(np.random.default_rng(0).integers(0, 255, (3, 16, 24, 3), np.uint8))
-    with tempfile.TemporaryDirectory() as scratch:
-        files = [Path(scratch) / name for name in ("a.mp4", "b.mp4")]
-        for file, lossless in zip(files, (True, False)):
-            write_video(file, pictures, 5.0, lossless)
-        return [file.read_bytes() for file in files]
-
-
-def read_video(path: Path) -> object:
-    """As `prepare` does, of at most three pictures."""
-    from endotsr.opencv.video import video_facts, video_pictures
-
-    return list(video_pictures(path, list(range(min(video_facts(path).count, 3)))))
-
-
-def read_depth(path: Path) -> object:
-    from endotsr.sequences.depth_files import depth_plane, read_plane
-
-    return depth_plane(read_plane(path), 0.1, path)
-
-
-def read_picture(path: Path) -> object:
-    from endotsr.opencv.pictures import read_picture as read
-
-    return read(path)
-
-
-def sequence_file_seeds() -> list[bytes]:
-    """sequence.toml with everything that it can hold."""
-    row = "[1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0]"
-    text = f"""format = "endotsr-sequence-1"
-source = "a clip"
-frames = 2
-unit = "mm"
-frame_rate = 25.0
-
-[camera]
-width = 48
-height = 32
-fx = 40.0
-fy = 41.0
-cx = 24.0
-cy = 16.0
-distortion = []
-baseline = 4.2
-
-[masks]
-folder = "masks"
-excluded_value = "white"
-proposed = false
-
-[depth]
-folder = "depth"
-unit = "mm"
-scale = 0.1
-method = "given"
-
-[poses]
-direction = "camera_to_world"
-axes = "opengl"
-matrices = [{row}, {row}]
-"""
-    return [text.encode()]
-
-
-def read_sequence_file(path: Path) -> object:
-    from endotsr.sequences.sequence_file import read_poses
-    from endotsr.sequences.sequence_file import read_sequence_file as read
-
-    found = read(path.parent)
-    return found.camera.lens(path), read_poses(found, path)
-
-
-def rig_seeds() -> list[bytes]:
-    """A stereo calibration."""
-    lens = ["res_x=64", "res_y=48", "fc_x=60.5", "fc_y=61", "cc_x=32", "cc_y=24", *(f"kc_{k}=0.01" for k in range(8))]
-    turn = [f"R_{k}={int(k % 4 == 0)}" for k in range(9)] + ["T_0=-4.2", "T_1=0", "T_2=0.1"]
-    return ["\n".join(["[StereoLeft]", *lens, "", "[StereoRight]", *lens, *turn, ""]).replace("=", " = ").encode()]
-
-
-def read_rig(path: Path) -> object:
-    from endotsr.sequences.calibration import read_rig as read
-
-    return read(path)
-
-
-def trajectory_seeds() -> list[bytes]:
-    """Poses by time and by number of the frame."""
-    lines = [f"{stamp} 0.1 0.2 {k} 0 0 0 1" for k, stamp in enumerate(("1.50", "1.54", "1.58", "1.62"))]
-    return ["\n".join(["# a comment", *lines, ""]).encode(), b"0 0 0 0 0 0 0 1\n1 0 0 0 0.6 0 0 0.8\n"]
-
-
-def read_trajectory(path: Path) -> object:
-    from endotsr.sequences.trajectory import filled, poses_of_frames
-    from endotsr.sequences.trajectory import read_trajectory as read
-
-    poses = poses_of_frames(read(path, "m", axes="opengl"), 4, 25.0)[0]
-    return filled(poses) if any(pose is not None for pose in poses) else poses
-
-
-def read_list(path: Path) -> object:
-    from endotsr.sequences.layouts.tum import read_list as read
-
-    found = read(path)
-    assert all(file.resolve().is_relative_to(path.parent.resolve()) for file in found[1])
-    return found
-
-
-COLMAP_TEXT = (
-    b"1 OPENCV 64 48 60 61 32 24 0.01 0 0 0\n2 SIMPLE_RADIAL 64 48 60 32 24 0.1\n",
-    b"1 1 0 0 0 0.1 0.2 0.3 1 a.png\n1.5 2.5 7 3 4 -1\n2 0.6 0.8 0 0 0 0 0 2 b/c d.png\n\n",
-    b"7 1.5 2.5 3.5 255 0 0 0.5 1 0 2 1\n9 1 1 1 0 0 0 0\n",
-)
-
-
-def colmap_seeds() -> list[bytes]:
-    """The three text files of a model, one after another, between lines of dashes."""
-    return [b"----\n".join(COLMAP_TEXT)]
-
-
-def read_colmap(path: Path) -> object:
-    """The three files apart; what is missing is empty."""
-    from endotsr.sequences.colmap_model import read_model
-
-    parts = path.read_bytes().split(b"----\n")[:3]
-    for name, part in zip(("cameras", "images", "points3D"), [*parts, b"", b""]):
-        (path.parent / f"{name}.txt").write_bytes(part)
-    return read_model(path.parent)
-
-
-@cache
-def colmap_binary_seeds() -> list[bytes]:
-    """cameras, images and points3D in the binary form, each after its length."""
-    cameras = struct.pack("<QiiQQ8d", 1, 1, 4, 64, 48, 60, 61, 32, 24, 0.01, 0, 0, 0)
-    pose = struct.pack("<i7di", 1, 1, 0, 0, 0, 0.1, 0.2, 0.3, 1)
-    images = struct.pack("<Q", 1) + pose + b"a.png\0" + struct.pack("<Qddqddq", 2, 1.5, 2.5, 7, 3, 4, -1)
-    points = struct.pack("<QQdddBBBdQii", 1, 7, 1.5, 2.5, 3.5, 255, 0, 0, 0.5, 1, 1, 0)
-    return [b"".join(struct.pack("<I", len(part)) + part for part in (cameras, images, points))]
-
-
-def read_colmap_binary(path: Path) -> object:
-    from endotsr.sequences.colmap_model import read_model
-
-    data = path.read_bytes()
-    for name in ("cameras", "images", "points3D"):
-        length = int.from_bytes(data[:4], "little")
-        (path.parent / f"{name}.bin").write_bytes(data[4 : 4 + length])
-        data = data[4 + length :]
-    return read_model(path.parent)
-
-
-@cache
-def points_seeds() -> list[bytes]:
-    """Cameras and points of two pictures."""
-    out = io.BytesIO()
-    np.savez(out, w2c=np.tile(np.eye(4), (2, 1, 1)), K=np.diag([60.0, 60.0, 1.0]), points=np.zeros((3, 3)),
-             visible=np.ones((3, 2), bool), frame_ids=np.arange(2))  # fmt: skip
-    return [out.getvalue()]
-
-
-def read_points(path: Path) -> object:
-    from endotsr.sequences.layouts.points import read_cameras
-
-    return read_cameras(path, [path.parent / "0.png", path.parent / "1.png"])
-
-
-@cache
 def manifest_seeds() -> list[bytes]:
     """The manifest, with a few of its files."""
     whole = json.loads((GOLDEN / "manifest.json").read_text())
@@ -509,18 +312,20 @@ def _refused() -> type[Exception]:
 
 READERS = {
     "png": Reader("a.png", png_seeds, mutate.png, read_png),
-    "jpg": Reader("a.jpg", jpeg_seeds, mutate.plain, read_picture),
-    "tiff": Reader("a.tiff", tiff_seeds, mutate.plain, read_depth),
-    "pfm": Reader("a.pfm", pfm_seeds, mutate.plain, read_depth),
-    "depth (npy)": Reader("a.npy", pose_seeds, mutate.npy, read_depth),
-    "video (mp4)": Reader("a.mp4", video_seeds, mutate.plain, read_video),
-    "sequence.toml": Reader("sequence.toml", sequence_file_seeds, mutate.lines, read_sequence_file),
-    "calibration (ini)": Reader("StereoCalibration.ini", rig_seeds, mutate.lines, read_rig),
-    "trajectory": Reader("groundtruth.txt", trajectory_seeds, mutate.lines, read_trajectory),
-    "list of pictures": Reader("rgb.txt", trajectory_seeds, mutate.lines, read_list),
-    "COLMAP (text)": Reader("model", colmap_seeds, mutate.lines, read_colmap),
-    "COLMAP (binary)": Reader("model", colmap_binary_seeds, mutate.plain, read_colmap_binary),
-    "cameras and points (npz)": Reader("a.npz", points_seeds, mutate.npz, read_points),
+    "jpg": Reader("a.jpg", recordings.jpeg_seeds, mutate.plain, recordings.read_picture),
+    "tiff": Reader("a.tiff", recordings.tiff_seeds, mutate.plain, recordings.read_depth),
+    "pfm": Reader("a.pfm", recordings.pfm_seeds, mutate.plain, recordings.read_depth),
+    "depth (npy)": Reader("a.npy", pose_seeds, mutate.npy, recordings.read_depth),
+    "video (mp4)": Reader("a.mp4", recordings.video_seeds, mutate.plain, recordings.read_video),
+    "sequence.toml": Reader(
+        "sequence.toml", recordings.sequence_file_seeds, mutate.lines, recordings.read_sequence_file
+    ),
+    "calibration (ini)": Reader("StereoCalibration.ini", recordings.rig_seeds, mutate.lines, recordings.read_rig),
+    "trajectory": Reader("groundtruth.txt", recordings.trajectory_seeds, mutate.lines, recordings.read_trajectory),
+    "list of pictures": Reader("rgb.txt", recordings.list_seeds, mutate.lines, recordings.read_list),
+    "COLMAP (text)": Reader("model", recordings.colmap_seeds, mutate.lines, recordings.read_colmap),
+    "COLMAP (binary)": Reader("model", recordings.colmap_binary_seeds, mutate.plain, recordings.read_colmap_binary),
+    "cameras and points (npz)": Reader("a.npz", recordings.points_seeds, mutate.npz, recordings.read_points),
     "poses (npy)": Reader("poses_bounds.npy", pose_seeds, mutate.npy, read_poses),
     "splats (npz)": Reader("a.npz", scene_seeds, mutate.npz, read_splats),
     "splats (ply)": Reader("a.ply", ply_seeds, mutate.ply, read_splats),

@@ -7,7 +7,8 @@ import os
 
 import pytest
 from campaign_of_inputs import bounded_memory
-from readers import COLMAP_TEXT, READERS
+from readers import READERS
+from recordings import COLMAP_TEXT
 
 from endotsr.errors import InputError
 from endotsr.sequences.colmap_model import read_model
