@@ -3,6 +3,7 @@
 import base64
 import io
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -239,3 +240,9 @@ def test_columns_of_8_bits_are_folded():
     assert "8‑bit" not in table and "31.71" not in table and "30.25" in table
     opened = folded[: folded.index("</details>")]
     assert "31.71" in opened and "30.19" in opened and "30.25" not in opened
+
+
+def test_the_report_says_that_it_shows_the_worst_of_more_frames():
+    data = made_up_data()
+    assert "worst of" not in report_html(data)
+    assert "The 2 worst of 4 frames; renders/ has all of them." in report_html(replace(data, frames=data.frames[:2]))

@@ -13,6 +13,8 @@ from endotsr.runs.files import refuse_unwritable, replace_file, write_json
 from endotsr.runs.folder import RunFolder, open_run
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.render import RenderOut
@@ -151,7 +153,7 @@ def _write(
     model: "Model",
     sequence: "Sequence",
     metrics: dict[str, Any],
-    held_out: "dict[int, RenderOut]",
+    held_out: "Mapping[int, RenderOut]",
     view: bool,
 ) -> None:
     """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""

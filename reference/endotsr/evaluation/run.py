@@ -5,7 +5,8 @@ frames, components taken out, published figures, what the numbers belong to) and
 Writes nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -37,7 +38,27 @@ COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, transla
 CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
+RENDERS_KEPT = 32  # of the held-out frames: a clip with more of them has others rendered again, and no more memory
+
 Render = Callable[..., RenderOut]
+
+
+class Renders(Mapping[int, RenderOut]):
+    """The renders of frames by number, made when they are asked for; the last `RENDERS_KEPT` are kept."""
+
+    def __init__(self, render: Callable[[int], RenderOut], frames: tuple[int, ...]) -> None:
+        self._frames, self._render = frames, lru_cache(RENDERS_KEPT)(render)
+
+    def __getitem__(self, index: int) -> RenderOut:
+        if index not in self._frames:
+            raise KeyError(index)
+        return self._render(index)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._frames)
+
+    def __len__(self) -> int:
+        return len(self._frames)
 
 
 def measure_run(
@@ -47,7 +68,7 @@ def measure_run(
     weights: LpipsWeights | None = None,
     published: tuple[dict[str, Any], ...] = (),
     true_positions: TruePositions | None = None,
-) -> tuple[dict[str, Any], dict[int, RenderOut]]:
+) -> tuple[dict[str, Any], Mapping[int, RenderOut]]:
     """metrics.json of a run, and the renders of the held-out frames by frame number.
 
     record          run.json of the run
@@ -69,7 +90,7 @@ def measure_folder(
     weights: LpipsWeights | None = None,
     published: tuple[dict[str, Any], ...] = (),
     measures: tuple[str, ...] = (),
-) -> tuple[Model, dict[str, Any], dict[int, RenderOut]]:
+) -> tuple[Model, dict[str, Any], Mapping[int, RenderOut]]:
     """The model of the latest checkpoint of a run, and what `measure_run` returns for it.
 
     source    where the sequence is now
@@ -88,7 +109,7 @@ def measure_model(
     sequence: Sequence,
     weights: LpipsWeights | None = None,
     true_positions: TruePositions | None = None,
-) -> tuple[dict[str, Any], dict[int, RenderOut]]:
+) -> tuple[dict[str, Any], Mapping[int, RenderOut]]:
     """The part of metrics.json that needs no run folder, and the renders of the held-out frames.
 
     returns  the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at the
@@ -104,9 +125,12 @@ def measure_model(
         camera, time = sequence.cameras[index], float(sequence.times[index])
         return render_at(shown, model.spectral, model.config, camera, time, frames=model.frames)
 
-    held_out = {int(i): render(int(i)) for i in sequence.test_index}
-    metrics = evaluate_model(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
-    metrics["cross_fade"] = _cross_fade(sequence, lambda i: (held_out.get(i) or render(i)).colour, weights)
+    def colour(index: int) -> FloatArray:
+        return (held_out[index] if index in held_out else render(index)).colour
+
+    held_out = Renders(render, tuple(int(i) for i in sequence.test_index))
+    metrics = evaluate_model(sequence, colour, weights)
+    metrics["cross_fade"] = _cross_fade(sequence, colour, weights)
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
     metrics["trajectories"] = None if motion is None else motion._asdict() | {"unit": sequence.unit}
     metrics["pose_correction"] = pose_change(given, sequence)

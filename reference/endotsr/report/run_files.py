@@ -3,8 +3,10 @@
 In: the metrics of a run and the renders of its held-out frames. Each file and folder is replaced whole.
 """
 
+import math
 import os
 import shutil
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +26,14 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.names import file_name
 
+MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the report: some 0.25 MB each
+
 
 def write_evaluation(
     folder: RunFolder,
     sequence: Sequence,
     metrics: dict[str, Any],
-    held_out: dict[int, RenderOut],
+    held_out: Mapping[int, RenderOut],
     preview: Preview | None = None,
     viewer: str = "",
 ) -> None:
@@ -51,7 +55,7 @@ def write_evaluation(
     write_report(folder.path / "report.html", replace(data, preview=preview, viewer=viewer))
 
 
-def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: dict[int, RenderOut]) -> None:
+def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: Mapping[int, RenderOut]) -> None:
     """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
     peers = folder.path / "test" / f"ours_{iteration}"
     if peers.parent.is_symlink():
@@ -81,23 +85,24 @@ def _report_data(
     folder: RunFolder,
     sequence: Sequence,
     metrics: dict[str, Any],
-    held_out: dict[int, RenderOut],
+    held_out: Mapping[int, RenderOut],
     log: list[dict[str, Any]],
 ) -> ReportData:
     record = folder.record()
     rows = {row["frame"]: row for row in metrics["held_out"]["per_frame"]}
+    worst = sorted(held_out, key=lambda i: _order(rows[i]["psnr_tissue"]))[:MOST_SHOWN]
     frames = tuple(
         FramePictures(
             index=i,
             name=sequence.names[i],
             time=float(sequence.times[i]),
-            render=out.colour,
+            render=held_out[i].colour,
             truth=sequence.frame(i).image,
             mask=sequence.masks[i],
-            depth=out.depth,
+            depth=held_out[i].depth,
             metrics=rows[i],
         )
-        for i, out in held_out.items()
+        for i in sorted(worst)
     )
     return ReportData(
         title=f"{Path(record['input']['source']).name}: {folder.path.absolute().name}",
@@ -113,3 +118,8 @@ def _report_data(
         notes=tuple(record["input"]["notes"]),
         depth_unit=sequence.unit,
     )
+
+
+def _order(psnr: float | None) -> float:
+    """For sorting, worst first: a frame without a value (its render is not finite) is the worst."""
+    return -math.inf if psnr is None or math.isnan(psnr) else psnr

@@ -203,7 +203,7 @@ def training(data: ReportData) -> str:
 
 
 def pictures(data: ReportData) -> str:
-    """Render, truth, error and depth of every held-out frame, worst first."""
+    """Render, truth, error and depth of the held-out frames that the report was given, worst first."""
     if not data.frames:
         return ""
     errors = [figures.tissue_error(f.render, f.truth, f.mask) for f in data.frames]
@@ -220,6 +220,9 @@ def pictures(data: ReportData) -> str:
         "the same scale in all frames. Grey: excluded or without depth. The frame marks the window with the largest "
         "tissue error, shown 4× beside or below."
     )
+    frames = len(data.evaluation.get("held_out", {}).get("per_frame", ()))
+    if frames > len(data.frames):
+        note = f"The {len(data.frames)} worst of {frames} frames; renders/ has all of them. {note}"
     blocks = [_frame(data.frames[i], scale, span, position < OPENED_FRAMES) for position, i in enumerate(order)]
     return parts.section(
         "Pictures of the held-out frames", f'<div class="legend">{"".join(legend)}</div>', *blocks, note=note
