@@ -10,33 +10,9 @@ from tiny import SETTINGS, assert_refused
 
 from endotsr.evaluation.lpips import CHANNELS, KERNELS
 from endotsr.untrusted.arrays import LONGEST_HEADER
+from special_files import dangling, device, folder_there, huge, pipe
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
-
-
-def pipe(path):
-    path.unlink()
-    os.mkfifo(path)
-
-
-def device(path):
-    path.unlink()
-    path.symlink_to("/dev/zero")
-
-
-def folder_there(path):
-    path.unlink()
-    path.mkdir()
-
-
-def dangling(path):
-    path.unlink()
-    path.symlink_to("nowhere")
-
-
-def huge(path):
-    with path.open("r+b") as file:
-        file.truncate(1 << 40)  # sparse
 
 
 LARGE = b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 17), }"

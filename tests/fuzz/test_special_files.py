@@ -12,6 +12,7 @@ from recordings import COLMAP_TEXT
 
 from endotsr.errors import InputError
 from endotsr.sequences.colmap_model import read_model
+from special_files import device, folder_there, huge, pipe
 
 pytestmark = [
     pytest.mark.fuzz,
@@ -22,27 +23,13 @@ SEVERAL_FILES = ("COLMAP (text)", "COLMAP (binary)")  # the fuzzing unpacks thes
 MAY_BE_MISSING = ("log.jsonl",)
 
 
-def pipe(path):
-    path.unlink()
-    os.mkfifo(path)
-
-
-def device(path):
-    path.unlink()
-    path.symlink_to("/dev/zero")
-
-
-def folder(path):
-    path.unlink()
-    path.mkdir()
-
-
-def huge(path):
-    with path.open("r+b") as file:
-        file.truncate(1 << 41)  # sparse
-
-
-NO_FILES = {"named pipe": pipe, "device": device, "folder": folder, "missing": lambda path: path.unlink(), "huge": huge}
+NO_FILES = {
+    "named pipe": pipe,
+    "device": device,
+    "folder": folder_there,
+    "missing": lambda path: path.unlink(),
+    "huge": huge,
+}
 DAMAGE = {
     "empty": lambda path: path.write_bytes(b""),
     "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
