@@ -16,7 +16,6 @@ import json
 import tempfile
 from collections.abc import Callable, Iterator
 from datetime import date
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 from endotsr.sequences.common import open_common
+from endotsr.simulator.truth import read_truth
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "any_clip.json", DOCS / "guides" / "prepare.md"
@@ -87,7 +87,8 @@ def measured(root: Path, way: str) -> dict[str, float]:
     }
     if way == "endonerf":
         return found
-    depth = depth_error(root / way, partial(true_depth, clean))
+    truth = read_truth(clean)
+    depth = depth_error(root / way, lambda frame: truth.frame(frame).depth)
     return found | depth | {"video": video_psnr(clean, root / way)}
 
 
@@ -118,12 +119,6 @@ def depth_error(prepared: Path, wanted: Callable[[int], np.ndarray | None]) -> d
         errors.append(np.abs(depth - known)[compared & (depth > 0)])
         covered.append((depth > 0)[compared].mean())
     return {"depth_mm": float(np.median(np.concatenate(errors))), "coverage": float(np.mean(covered))}
-
-
-def true_depth(clean: Path, frame: int) -> np.ndarray:
-    """Depth of a simulated frame, (H, W) in mm."""
-    with np.load(clean / "truth" / "frames" / f"{frame:06d}.npz") as truth:
-        return truth["depth"]
 
 
 def table(result: dict[str, Any]) -> str:

@@ -18,7 +18,7 @@ def test_renders_are_made_when_asked_for_and_few_are_kept():
     renders = Renders(render, frames)
     assert list(renders) == list(frames) and len(renders) == len(frames) and not made
     assert renders[4].colour.item() == renders[4].colour.item() == 4 and made == [4]
-    assert 3 not in renders
+    assert 6 in renders and 3 not in renders and made == [4]
     with pytest.raises(KeyError):
         renders[3]
     for i in frames:

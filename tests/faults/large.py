@@ -25,11 +25,13 @@ FRAMES = 9
 
 
 def trained(words: list[str], **environment: str) -> dict[str, float]:
-    """A training in a process of its own: exit code, seconds, and the most bytes it had in RAM."""
+    """A training in a process of its own: seconds, and the most bytes in RAM. Raises SystemExit if it fails."""
     began = time.monotonic()
     process = subprocess.Popen([sys.executable, "-m", "endotsr", *words], env=os.environ | environment)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"failed: endotsr {' '.join(words)}")
     unit = 1 if sys.platform == "darwin" else 1024
     return {
         "exit_code": process.returncode,
@@ -39,7 +41,7 @@ def trained(words: list[str], **environment: str) -> dict[str, float]:
 
 
 def many_gaussians(count: int, iterations: int, width: int, height: int, scratch: Path) -> dict[str, Any]:
-    """Train from `count` pixels of the first frame. Raises SystemExit if the run does not end well."""
+    """Train from `count` pixels of the first frame."""
     words = [
         "train", "simulated", "--out", str(scratch / "many"), "--no-evaluate",
         "--simulator.width", str(width), "--simulator.height", str(height), "--simulator.frames", str(FRAMES),
@@ -48,8 +50,6 @@ def many_gaussians(count: int, iterations: int, width: int, height: int, scratch
         "--initialisation.other-frame-points", "0", "--density.until", "0",
     ]  # fmt: skip
     found = trained(words)
-    if found["exit_code"]:
-        raise SystemExit(f"failed: endotsr {' '.join(words)}")
     log = [json.loads(line) for line in (scratch / "many" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
     about = {"width": width, "height": height, "iterations": iterations, "gaussians": log[-1]["gaussians"]}
     late = statistics.median(entry["seconds"] for entry in log[len(log) // 2 :])
@@ -63,10 +63,7 @@ def many_threads(threads: int, scratch: Path) -> dict[str, Any]:
     for count in (1, threads):
         words = train_words(scratch / str(count), "--no-evaluate")
         words[words.index("--training.threads") + 1] = str(count)
-        found = trained(words, NUMBA_NUM_THREADS=str(threads))
-        if found["exit_code"]:
-            raise SystemExit(f"failed: endotsr {' '.join(words)}")
-        seconds[count] = found["seconds"]
+        seconds[count] = trained(words, NUMBA_NUM_THREADS=str(threads))["seconds"]
     assert_same_run(scratch / "1", scratch / str(threads))
     return {"threads": threads, "cores": os.cpu_count(), "seconds_of_one": seconds[1], "seconds": seconds[threads]}
 

@@ -10,24 +10,15 @@ from tiny import SETTINGS, assert_refused
 
 from endotsr.evaluation.lpips import CHANNELS, KERNELS
 from endotsr.untrusted.arrays import LONGEST_HEADER
-from special_files import dangling, device, folder_there, huge, pipe
+from special_files import DAMAGE, NO_FILES
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 
 
 LARGE = b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 17), }"
 FAULTS = {
-    "missing": lambda p: p.unlink(),
-    "named pipe": pipe,
-    "device": device,
-    "folder": folder_there,
-    "dangling link": dangling,
-    "huge": huge,
-    "empty": lambda p: p.write_bytes(b""),
-    "half": lambda p: p.write_bytes(p.read_bytes()[: p.stat().st_size // 2]),
-    "zeros": lambda p: p.write_bytes(bytes(p.stat().st_size)),
-    "no text": lambda p: p.write_bytes(b"\xff\xfe\x00" * 99),
-    "deep": lambda p: p.write_text("[" * 100_000),
+    **NO_FILES,
+    **DAMAGE,
     "long header": lambda p: p.write_bytes(b"\x93NUMPY\x02\x00\xff\xff\xff\x7f" + b"(" * LONGEST_HEADER),
     "large array": lambda p: p.write_bytes(b"\x93NUMPY\x01\x00\x76\x00" + LARGE.ljust(118)),
 }  # fmt: skip

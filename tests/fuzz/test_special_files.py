@@ -12,7 +12,7 @@ from recordings import COLMAP_TEXT
 
 from endotsr.errors import InputError
 from endotsr.sequences.colmap_model import read_model
-from special_files import device, folder_there, huge, pipe
+from special_files import DAMAGE, NO_FILES
 
 pytestmark = [
     pytest.mark.fuzz,
@@ -21,22 +21,6 @@ pytestmark = [
 ]
 SEVERAL_FILES = ("COLMAP (text)", "COLMAP (binary)")  # the fuzzing unpacks these itself
 MAY_BE_MISSING = ("log.jsonl",)
-
-
-NO_FILES = {
-    "named pipe": pipe,
-    "device": device,
-    "folder": folder_there,
-    "missing": lambda path: path.unlink(),
-    "huge": huge,
-}
-DAMAGE = {
-    "empty": lambda path: path.write_bytes(b""),
-    "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
-    "zeros": lambda path: path.write_bytes(bytes(path.stat().st_size)),
-    "no text": lambda path: path.write_bytes(b"\xff\xfe\x00" * 99),
-    "deep": lambda path: path.write_text("[" * 100_000),
-}
 
 
 def refusal(reader, path):

@@ -127,3 +127,26 @@ def test_a_picture_of_more_pixels_than_allowed_is_refused_before_it_is_decoded(t
     (tmp_path / "a.jpg").write_bytes(data)
     with pytest.raises(InputError, match=r"a\.jpg: 60000x60000 pixels; allowed: at most 67108864"):
         read_picture(tmp_path / "a.jpg")
+
+
+TOO_LARGE = """
+import struct, sys
+from pathlib import Path
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import read_picture
+entries = [(256, 9000), (257, 9000), (258, 8), (259, 1), (262, 1), (273, 8), (278, 9000), (279, 81000000)]
+tags = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
+Path(sys.argv[1]).write_bytes(b"II*\\0" + struct.pack("<IH", 8, len(entries)) + tags + bytes(4))
+try:
+    read_picture(Path(sys.argv[1]))
+except InputError as error:
+    sys.exit(0 if "MAX_IMAGE_PIXELS" in str(error) else str(error))
+sys.exit("read")
+"""
+
+
+def test_the_bound_on_pixels_holds_for_every_format_that_opencv_decodes(tmp_path):
+    process = subprocess.run(
+        [sys.executable, "-c", TOO_LARGE, str(tmp_path / "a.tiff")], check=False, capture_output=True, text=True
+    )
+    assert (process.returncode, process.stderr) == (0, "")

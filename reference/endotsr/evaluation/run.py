@@ -50,9 +50,12 @@ class Renders(Mapping[int, RenderOut]):
         self._frames, self._render = frames, lru_cache(RENDERS_KEPT)(render)
 
     def __getitem__(self, index: int) -> RenderOut:
-        if index not in self._frames:
+        if index not in self:
             raise KeyError(index)
         return self._render(index)
+
+    def __contains__(self, index: object) -> bool:
+        return index in self._frames  # without a render
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._frames)
