@@ -9,6 +9,8 @@ To measure, on a machine that has nothing else to do (each command continues whe
         --json docs/results/ablation_pulling.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --collect --json ...   what is finished
     endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
+    endotsr ablate simulated --preset paper --iterations 1500 --no-fixed-count --out runs/ablation_simulated_paper \
+        --configurations base A S L A+S A+S+L --json docs/results/ablation_simulated_paper.json
 
 A result that is not there is called "not measured yet"; a result of some seeds is shown with their number.
 """
@@ -24,7 +26,11 @@ from endotsr.errors import InputError
 
 DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
-FILES = {"pulling": "ablation_pulling.json", "simulated": "ablation_simulated.json"}
+FILES = {
+    "pulling": "ablation_pulling.json",
+    "simulated": "ablation_simulated.json",
+    "simulated_paper": "ablation_simulated_paper.json",
+}
 COST = "sweep_cost.json"  # by docs/results/sweep_cost.py
 RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
 
@@ -47,6 +53,7 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
         "verdicts": claims_parts.verdicts(found["pulling"], runs),
         "pulling": claims_parts.tables(found["pulling"]),
         "simulated": claims_parts.tables(found["simulated"]),
+        "simulated_paper": claims_parts.tables(found["simulated_paper"]),
         "protocols": claims_parts.protocols(found["pulling"], runs),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(read_json(cost, "docs/results/sweep_cost.py") if cost.exists() else None),

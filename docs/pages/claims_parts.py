@@ -1,8 +1,8 @@
 """The generated parts of docs/claims.md: verdicts, tables, protocols, cost.
 
-A verdict is decided by numbers alone. For a difference with the published value p and the 95 % interval I of its mean:
-I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: the direction alone, or its
-opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0.
+A verdict is decided by numbers alone. For a difference with the published value p and Student's 95 % interval I of its
+mean: I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: the direction alone, or
+its opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0.
 """
 
 from typing import Any
@@ -107,12 +107,12 @@ def _increment_row(found: Record | None, claim: str, words: str) -> list[str]:
     entry = _of(found, claim)
     if entry is None:
         return [words, NOT_YET, "-", "-", COMMAND]
-    verdict = increment_verdict(entry["published"], entry["mean_low"], entry["mean_high"], entry["pairs"])
-    return [words, verdict, f"{entry['mean']:+.3f} dB", interval_text(entry, "mean", 3) + _unit(entry), COMMAND]
+    verdict = increment_verdict(entry["published"], entry["student_low"], entry["student_high"], entry["pairs"])
+    return [words, verdict, f"{entry['mean']:+.3f} dB", interval_text(entry, "student", 3) + _unit(entry), COMMAND]
 
 
 def _unit(entry: Record) -> str:
-    return "" if entry["mean_low"] is None else " dB"
+    return "" if entry["student_low"] is None else " dB"
 
 
 def _largest_row(found: Record | None) -> list[str]:
@@ -124,8 +124,8 @@ def _largest_row(found: Record | None) -> list[str]:
     means = ", ".join(f"{e['with']} {e['mean']:+.3f}" for e in known) + " dB"
     if min(e["pairs"] for e in known) < LEAST_PAIRS:
         return [claim, f"not decided: {min(e['pairs'] for e in known)} of {LEAST_PAIRS} seeds", means, "-", COMMAND]
-    others = max(e["mean_high"] for e in known[1:])
-    if known[0]["mean_low"] > others:
+    others = max(e["student_high"] for e in known[1:])
+    if known[0]["student_low"] > others:
         return [claim, "reproduced", means, "-", COMMAND]
     largest = max(known, key=lambda e: e["mean"]) is known[0]
     return [claim, "not decided: the intervals overlap" if largest else "not reproduced", means, "-", COMMAND]

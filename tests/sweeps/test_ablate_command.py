@@ -5,6 +5,7 @@ import json
 import pytest
 from tiny_sweep import rows_of
 
+from endotsr.cli.ablate import _without_folders
 from endotsr.cli.main import main
 
 WORDS = (
@@ -44,6 +45,24 @@ def test_the_results_are_paired_and_written_three_times_over(done):
     assert ("A, fixed count", "psnr_full") in found
     assert "A, temporal appearance" in (done / "out" / "ablation.md").read_text()
     assert (done / "out" / "ablation.png").stat().st_size > 1000
+
+
+def test_results_do_not_tell_where_files_lie(done, tmp_path, monkeypatch):
+    command = json.loads((done / "ablation.json").read_text())["command"]
+    assert command[:3] == ["endotsr", "ablate", "simulated"]
+    assert command[-4:] == ["--out", "out", "--json", "ablation.json"]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "clip").mkdir()
+    words = ["../x/none", "clip", "--out=/a/b/c", "--out", "/a/b", "blocks 4", "A+S"]
+    assert [_without_folders(word) for word in words] == [
+        "../x/none",
+        "clip",
+        "--out=c",
+        "--out",
+        "b",
+        "blocks 4",
+        "A+S",
+    ]
 
 
 def test_collect_writes_the_finished_runs_and_trains_nothing(done, capsys):

@@ -21,7 +21,7 @@ DEMONSTRATION = SimulatorSettings()
 class AblateOptions:
     """Train the configurations base, A, S, L, A+S, A+S+L and S without its prior on every SEQUENCE, over seeds.
 
-    Each difference between two configurations is paired by sequence and seed, with mean, median and bootstrap interval.
+    Each difference between two configurations is paired by sequence and seed, with mean, median and intervals.
     With --fixed-count all are also trained from one checkpoint of the base without density control, so that the numbers
     of Gaussians are equal. The command continues where it was interrupted, as `endotsr sweep` does.
     """
@@ -79,7 +79,7 @@ def run(words: list[str]) -> int:
     if options.out is None:
         raise InputError("ablate: --out DIR is missing: the folder of the sweep")
     spec, record = spec_of(spec_data(options), "ablate", Path.cwd()), {}
-    command = ["endotsr", "ablate", *(Path(word).name if Path(word).exists() else word for word in words)]
+    command = ["endotsr", "ablate", *map(_without_folders, words)]
 
     def on_rows(rows: list[dict[str, Any]]) -> None:
         nonlocal record
@@ -100,6 +100,13 @@ def run(words: list[str]) -> int:
     rows = run_spec(spec, options.out, place, options.retry, on_rows)
     print(ablation_markdown(record))
     return ended(rows, options.out)
+
+
+def _without_folders(word: str) -> str:
+    """A word of the command as results store it: a path shrinks to its last name, as results are passed on."""
+    head, equals, value = word.rpartition("=")
+    path = Path(value)
+    return f"{head}{equals}{path.name}" if path.is_absolute() or path.exists() else word
 
 
 def spec_data(options: AblateOptions) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 In: rows of a sweep. Out: one `Increment` a comparison, split and metric: the configuration `with_` minus the
 configuration `without`, on the same frames, with the same seed and no other setting changed (matched input). Sequences
-have equal weights, whatever the number of their seeds. An interval is a bootstrap over the seeds within each sequence:
-it says how the difference would vary with other seeds on these sequences, and nothing about other sequences.
+have equal weights, whatever the number of their seeds. The intervals are of the seeds within each sequence: they say
+how the difference would vary with other seeds on these sequences, and nothing about other sequences. Student's interval
+holds its 95 % with any number of seeds. The bootstrap does so with many: with three seeds it is no more than the range
+from the smallest to the largest difference, which misses the true one in a quarter of all cases.
 """
 
 from collections.abc import Iterable
@@ -79,14 +81,19 @@ COMPARISONS = (
 )
 
 
+Limits = tuple[float | None, float | None]  # lower and upper
+
+
 class Estimate(NamedTuple):
-    """Of a paired difference. Limits are None with fewer than two pairs in every sequence."""
+    """Of a paired difference. Limits are None unless every sequence has two pairs or more."""
 
     mean: float
-    mean_low: float | None
+    student_low: float | None  # of the mean
+    student_high: float | None
+    mean_low: float | None  # bootstrap
     mean_high: float | None
     median: float
-    median_low: float | None
+    median_low: float | None  # bootstrap
     median_high: float | None
     pairs: int
     sequences: int
@@ -144,17 +151,32 @@ def _refuse_other_input(a: dict[str, Any], b: dict[str, Any]) -> None:
 
 
 def estimate(pairs: list[dict[str, Any]], seed: int = 0) -> Estimate:
-    """Mean and median over the seeds of each sequence, averaged over the sequences, with bootstrap intervals."""
+    """Mean and median over the seeds of each sequence, averaged over the sequences, with their intervals."""
     groups: dict[str, list[float]] = {}
     for pair in pairs:
         groups.setdefault(pair["sequence"], []).append(pair["difference"])
     samples = tuple(np.array(values) for values in groups.values())
     mean, median = (float(np.mean([middle(sample) for sample in samples])) for middle in (np.mean, np.median))
-    of_mean, of_median = (_interval(samples, middle, seed) for middle in (np.mean, np.median))
-    return Estimate(mean, *of_mean, median, *of_median, len(pairs), len(samples))
+    of_mean, of_median = (_bootstrap(samples, middle, seed) for middle in (np.mean, np.median))
+    return Estimate(mean, *_student(samples), *of_mean, median, *of_median, len(pairs), len(samples))
 
 
-def _interval(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float | None, float | None]:
+def _student(samples: tuple[FloatArray, ...]) -> Limits:
+    """Student's interval of the average of the means; for several sequences with the degrees of freedom of Welch."""
+    from scipy.stats import t
+
+    if min(map(len, samples)) < 2:
+        return None, None
+    middle = float(np.mean([sample.mean() for sample in samples]))
+    variances = np.array([sample.var(ddof=1) / len(sample) for sample in samples])  # of the means
+    if not variances.sum() ** 2 > 0.0:  # equal, or so close that the square vanishes
+        return middle, middle
+    freedom = variances.sum() ** 2 / sum(v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True))
+    half = float(t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(variances.sum()) / len(samples))
+    return middle - half, middle + half
+
+
+def _bootstrap(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> Limits:
     """Percentile bootstrap of the average over the samples of their means or medians."""
     from scipy.stats import bootstrap
 

@@ -83,7 +83,7 @@ def level_table(record: dict[str, Any], split: str) -> str:
 
 
 def increment_table(record: dict[str, Any], split: str) -> str:
-    """Paired differences on a split: mean, its interval, median, and what the paper states."""
+    """Paired differences on a split: mean with Student's interval and the bootstrap, median, and what is published."""
     rows = []
     for found in record["increments"]:
         digits = next((d for key, _, d in SHOWN if key == found["metric"]), None)
@@ -92,16 +92,17 @@ def increment_table(record: dict[str, Any], split: str) -> str:
         label = next(head for key, head, _ in SHOWN if key == found["metric"])
         stated = found["published"] if found["metric"] == "psnr_full" else None
         rows.append([
-            found["claim"], label, _signed(found["mean"], digits), interval_text(found, "mean", digits),
+            found["claim"], label, _signed(found["mean"], digits),
+            *(interval_text(found, of, digits) for of in ("student", "mean")),
             _signed(found["median"], digits), interval_text(found, "median", digits), _signed(stated, digits),
             f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
-    heads = ("difference", "metric", "mean", "95 % interval", "median", "95 % interval", "published", "pairs")
+    heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
     return markdown(heads, rows)
 
 
 def interval_text(found: dict[str, Any], of: str, digits: int) -> str:
-    """The interval of a mean or a median: "-0.02 to +0.11"; "-" where one pair has none."""
+    """An interval, `of` being student, mean or median: "-0.02 to +0.11"; "-" where one pair has none."""
     low, high = found[f"{of}_low"], found[f"{of}_high"]
     return "-" if low is None or high is None else f"{_signed(low, digits)} to {_signed(high, digits)}"
 
@@ -124,11 +125,12 @@ def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
     style.plain_axes(axes, grid="x")
     axes.axvline(0.0, color=style.GREY, linewidth=1.0)
     places = range(len(chosen))
-    for place, found in zip(places, chosen):
-        low, high = found["mean_low"], found["mean_high"]
-        if low is not None:
-            axes.plot([low, high], [place, place], color=style.BLUE, linewidth=2.0)
-    axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="measured, 95 % interval")
+    for of, width in (("student", 1.0), ("mean", 3.0)):
+        for place, found in zip(places, chosen):
+            low, high = found[f"{of}_low"], found[f"{of}_high"]
+            if low is not None:
+                axes.plot([low, high], [place, place], color=style.BLUE, linewidth=width)
+    axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="mean; thin: 95 %, thick: bootstrap")
     stated = [(f["published"], place) for place, f in zip(places, chosen) if f["published"] is not None]
     if stated:
         axes.plot(*zip(*stated), "x", color=style.ORANGE, label="published")
