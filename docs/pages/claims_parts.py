@@ -20,8 +20,8 @@ HUNDREDTH = 0.01  # dB
 LEAST_PAIRS = 3  # below, nothing is decided
 FULL, SPLIT = "A+S+L", "every_eighth"
 COMMAND = "`endotsr ablate endonerf_pulling --out DIR`"
-LEVELS = (("psnr_full", "PSNR full", "{:.2f} dB", True), ("ssim_full", "SSIM full", "{:.4f}", True),
-          ("lpips", "LPIPS", "{:.4f}", False))  # fmt: skip
+LEVELS = (("psnr_full", "PSNR full", "{:.2f} dB", True, 0.01), ("ssim_full", "SSIM full", "{:.4f}", True, 0.001),
+          ("lpips", "LPIPS", "{:.4f}", False, 0.001))  # larger is better; unit of the last published digit  # fmt: skip
 INCREMENTS = (
     ("A, temporal appearance", "Temporal appearance (A) gains 0.29 dB"),
     ("S, spectral motion", "Spectral motion (S) gains 0.04 dB"),
@@ -61,11 +61,14 @@ def increment_verdict(published: float, low: float | None, high: float | None, p
     return "direction reproduced, size not" if (low > 0) == (published > 0) else "not reproduced: the opposite"
 
 
-def level_verdict(published: float, low: float | None, high: float | None, larger_is_better: bool) -> str:
-    """The verdict on a mean: reproduced if its interval reaches the published value, or is better than it."""
+def level_verdict(published: float, low: float | None, high: float | None, larger_is_better: bool, unit: float) -> str:
+    """The verdict on a mean: reproduced if its interval reaches a value that rounds to the published one, or a better.
+
+    unit   of the last published digit
+    """
     if low is None or high is None:
         return "not decided: one seed"
-    reached = high >= published if larger_is_better else low <= published
+    reached = high >= published - unit / 2 if larger_is_better else low <= published + unit / 2
     return "reproduced" if reached else "not reproduced"
 
 
@@ -85,7 +88,9 @@ def full_runs(found: Record | None, runs: list[Record], key: str) -> list[float]
     return [v for s, v in settings if v is not None and s["preset"] == "paper" and s["sequence"]["split"] == SPLIT]
 
 
-def _level_row(found: Record | None, runs: list[Record], key: str, label: str, form: str, larger: bool) -> list[str]:
+def _level_row(
+    found: Record | None, runs: list[Record], key: str, label: str, form: str, larger: bool, unit: float
+) -> list[str]:
     published = PUBLISHED["pulling"][key]
     claim = f"{label} {published:g}"
     values = full_runs(found, runs, key)
@@ -94,7 +99,7 @@ def _level_row(found: Record | None, runs: list[Record], key: str, label: str, f
     mean, low, high = student(values)
     shown = "-" if low is None or high is None else f"{form.format(low)} to {form.format(high)}"
     measured = f"{form.format(mean)}, {len(values)} seed{'s' if len(values) > 1 else ''}"
-    return [claim, level_verdict(published, low, high, larger), measured, shown, COMMAND]
+    return [claim, level_verdict(published, low, high, larger, unit), measured, shown, COMMAND]
 
 
 def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record | None:

@@ -47,13 +47,16 @@ def test_verdicts_of_differences(published, low, high, pairs, verdict):
 
 
 def test_verdicts_of_levels():
-    assert level_verdict(39.34, 39.0, 39.5, True) == level_verdict(39.34, 40.0, 41.0, True) == "reproduced"
-    assert level_verdict(39.34, 38.0, 39.0, True) == "not reproduced"
-    assert (
-        level_verdict(0.035, 0.03, 0.04, False) == "reproduced"
-        and level_verdict(0.035, 0.04, 0.05, False) != "reproduced"
-    )
-    assert level_verdict(39.34, None, None, True) == "not decided: one seed"
+    assert level_verdict(39.34, 39.0, 39.5, True, 0.01) == level_verdict(39.34, 40.0, 41.0, True, 0.01) == "reproduced"
+    assert level_verdict(39.34, 38.0, 39.0, True, 0.01) == "not reproduced"
+    assert level_verdict(0.035, 0.03, 0.04, False, 0.001) == "reproduced"
+    assert level_verdict(0.035, 0.04, 0.05, False, 0.001) == "not reproduced"
+    assert level_verdict(39.34, None, None, True, 0.01) == "not decided: one seed"
+
+
+@pytest.mark.parametrize("high, verdict", [(0.9664, "not reproduced"), (0.9666, "reproduced")])
+def test_a_published_level_is_known_to_its_last_digit(high, verdict):
+    assert level_verdict(0.967, 0.96, high, True, 0.001) == verdict
     mean, low, high = student([39.0, 39.2, 39.4])
     assert mean == pytest.approx(39.2) and high - low == pytest.approx(2 * 4.30265 * 0.2 / 3**0.5, rel=1e-5)
 
