@@ -1,4 +1,4 @@
-"""Write the generated parts of docs/claims.md and docs/guides/sweep.md from the results that are there.
+"""Write the generated parts of docs/claims.md and docs/guides/sweep.md, and pictures, from the results that are there.
 
     python docs/pages/claims.py            from docs/results
     python docs/pages/claims.py FOLDER     from the files of another folder
@@ -23,6 +23,7 @@ import claims_parts
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
+from endotsr.sweeps.ablation_page import draw
 
 DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
@@ -60,14 +61,23 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
     }
 
 
+def draw_ablations(folder: Path) -> None:
+    """The intervals of every ablation as a picture beside its result: NAME.json becomes NAME.svg."""
+    for name, found in read(folder).items():
+        if found is not None and found["increments"]:
+            draw(found, (folder / FILES[name]).with_suffix(".svg"))
+
+
 def main(words: list[str]) -> None:
     """The command."""
     if len(words) > 1:
         sys.exit(__doc__)
     try:
-        made = parts(Path(words[0]) if words else RESULTS)
+        folder = Path(words[0]) if words else RESULTS
+        made = parts(folder)
         for page in (PAGE, GUIDE):
             write_marked(page, made, "claims")
+        draw_ablations(folder)
     except InputError as error:
         sys.exit(f"error: {error}")
 

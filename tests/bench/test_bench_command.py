@@ -14,6 +14,7 @@ from endotsr.cli.main import main
 from endotsr.cli.parts.bench_options import StagesOptions
 from endotsr.config import PAPER
 from endotsr.errors import InputError
+from endotsr.export import npz
 
 PEAKS = {
     "threads": 1,
@@ -109,7 +110,7 @@ def test_error_beyond_the_limit_is_said():
 
 def test_trained_scene_fills_the_picture(tmp_path):
     rng, file = np.random.default_rng(2), tmp_path / "scene.npz"
-    found = {name: rng.uniform(0.1, 0.9, (50, *rest)).astype(np.float32) for name, rest in trained.ARRAYS.items()}
+    found = {name: rng.uniform(0.1, 0.9, (50, *rest)).astype(np.float32) for name, rest in npz.ARRAYS.items()}
     found["xyz"] *= 30
     np.savez(file, allow_pickle=False, **found)
     scene = trained.trained_gaussians(file, PAPER)

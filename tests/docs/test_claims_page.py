@@ -19,6 +19,16 @@ def test_committed_pages_are_what_the_results_say(page):
     assert "<!-- claims:" in text and replaced(text, claims.parts(), page, "claims") == text
 
 
+def test_every_ablation_is_drawn_on_the_page(tmp_path):
+    for name in ("pulling", "simulated"):
+        record = claims.RESULTS / claims.FILES[name]
+        assert f"](results/{record.stem}.svg)" in claims.PAGE.read_text(encoding="utf-8")
+        assert record.with_suffix(".svg").exists()
+    (tmp_path / claims.FILES["pulling"]).write_text(json.dumps(made_up_record(0.28)), encoding="utf-8")
+    claims.draw_ablations(tmp_path)
+    assert [path.name for path in tmp_path.glob("*.svg")] == ["ablation_pulling.svg"]
+
+
 def test_without_results_every_claim_says_so():
     text = verdicts(None, [])
     rows = [line for line in text.splitlines()[2:]]

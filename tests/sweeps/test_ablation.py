@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from endotsr.errors import InputError
+from endotsr.report import style
 from endotsr.sweeps.ablation import (
     COMPARISONS,
     CONFIGURATIONS,
@@ -154,3 +155,21 @@ def test_without_a_pair_there_is_no_picture(tmp_path):
     record = write_ablation(tmp_path, [open_row("base", 0)], [])
     assert record["increments"] == [] and not (tmp_path / FILES[2]).exists()
     assert ablation_record([], [])["runs"]["planned"] == 0
+
+
+def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(style, "save", lambda figure, path: drawn.append(figure))
+    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "A", "A+S") for s in range(3)]
+    write_ablation(tmp_path, rows, [])
+    (axes,) = drawn[0].axes
+    marks = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    assert [name.get_text() for name in axes.get_yticklabels()] == [
+        "A, temporal appearance", "S beside A", "A and S together"
+    ]  # fmt: skip
+    np.testing.assert_allclose(marks["mean"], [(0.25, 0), (0.0, 1), (0.25, 2)], atol=1e-12)
+    assert len(marks["one pair"]) == 9 and marks["published"].tolist() == [[0.29, 0.0]]
+    (legend,) = drawn[0].legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "95 %, Student", "95 %, bootstrap", "one pair", "mean", "published"
+    ]  # fmt: skip

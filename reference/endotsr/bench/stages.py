@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from endotsr.bench.case import Case, Precision, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
-from endotsr.bench.trained import read_arrays
+from endotsr.export.npz import read_arrays
 from endotsr.report.tables import plain
 from endotsr.report.words import memory
 

@@ -7,8 +7,8 @@ from typing import Any
 from endotsr.bench import charts, peers, scaling, stages, start
 from endotsr.bench.case import Case, Precision
 from endotsr.bench.stages import Say
-from endotsr.bench.trained import read_arrays
 from endotsr.errors import InputError
+from endotsr.export.npz import read_arrays
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 

@@ -1,21 +1,15 @@
-"""A trained scene in place of the common workload, with the sizes, needles and opacities that training produces.
-
-The file is an npz with xyz (N, 3), log_scale (N, 3), quat_wxyz (N, 4), rgb (N, 3) and opacity (N,).
-"""
+"""A trained scene in place of the common workload, with the sizes, needles and opacities that training produces."""
 
 from pathlib import Path
 
 import numpy as np
 
 from endotsr.config import Config
-from endotsr.errors import InputError
+from endotsr.export.npz import read_arrays
 from endotsr.kernels.constants import Y00
 from endotsr.scene import workload
 from endotsr.scene.gaussians import Gaussians
-from endotsr.untrusted.arrays import Refused, open_npz
 
-ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
-LARGEST_FILE = 1 << 32  # bytes
 DEPTH = 4.0  # scene units of the middle of the scene, that of the common workload
 PERCENTILES = (1, 99)  # of the positions: the range that is scaled to the picture
 
@@ -23,6 +17,7 @@ PERCENTILES = (1, 99)  # of the positions: the range that is scaled to the pictu
 def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
     """The scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
 
+    path   npz, see `export.npz`
     Raises: InputError naming the file and what is missing.
     """
     found = read_arrays(path)
@@ -45,23 +40,3 @@ def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
     )
     sigma = float(np.exp(np.median(scene.log_scale)))
     return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
-
-
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of a trained scene.
-
-    Raises: InputError naming the file and what is missing or has another shape.
-    """
-    try:
-        with open_npz(path, LARGEST_FILE, compressed=True) as file:
-            found = {name: file.read(name) for name in ARRAYS}
-    except InputError:
-        raise
-    except (Refused, KeyError) as error:
-        reason = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
-        raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
-    for name, rest in ARRAYS.items():
-        expected = (len(found["xyz"]), *rest)
-        if found[name].shape != expected:
-            raise InputError(f"{path}: {name} has shape {found[name].shape}; allowed: {expected}")
-    return found

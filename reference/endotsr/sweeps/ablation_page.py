@@ -112,12 +112,15 @@ def draw(record: dict[str, Any], path: Path, metric: str = "psnr_full") -> None:
     chosen = [found for found in record["increments"] if found["metric"] == metric]
     splits = list(dict.fromkeys(found["split"] for found in chosen))
     count = max(sum(found["split"] == split for found in chosen) for split in splits)
-    figure = style.new_figure(4.0 + 3.2 * len(splits), 1.2 + 0.32 * count)
+    figure = style.new_figure(4.0 + 3.2 * len(splits), 1.5 + 0.32 * count)
     panels = figure.subplots(1, len(splits), squeeze=False)[0]
+    named: dict[str, Any] = {}  # one entry of the legend a label, whichever panels have it
     for axes, split in zip(panels, splits, strict=True):
         _panel(axes, [found for found in chosen if found["split"] == split])
         style.name_axes(axes, x="difference of PSNR full, dB", title=f"held out: {split}")
-    style.legend(panels[0], loc="best")
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    style.legend(figure, handles=list(named.values()), labels=list(named), loc="outside lower center", ncols=5)
     style.save(figure, path)
 
 
@@ -125,15 +128,17 @@ def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
     style.plain_axes(axes, grid="x")
     axes.axvline(0.0, color=style.GREY, linewidth=1.0)
     places = range(len(chosen))
-    for of, width in (("student", 1.0), ("mean", 3.0)):
-        for place, found in zip(places, chosen):
-            low, high = found[f"{of}_low"], found[f"{of}_high"]
-            if low is not None:
-                axes.plot([low, high], [place, place], color=style.BLUE, linewidth=width)
-    axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="mean; thin: 95 %, thick: bootstrap")
-    stated = [(f["published"], place) for place, f in zip(places, chosen) if f["published"] is not None]
+    for of, width, label in (("student", 1.2, "95 %, Student"), ("mean", 3.5, "95 %, bootstrap")):
+        limits = [(place, f[f"{of}_low"], f[f"{of}_high"]) for place, f in enumerate(chosen)]
+        known = [limit for limit in limits if limit[1] is not None]
+        if known:
+            axes.hlines(*zip(*known, strict=True), color=style.BLUE, linewidth=width, label=label)
+    single = [(pair["difference"], place) for place, f in enumerate(chosen) for pair in f["of"]]
+    axes.plot(*zip(*single, strict=True), ".", color=style.INK, markersize=4, zorder=3, label="one pair")
+    axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="mean")
+    stated = [(f["published"], place) for place, f in enumerate(chosen) if f["published"] is not None]
     if stated:
-        axes.plot(*zip(*stated), "x", color=style.ORANGE, label="published")
+        axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="published")
     axes.set_yticks(list(places), [found["claim"] for found in chosen])
     axes.invert_yaxis()
 

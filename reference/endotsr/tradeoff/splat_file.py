@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from endotsr.bench.trained import read_arrays
 from endotsr.config import ModelConfig
 from endotsr.errors import InputError
+from endotsr.export.npz import read_arrays
 from endotsr.export.ply import read_gaussians, sound
 from endotsr.export.scene import facing_camera
 from endotsr.kernels.constants import Y00
