@@ -50,13 +50,13 @@ def targets(stages: Result, scaling: Result, peers: Result, start: Result, runs:
     single_ms = case["iteration"]["median_ms"]
     largest = scaling["axes"]["gaussians"]
     ratios = [c["ratio"] for c in peers["cases"] if c["precision"] == "float32"]
-    whole = runs.get("pulling")
+    whole = runs.get("pulling_paper_seed0")
     found = [
         Target("splat, forward and reverse", case["splat"]["median_ms"], 60, None, "ms"),
         Target("full iteration, all losses", single_ms, 100, None, "ms"),
         Target("float64 against float32, iteration", double["iteration"]["median_ms"] / single_ms, 1.8, None, "times"),
         Target("gsplat's torch reference against splat", min(ratios, default=None), None, 50, "times"),
-        Target("run of 6000 iterations, `pulling.json`", whole["seconds"] / 60 if whole else None, 10, None, "min"),
+        Target("run of 6000 iterations, `pulling_paper_seed0.json`", whole["seconds"] / 60 if whole else None, 10, None, "min"),
         Target("cold start to the first iteration", start["cold"]["first iteration"], 25, None, "s"),
         Target("warm start to the first iteration", start["warm"]["first iteration"], 3, None, "s"),
         Target(

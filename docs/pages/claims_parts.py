@@ -186,14 +186,17 @@ def protocols(found: Record | None, runs: list[Record]) -> str:
 
 
 def _by_split(found: Record | None, runs: list[Record]) -> dict[str, list[Record]]:
-    """Rows with the keys of a sweep, by split and preset."""
+    """Rows with the keys of a sweep, by split and preset: of the ablation, else of recorded runs."""
     groups: dict[str, list[Record]] = {}
     for row in found["rows"] if found is not None else []:
         if row["configuration"] == FULL:
             groups.setdefault(f"{row['split']}, {row['preset']}", []).append(row)
+    ablated = set(groups)
     for run in runs:
         sequence, preset = run["run"]["settings"]["sequence"], run["run"]["settings"]["preset"]
         split = sequence["split"] + (f" {sequence['block_length']}" if sequence["split"] in ("blocks", "end") else "")
+        if f"{split}, {preset}" in ablated:  # the same runs, or runs of the same kind without their pairs
+            continue
         faded = (run.get("cross_fade") or {}).get("mean") or {}
         row = {
             "psnr_tissue": run["held_out"]["mean"]["psnr_tissue"],
@@ -201,7 +204,7 @@ def _by_split(found: Record | None, runs: list[Record]) -> dict[str, list[Record
             "cross_fade_psnr_tissue": faded.get("psnr_tissue"),
             "baselines": run["baselines"],
         }
-        groups.setdefault(f"{split}, {preset}, recorded runs", []).append(row)
+        groups.setdefault(f"{split}, {preset}", []).append(row)
     return groups
 
 
@@ -236,17 +239,20 @@ def divided(found: Record | None) -> str:
 
 def cost(found: Record | None, runs: list[Record]) -> str:
     """Hours of sweeps on several numbers of cores, from the measured seconds of one run."""
-    measured = [(row["seconds"], row["threads"]) for row in (found["rows"] if found is not None else [])
-                if row.get("seconds") and row.get("threads") and row["preset"] == "paper"]  # fmt: skip
+    rows = found["rows"] if found is not None else []
+    measured = [
+        (row["seconds"], row["threads"]) for row in rows  # those with a fixed count train half of the iterations
+        if row.get("seconds") and row.get("threads") and row["preset"] == "paper" and "fixed" not in row["configuration"]
+    ]  # fmt: skip
     measured = measured or [
         (run["run"]["seconds"], run["run"]["threads"]) for run in runs if run["run"]["settings"]["preset"] == "paper"
     ]
     if not measured:
         return NOT_YET
     core_minutes = float(np.median([seconds * threads / 60 for seconds, threads in measured]))
-    rows = [
+    cells = [
         [str(count), *(f"{planned_hours(count, cores, core_minutes):.1f}" for cores in PLANNED_CORES)]
         for count in PLANNED_RUNS
     ]
     about = f"One run takes {core_minutes:.0f} core minutes (median of {len(measured)} measured)."
-    return f"{about}\n\n" + markdown(("runs", *(f"{n} cores, hours" for n in PLANNED_CORES)), rows)
+    return f"{about}\n\n" + markdown(("runs", *(f"{n} cores, hours" for n in PLANNED_CORES)), cells)

@@ -123,7 +123,11 @@ def found(clips: dict[str, str], seeds: int, jobs: int) -> dict[str, Any]:
         for poses in (POSES if scene in SCENES else POSES[1:])
     ]
     runs = {f"{', '.join(row)}, seed {seed}": (*row, seed) for seed in range(seeds) for row in rows}
-    answers = kept.measured(FILE, {"sources": kept.sources("")}, runs, partial(measured, runs=runs, clips=clips), jobs)
+    about = {
+        "sources": kept.sources(""), "size": SIZE, "frames": FRAMES, "iterations": (ITERATIONS, CLIP_ITERATIONS),
+        "swing": SWING, "breath": BREATH, "error": ERROR, "step": STEP, "settings": SETTINGS, "scenes": SCENES,
+    }  # fmt: skip
+    answers = kept.measured(FILE, about, runs, partial(measured, runs=runs, clips=clips), jobs)
     result: dict[str, Any] = {}
     for scene, label, poses in rows:
         values = [answers[f"{scene}, {label}, {poses}, seed {seed}"] for seed in range(seeds)]

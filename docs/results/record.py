@@ -58,11 +58,15 @@ def rows(records: dict[str, dict]) -> list[tuple[str, list[dict]]]:
         presets.setdefault(preset, []).append(metrics["held_out"]["mean"])
         if row := metrics.get("cross_fade"):
             faded.setdefault(preset, []).append(row["mean"])
-    counted = {name: f", mean of {len(runs)} seeds" if len(runs) > 1 else "" for name, runs in presets.items()}
-    out = [(f"endotsr, preset `{name}`{counted[name]}", runs) for name, runs in presets.items()]
-    out += [(f"blend of the own renders of `{name}`", means) for name, means in faded.items()]
+    out = [(f"endotsr, preset `{name}`{counted(runs)}", runs) for name, runs in presets.items()]
+    out += [(f"blend of the own renders of `{name}`{counted(means)}", means) for name, means in faded.items()]
     out += [(baseline["label"], [baseline["mean"]]) for baseline in first["baselines"].values()]
     return out + [(row["label"], [row]) for row in first["published"] if split_of(first) == EVERY_EIGHTH]
+
+
+def counted(runs: list[dict]) -> str:
+    """What a mean is taken over, if there is more than one run."""
+    return f", mean of {len(runs)} seeds" if len(runs) > 1 else ""
 
 
 def cell(values: list[dict], key: str, form: str) -> str:

@@ -20,7 +20,7 @@ def test_committed_pages_are_what_the_results_say(page):
 
 
 def test_every_ablation_is_drawn_on_the_page(tmp_path):
-    for name in ("pulling", "simulated"):
+    for name in claims.FILES:
         record = claims.RESULTS / claims.FILES[name]
         assert f"](results/{record.stem}.svg)" in claims.PAGE.read_text(encoding="utf-8")
         assert record.with_suffix(".svg").exists()

@@ -34,7 +34,6 @@ def trained(words: list[str], **environment: str) -> dict[str, float]:
         raise SystemExit(f"failed: endotsr {' '.join(words)}")
     unit = 1 if sys.platform == "darwin" else 1024
     return {
-        "exit_code": process.returncode,
         "seconds": round(time.monotonic() - began, 1),
         "peak_bytes": usage.ru_maxrss * unit,
     }
