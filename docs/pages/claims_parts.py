@@ -240,10 +240,9 @@ def divided(found: Record | None) -> str:
 def cost(found: Record | None, runs: list[Record]) -> str:
     """Hours of sweeps on several numbers of cores, from the measured seconds of one run."""
     rows = found["rows"] if found is not None else []
-    measured = [
-        (row["seconds"], row["threads"]) for row in rows  # those with a fixed count train half of the iterations
-        if row.get("seconds") and row.get("threads") and row["preset"] == "paper" and "fixed" not in row["configuration"]
-    ]  # fmt: skip
+    whole = [row for row in rows if "fixed" not in row["configuration"]]  # the others train half of the iterations
+    measured = [(row["seconds"], row["threads"]) for row in whole
+                if row.get("seconds") and row.get("threads") and row["preset"] == "paper"]  # fmt: skip
     measured = measured or [
         (run["run"]["seconds"], run["run"]["threads"]) for run in runs if run["run"]["settings"]["preset"] == "paper"
     ]

@@ -168,8 +168,8 @@ def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path
         "A, temporal appearance", "S beside A", "A and S together"
     ]  # fmt: skip
     np.testing.assert_allclose(marks["mean"], [(0.25, 0), (0.0, 1), (0.25, 2)], atol=1e-12)
-    assert len(marks["one pair"]) == 9 and marks["published"].tolist() == [[0.29, 0.0]]
+    assert len(marks["one pair"]) == 9 and marks["published for pulling"].tolist() == [[0.29, 0.0]]
     (legend,) = drawn[0].legends
     assert [text.get_text() for text in legend.get_texts()] == [
-        "95 %, Student", "95 %, bootstrap", "one pair", "mean", "published"
+        "95 %, Student", "95 %, bootstrap", "one pair", "mean", "published for pulling"
     ]  # fmt: skip

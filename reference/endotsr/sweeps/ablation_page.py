@@ -138,7 +138,7 @@ def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
     axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="mean")
     stated = [(f["published"], place) for place, f in enumerate(chosen) if f["published"] is not None]
     if stated:
-        axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="published")
+        axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="published for pulling")
     axes.set_yticks(list(places), [found["claim"] for found in chosen])
     axes.invert_yaxis()
 
