@@ -20,3 +20,13 @@ settings.register_profile("quick", max_examples=15, **COMMON)
 settings.register_profile("ci", max_examples=25, derandomize=True, print_blob=True, database=None, **COMMON)
 settings.register_profile("deep", max_examples=1000, print_blob=True, **COMMON)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "quick"))
+
+LARGEST_CREW = 8  # workers; each takes about a gigabyte
+
+
+def pytest_xdist_auto_num_workers(config):
+    """Workers of `-n auto`: one a core for folders of tests, none for files and tests that are named one by one."""
+    if all(Path(word.partition("::")[0]).suffix == ".py" for word in config.args):
+        return 0
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(cores, LARGEST_CREW) if cores > 1 else 0

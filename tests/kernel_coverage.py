@@ -47,7 +47,15 @@ def measure(arguments: list[str]) -> tuple[int, dict[str, Any]]:
             "HYPOTHESIS_PROFILE": "ci",
         }
         run = lambda *words: subprocess.run([sys.executable, "-m", "coverage", *words], cwd=ROOT, env=environment)
-        tests = ["pytest", "-q", "-p", "no:cacheprovider", *(arguments or [*SELECTION, "-k", f"not ({LEFT_OUT})"])]
+        tests = [
+            "pytest",
+            "-q",
+            "-n",
+            "0",
+            "-p",
+            "no:cacheprovider",
+            *(arguments or [*SELECTION, "-k", f"not ({LEFT_OUT})"]),
+        ]
         status = run("run", "--branch", f"--source={PACKAGE}", "-m", *tests).returncode
         run("json", "-q", "-o", f"{folder}/report.json")
         return status, json.loads(Path(folder, "report.json").read_text(encoding="utf-8"))

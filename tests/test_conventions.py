@@ -134,9 +134,24 @@ def test_opencv_is_imported_in_one_file():
     assert [f.relative_to(PACKAGE).as_posix() for f in SOURCES if "cv2" in imported(f)] == ["opencv/library.py"]
 
 
+@pytest.mark.slow
 def test_selection_by_word_is_the_registry():
     """`pytest -k` with the word collects exactly one check per registered pair and nothing else."""
-    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-k", WORD, "-p", "no:cacheprovider", "tests"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "--collect-only",
+        "-q",
+        "-n",
+        "0",
+        "-k",
+        WORD,
+        "-p",
+        "no:cacheprovider",
+        "tests",
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     collected = {line.strip() for line in done.stdout.splitlines() if "::" in line}
-    assert collected == {f"tests/test_{WORD}.py::test_{WORD}[{name}]" for name in all_pairs()}, done.stdout[-2000:]
+    wanted = {f"tests/test_{WORD}.py::test_{WORD}[{name}-{seed}]" for name in all_pairs() for seed in (0, 1)}
+    assert collected == wanted, done.stdout[-2000:]

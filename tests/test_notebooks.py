@@ -102,6 +102,7 @@ def test_a_flipped_sign_of_a_transcription_is_noticed(file):
     assert noticed, f"with the sign flipped, nothing failed: {line}"
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_flipped_sign_of_a_kernel_is_noticed():
     """A few signs of the package; all of them: python tests/kernel_signs.py."""

@@ -45,7 +45,12 @@ def record(run: Path, name: str, commit: str) -> None:
 def split_of(metrics: dict) -> str:
     """The held-out frames of a run, in words."""
     sequence = metrics["run"]["settings"]["sequence"]
-    return EVERY_EIGHTH if sequence["split"] != "blocks" else f"blocks of {sequence['block_length']} frames"
+    frames = sequence["block_length"]
+    words = {
+        "every_eighth": EVERY_EIGHTH, "every_second": "every second frame",
+        "blocks": f"blocks of {frames} frames", "end": f"the last {frames} frames",
+    }  # fmt: skip
+    return words[sequence["split"]]
 
 
 def rows(records: dict[str, dict]) -> list[tuple[str, list[dict]]]:

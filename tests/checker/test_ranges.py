@@ -51,6 +51,7 @@ def test_tasks_in_any_ranges_and_order_give_the_same_bits(name, monkeypatch):
         assert np.array_equal(value, cut[key]), key
 
 
+@pytest.mark.slow
 def test_pieces_of_any_length_without_the_compiler():
     file = Path(__file__).with_name("pieces_without_compiler.py")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)]

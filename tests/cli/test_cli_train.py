@@ -110,6 +110,7 @@ def test_ctrl_c_keeps_the_last_checkpoint_and_resume_is_bitwise_equal(at, finish
     assert record["status"] == "finished" and record["resumed"][0]["after_iteration"] == at // EVERY * EVERY
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=["interrupted", "terminated", "killed"]
 )
@@ -187,6 +188,7 @@ def test_a_signal_lets_the_iteration_end_and_nothing_is_lost(finished_run, tmp_p
     assert_same_run(finished_run, out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["a second signal", "the end of patience"])
 def test_an_iteration_that_does_not_end_is_given_up(how, finished_run, tmp_path, capsys, monkeypatch):
     out, after = tmp_path / "run", []

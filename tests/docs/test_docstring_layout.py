@@ -2,7 +2,7 @@
 
 import pytest
 
-pytest.importorskip("sphinx")
+pytest.importorskip("sphinx", reason="Sphinx, which builds the book, is not installed (pip install '.[docs]')")
 from docstring_layout import INLINE, NOTE, blocks, grouped  # pyright: ignore[reportMissingImports]
 
 from endotsr.equations.matern import matern_weights

@@ -1,7 +1,9 @@
 """Numbers of the book stay on the line of their unit."""
 
 import pytest
-from unbroken_units import unbroken
+
+pytest.importorskip("sphinx", reason="Sphinx, which builds the book, is not installed (pip install '.[docs]')")
+from unbroken_units import unbroken  # pyright: ignore[reportMissingImports]
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,7 @@ print(json.dumps([missed, sum(bool(s.cache_hits) for s in stats.values())]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(usable_cores() < 2, reason="one core: nothing is compiled ahead")
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="the compiler is off")
 def test_a_training_finds_every_kernel_compiled(tmp_path):

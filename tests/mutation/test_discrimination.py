@@ -49,6 +49,7 @@ def test_the_page_is_made_from_the_report(result):
     assert PAGE.read_text(encoding="utf-8") == page(result)
 
 
+@pytest.mark.slow
 def test_defects_and_a_sample_of_mutants_are_still_noticed():
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, str(ROOT / "tests/mutation/again.py"), "40"]
@@ -74,6 +75,7 @@ def test_a_later_run_of_survivors_is_added_by_name():
     assert survivors(both) == set() and survivors(early) == {"k: alive"}
 
 
+@pytest.mark.slow
 def test_what_the_source_no_longer_has_leaves_the_report(result):
     functions = kernels() | planted()
     kernel = "equations.matern.matern_weights"

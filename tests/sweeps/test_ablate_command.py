@@ -8,6 +8,7 @@ from tiny_sweep import rows_of
 from endotsr.cli.ablate import _without_folders
 from endotsr.cli.main import main
 
+pytestmark = pytest.mark.slow
 WORDS = (
     *("ablate", "simulated", "--preset", "demo", "--iterations", "12", "--seeds", "1", "--workers", "1"),
     *("--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"),

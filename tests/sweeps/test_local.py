@@ -62,6 +62,7 @@ def assert_whole(out: Path, undisturbed: Path) -> None:
     assert_same_checkpoints(out, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_continues_run_by_run(undisturbed, tmp_path):
     words = ("sweep", str(write_spec(tmp_path, iterations=str(LENGTH))), "--out", str(tmp_path / "out"))
     first = start(*words)
@@ -75,6 +76,7 @@ def test_a_killed_sweep_continues_run_by_run(undisturbed, tmp_path):
     assert_whole(tmp_path / "out", undisturbed)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_no_run(undisturbed, tmp_path):
     out = tmp_path / "out"
     process = start("sweep", str(write_spec(tmp_path, iterations=str(LENGTH))), "--out", str(out))
@@ -85,6 +87,7 @@ def test_a_killed_worker_loses_no_run(undisturbed, tmp_path):
     assert_whole(out, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_signal_writes_checkpoints_and_says_how_to_continue(undisturbed, tmp_path):
     out = tmp_path / "out"
     words = ("sweep", str(write_spec(tmp_path, iterations=str(LENGTH))), "--out", str(out), "--workers", "1")

@@ -214,6 +214,7 @@ def test_errors_are_outcomes_of_one_line(tmp_path, monkeypatch, error, said):
     assert not outcome.ends_sweep
 
 
+@pytest.mark.slow
 def test_the_lock_of_a_run_is_waited_for_as_long_as_its_log_grows(whole):
     _, out, rows, _ = whole
     run = open_run(out / "runs" / rows[0]["name"])

@@ -109,6 +109,7 @@ def test_visits_grow_like_the_logarithm_of_one_over_the_cutoff():
     np.testing.assert_allclose(slopes, expected, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, *dials.EXPONENTIALS])
 def test_the_image_errs_no_more_than_the_exponential(scene, reference, degree):
     """An error of alpha by a factor 1 + d changes the image by less than d times the sum of alpha T, which is < 1."""

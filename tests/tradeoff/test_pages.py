@@ -48,6 +48,7 @@ def test_no_word_covers_another(result):
         assert overlaps(figure) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", COMMITTED, ids=lambda file: file.stem)
 def test_no_word_covers_another_in_the_committed_pictures(file):
     committed = json.loads(file.read_text(encoding="utf-8"))
@@ -55,6 +56,7 @@ def test_no_word_covers_another_in_the_committed_pictures(file):
         assert all(overlaps(figure) == [] for figure in figures(committed))
 
 
+@pytest.mark.slow
 def test_the_page_stands_alone(result, tmp_path):
     stems = draw(result, tmp_path)
     assert stems == [f"tradeoff{ending}" for ending in PICTURES]
@@ -67,6 +69,7 @@ def test_the_page_stands_alone(result, tmp_path):
     assert all(plain(sentence) in text for sentence in advice(result))
 
 
+@pytest.mark.slow
 def test_equal_results_give_equal_pictures(result, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()

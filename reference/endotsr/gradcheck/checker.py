@@ -89,6 +89,7 @@ def check_pair(pair: Pair, rng: np.random.Generator, settings: Settings = DOUBLE
         inputs,
         blocks=pair.blocks(inputs) if pair.blocks else None,
         trace=pair.trace,
+        traced=pair.traced,
         hard=pair.hard(inputs) if pair.hard else None,
         rng=rng,
         settings=settings,
@@ -103,6 +104,7 @@ def check_function(
     *,
     blocks: Mapping[str, tuple[str, object]] | None = None,
     trace: Callable[[dict[str, NDArray]], Mapping[str, NDArray]] | None = None,
+    traced: Callable[[dict[str, NDArray]], tuple[Any, Mapping[str, NDArray]]] | None = None,
     hard: Mapping[str, NDArray] | None = None,
     rng: np.random.Generator | None = None,
     settings: Settings = DOUBLE,
@@ -115,12 +117,13 @@ def check_function(
     inputs    float arrays by name; float64 unless the function computes in float32 (then settings=SINGLE)
     blocks    (input name, mask or index) by block name; None = one block per input
     trace     discrete decisions of the forward pass; a difference across a change of them is refused
+    traced    outputs and decisions of one forward pass, where a second pass for the trace would cost time
     hard      flat indices by input name that are always probed one by one
     rng       draws cotangents and directions; None = seed 0
     returns   PairReport; never raises for a wrong gradient
     """
     start = time.perf_counter()
-    session = Session(forward, reverse, inputs, trace, rng or np.random.default_rng(0))
+    session = Session(forward, reverse, inputs, trace, rng or np.random.default_rng(0), traced)
     failures = list(session.faults)
     reports: list[BlockReport] = []
     slope = np.nan

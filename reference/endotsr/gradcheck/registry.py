@@ -32,6 +32,7 @@ class Pair(NamedTuple):
     function  dotted name of the forward function, for tables
     hard      inputs -> flat indices by input name: entries that are always probed one by one
     single    "" = the pair also runs in float32; otherwise the reason why it cannot
+    traced    inputs -> (outputs, decisions) of one forward pass, for pairs that have a trace; None = two passes
     """
 
     name: str
@@ -44,6 +45,7 @@ class Pair(NamedTuple):
     trace: Callable[[Arrays], Mapping[str, NDArray]] | None = None
     hard: Callable[[Arrays], Mapping[str, NDArray]] | None = None
     single: str = ""
+    traced: Callable[[Arrays], tuple[Mapping[str, NDArray], Mapping[str, NDArray]]] | None = None
 
 
 def pair_of(stage: Stage, variant: Variant) -> Pair:
@@ -62,15 +64,17 @@ def pair_of(stage: Stage, variant: Variant) -> Pair:
         outputs, _ = stage.forward(whole(inputs), variant.settings)
         return {name: np.asarray(value) for name, value in outputs.items()}
 
+    def traced(inputs: Arrays) -> tuple[dict[str, NDArray], Mapping[str, NDArray]]:
+        assert trace_pass is not None
+        everything = whole(inputs)
+        outputs, saved = stage.forward(everything, variant.settings)
+        found = {name: np.asarray(value) for name, value in outputs.items()}
+        return found, trace_pass(everything, variant.settings, saved)
+
     def reverse(inputs: Arrays, cotangents: Arrays) -> dict[str, NDArray]:
         _, saved = stage.forward(whole(inputs), variant.settings)
         found = reverse_pass(cotangents, saved)
         return {name: np.asarray(found[f"d_{name}"]) for name in inputs}
-
-    def trace(inputs: Arrays) -> Mapping[str, NDArray]:
-        assert trace_pass is not None
-        everything = whole(inputs)
-        return trace_pass(everything, variant.settings, stage.forward(everything, variant.settings)[1])
 
     return Pair(
         variant.name,
@@ -80,9 +84,10 @@ def pair_of(stage: Stage, variant: Variant) -> Pair:
         forward,
         reverse,
         variant.blocks,
-        trace if trace_pass is not None else None,
+        (lambda inputs: traced(inputs)[1]) if trace_pass is not None else None,
         variant.hard,
         variant.single,
+        traced if trace_pass is not None else None,
     )
 
 

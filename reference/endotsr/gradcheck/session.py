@@ -13,10 +13,11 @@ LINEAR = 1e5  # reverse passes are linear in the cotangents up to this many roun
 class Session:
     """Inputs, outputs, dense cotangents and gradient of one check, and the faults already found in them."""
 
-    def __init__(self, forward, reverse, inputs: Arrays, trace, rng: np.random.Generator):
+    def __init__(self, forward, reverse, inputs: Arrays, trace, rng: np.random.Generator, traced=None):
         self.inputs = {name: np.array(value) for name, value in inputs.items()}
-        self.rng, self._trace, self.faults = rng, trace, []
-        self._forward, self._reverse = forward, reverse
+        self.rng, self.faults = rng, []
+        self._reverse = reverse
+        self._traced = traced or (lambda moved: (forward(moved), trace(moved) if trace else {}))
         self.decisions = trace(self.inputs) if trace else {}
         answer = forward(dict(self.inputs))
         self.bare = not isinstance(answer, Mapping)
@@ -89,9 +90,10 @@ class Session:
             moved = dict(self.inputs)
             for name, v in direction.items():
                 moved[name] = (self.inputs[name] + step * v).astype(self.inputs[name].dtype)
-            if self._trace is not None and not _equal(self._trace(moved), self.decisions):
+            answer, decisions = self._traced(moved)
+            if not _equal(decisions, self.decisions):
                 return None
-            outputs = self._named(self._forward(moved))
+            outputs = self._named(answer)
             terms = [(np.float64(self.cotangents[k]) * np.float64(v)).ravel() for k, v in outputs.items()]
             return terms[0] if len(terms) == 1 else np.concatenate(terms)
 

@@ -43,6 +43,7 @@ def test_the_mistakes_are_many_known_and_of_every_family():
     assert sum("training" in m.operations for m in in_reference.MISTAKES) >= 10
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("cc") or shutil.which("gcc")), reason="no C compiler (cc or gcc) on this machine")
 @pytest.mark.parametrize("flag", ["", "tanh_missing", "support_subsampled", "depth_over_opacity"])
 def test_a_mistake_in_the_c_port_is_named_and_the_right_port_is_not(flag):

@@ -243,6 +243,7 @@ def test_regeneration_says_what_moved(copy):
     assert line.startswith("motion/generic/translation: ") and "e-0" in line and "tolerance" not in line
 
 
+@pytest.mark.slow
 def test_writing_ends_with_exit_code_1(copy):
     from endotsr.cli.golden import run
 

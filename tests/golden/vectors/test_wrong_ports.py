@@ -64,6 +64,7 @@ def test_a_copy_leaves_the_reference_as_it_is(golden):
     assert right["loss"] == golden.array(question, "expected/loss.npy") != made[question.name].double["loss"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(WRONG_PORTS))
 def test_a_wrong_port_is_refused_and_named(name, golden, clean, tmp_path):
     examined = answer_wrongly(golden, tmp_path, WRONG_PORTS[name], spoiled_only=True)
