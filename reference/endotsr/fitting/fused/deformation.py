@@ -7,6 +7,8 @@ well, from the updated numbers, so that the arrays are not read from memory a se
 (tested).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from endotsr.equations.deformation import CHANNELS, GAUSSIANS_PER_PIECE, DeformationSaved, add_row, reverse_row
@@ -16,6 +18,32 @@ from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 
 NAMES = ("fdm_weight", "fdm_centre", "fdm_width")
+
+
+class FdmArrays(NamedTuple):
+    """The three arrays of the FDM, each (10, B, N): the parameters, or their first or second moments."""
+
+    weight: FloatArray
+    centre: FloatArray
+    width: FloatArray
+
+
+class StepSettings(NamedTuple):
+    """What `adam_row` needs, for each of the three arrays; numbers in float64."""
+
+    rate: FloatArray  # (3, 10) learning rate of a channel, divided by the bias correction of the first moment
+    root: FloatArray  # (3,) inverse root of the bias correction of the second moment
+    beta1: float
+    beta2: float
+    epsilon: float
+
+
+class BasisTimes(NamedTuple):
+    """Where the time bases are evaluated, in normalised time, and their shape."""
+
+    t: float  # of the gradient
+    t_ahead: float  # of the offsets that are computed from the updated arrays
+    quartic: bool
 
 
 def deformation_adam_step(
@@ -41,8 +69,8 @@ def deformation_adam_step(
     Raises: ValueError naming the array whose shape, dtype or layout does not fit.
     Oracle: `deformation_reverse`, `adam_update`, `deformation_forward`, bitwise.
     """
-    parameters = (saved.weight, saved.centre, saved.width)
-    first, second = [state.first[n] for n in NAMES], [state.second[n] for n in NAMES]
+    parameters = FdmArrays(saved.weight, saved.centre, saved.width)
+    first, second = (FdmArrays(*(moments[name] for name in NAMES)) for moments in (state.first, state.second))
     for k, name in enumerate(NAMES):
         check_layout(saved.weight, {name: parameters[k], f"first {name}": first[k], f"second {name}": second[k]})
     expected = (CHANNELS, saved.weight.shape[2])
@@ -56,39 +84,24 @@ def deformation_adam_step(
         state.step[name] += 1
         for part, value in rate_parts(rates[name]):
             rate[k, part], root[k] = step_factors(state.step[name], value, beta1, beta2)
-    moments = (*first, *second)
-    inputs = (*parameters, saved.t, saved.basis == "quartic", d_offsets)
-    settings = (rate, root, float(beta1), float(beta2), float(epsilon))
+    settings = StepSettings(rate, root, float(beta1), float(beta2), float(epsilon))
+    times = BasisTimes(saved.t, saved.t if ahead is None else float(ahead), saved.basis == "quartic")
     count = saved.weight.shape[2]
     offsets = np.empty((CHANNELS, count if ahead is not None else 0), saved.weight.dtype)
     tasks = CHANNELS * ((count + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE)
-    parallel_for(_step_kernel, tasks, *inputs, *moments, *settings, saved.t if ahead is None else float(ahead), offsets)
+    parallel_for(_step_kernel, tasks, parameters, first, second, d_offsets, settings, times, offsets)
     return offsets if ahead is not None else None
 
 
-def _adam_piece(parameter, gradient, first, second, c, j, start, rate, root, beta1, beta2, epsilon):
-    """Adam step of one piece of row (c, j) of a parameter; gradient (GAUSSIANS_PER_PIECE,) holds that of the piece."""
-    stop = min(parameter.shape[2], start + GAUSSIANS_PER_PIECE)
-    adam_row(
-        parameter[c, j, start:stop], gradient, first[c, j, start:stop], second[c, j, start:stop],
-        rate, root, beta1, beta2, epsilon,
-    )  # fmt: skip
-
-
-_adam_piece_kernel = jit(_adam_piece)
-
-
-def _step(
-    first, last, weight, centre, width, t, quartic, d_offsets, m_w, m_m, m_s, v_w, v_m, v_s,
-    rate, root, beta1, beta2, epsilon, ahead, offsets,
-):  # fmt: skip
+def _step(first_task, last_task, parameters, first, second, d_offsets, settings, times, offsets):
     """Each task owns one piece of one channel, of all nine arrays; `offsets` has no columns if none are computed."""
+    (weight, centre, width), (t, t_ahead, quartic) = parameters, times
+    rate, root, beta1, beta2, epsilon = settings
     bases, count = weight.shape[1:]
     pieces = (count + GAUSSIANS_PER_PIECE - 1) // GAUSSIANS_PER_PIECE
-    time, time_ahead = weight.dtype.type(t), weight.dtype.type(ahead)
+    time, time_ahead = weight.dtype.type(t), weight.dtype.type(t_ahead)
     gradient = np.empty((3, GAUSSIANS_PER_PIECE), weight.dtype)
-    d_w, d_m, d_s = gradient[0], gradient[1], gradient[2]
-    for task in range(first, last):
+    for task in range(first_task, last_task):
         c, start = task // pieces, (task % pieces) * GAUSSIANS_PER_PIECE
         stop = min(count, start + GAUSSIANS_PER_PIECE)
         later = offsets[c, start:stop]
@@ -96,10 +109,13 @@ def _step(
             later[i] = weight.dtype.type(0)
         for j in range(bases):
             w, m, s = weight[c, j, start:stop], centre[c, j, start:stop], width[c, j, start:stop]
-            reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], d_w, d_m, d_s)
-            _adam_piece_kernel(weight, d_w, m_w, v_w, c, j, start, rate[0, c], root[0], beta1, beta2, epsilon)
-            _adam_piece_kernel(centre, d_m, m_m, v_m, c, j, start, rate[1, c], root[1], beta1, beta2, epsilon)
-            _adam_piece_kernel(width, d_s, m_s, v_s, c, j, start, rate[2, c], root[2], beta1, beta2, epsilon)
+            reverse_row(w, m, s, time, quartic, d_offsets[c, start:stop], gradient[0], gradient[1], gradient[2])
+            for k in range(3):
+                piece, mean, square = parameters[k][c, j], first[k][c, j], second[k][c, j]
+                adam_row(
+                    piece[start:stop], gradient[k], mean[start:stop], square[start:stop],
+                    rate[k, c], root[k], beta1, beta2, epsilon,
+                )  # fmt: skip
             add_row(w, m, s, time_ahead, quartic, later)
 
 
