@@ -3,6 +3,8 @@
     python docs/pages/claims.py            from docs/results
     python docs/pages/claims.py FOLDER     from the files of another folder
 
+The differences are made from the stored runs each time, and written into the file of the ablation.
+
 To measure, on a machine that has nothing else to do (each command continues where it was interrupted):
 
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
@@ -23,7 +25,9 @@ import claims_parts
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
-from endotsr.sweeps.ablation_page import draw
+from endotsr.runs.files import write_json
+from endotsr.sweeps.ablation_page import ablation_record, draw
+from endotsr.sweeps.execute import FINISHED
 
 DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
@@ -39,7 +43,15 @@ RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
 def read(folder: Path) -> dict[str, dict[str, Any] | None]:
     """The ablations by name; None where there is no result yet. Raises: InputError for a file that cannot be read."""
     found = {name: folder / file for name, file in FILES.items()}
-    return {name: read_json(path, "endotsr ablate") if path.exists() else None for name, path in found.items()}
+    return {
+        name: compared(read_json(path, "endotsr ablate")) if path.exists() else None for name, path in found.items()
+    }
+
+
+def compared(record: dict[str, Any]) -> dict[str, Any]:
+    """The record of an ablation with the differences that `COMPARISONS` asks of its runs."""
+    again = ablation_record([{**row, "status": FINISHED} for row in record["rows"]], record["command"])
+    return {**record, "levels": again["levels"], "increments": again["increments"]}
 
 
 def read_runs(folder: Path) -> list[dict[str, Any]]:
@@ -62,9 +74,10 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
 
 
 def draw_ablations(folder: Path) -> None:
-    """The intervals of every ablation as a picture beside its result: NAME.json becomes NAME.svg."""
+    """The differences in the file of every ablation, and their intervals beside it: NAME.json and NAME.svg."""
     for name, found in read(folder).items():
         if found is not None and found["increments"]:
+            write_json(folder / FILES[name], found)
             draw(found, (folder / FILES[name]).with_suffix(".svg"))
 
 

@@ -2,7 +2,8 @@
 
 A verdict is decided by numbers alone. For a difference with the published value p and Student's 95 % interval I of its
 mean: I holds p and not 0: reproduced; both: not decided; 0 and not p: not reproduced; neither: the direction alone, or
-its opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0.
+its opposite. A claim that something changes nothing (p = 0) is reproduced if I lies within HUNDREDTH of 0. Which two
+configurations a claim compares stands in `sweeps.ablation.COMPARISONS` alone.
 """
 
 from typing import Any
@@ -12,37 +13,36 @@ from over_seeds import interval
 
 from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
+from endotsr.sweeps.ablation import COMPARISONS, STEPS, Comparison
 from endotsr.sweeps.ablation_page import increment_table, interval_text, level_table
 from endotsr.sweeps.cost import planned_hours
 
 NOT_YET = "Not measured yet."
 HUNDREDTH = 0.01  # dB
 LEAST_PAIRS = 3  # below, nothing is decided
+SCOPE = ", mean over EndoNeRF"  # what the published gains of the steps are
 FULL, SPLIT = "A+S+L", "every_eighth"
-COMMAND = "`endotsr ablate endonerf_pulling --out DIR`"
-LEVELS = (("psnr_full", "PSNR full", "{:.2f} dB", True, 0.01), ("ssim_full", "SSIM full", "{:.4f}", True, 0.001),
-          ("lpips", "LPIPS", "{:.4f}", False, 0.001))  # larger is better; unit of the last published digit  # fmt: skip
-INCREMENTS = (
-    ("A, temporal appearance", "Temporal appearance (A) gains 0.29 dB"),
-    ("S, spectral motion", "Spectral motion (S) gains 0.04 dB"),
-    ("L, Laplacian detail", "Laplacian detail (L) gains 0.12 dB"),
-    ("all three, fixed count", "At a fixed number of Gaussians all three together gain 0.25 dB"),
-    ("Matérn prior", "The Matérn prior changes PSNR by less than 0.01 dB"),
-    ("Matérn prior, fixed representation", "The same at a fixed representation"),
+LEVELS = (  # key, key of the published value, name, larger is better, unit of the last published digit
+    ("psnr_full", "psnr_full", "PSNR full", "{:.2f} dB", True, 0.01),
+    ("ssim_full", "ssim_full", "SSIM full", "{:.4f}", True, 0.001),
+    ("lpips", "lpips", "LPIPS, if its input is in [0, 1]", "{:.4f}", False, 0.001),
+    ("lpips_symmetric", "lpips", "LPIPS, if its input is in [-1, 1]", "{:.4f}", False, 0.001),
 )
 PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)
 Record = dict[str, Any]
 
 
 def verdicts(found: Record | None, runs: list[Record]) -> str:
-    """Claim by claim: verdict, number, interval, command."""
+    """Claim by claim: the compared configurations, what is published, verdict, number, interval."""
     rows = [_level_row(found, runs, *level) for level in LEVELS]
+    rows += [_increment_row(found, comparison) for comparison in COMPARISONS if comparison.says]
     rows.append(_largest_row(found))
-    rows += [_increment_row(found, claim, words) for claim, words in INCREMENTS]
+    rows.append(
+        ["The other sequences of the paper", "-", "-", "not testable: their pictures are not at hand", "-", "-"]
+    )
     rows.append(_motion_row(found))
-    other = "not testable: their pictures are not at hand"
-    rows.append(["The other sequences of the paper", other, "-", "-", "`endotsr ablate SEQUENCE --out DIR`"])
-    return markdown(("claim of the paper, EndoNeRF pulling", "verdict", "measured", "95 % interval", "command"), rows)
+    heads = ("the paper, in our words", "compared", "published", "verdict on pulling", "measured", "95 % interval")
+    return markdown(heads, rows)
 
 
 def increment_verdict(published: float, low: float | None, high: float | None, pairs: int) -> str:
@@ -89,17 +89,17 @@ def full_runs(found: Record | None, runs: list[Record], key: str) -> list[float]
 
 
 def _level_row(
-    found: Record | None, runs: list[Record], key: str, label: str, form: str, larger: bool, unit: float
+    found: Record | None, runs: list[Record], key: str, of: str, label: str, form: str, larger: bool, unit: float
 ) -> list[str]:
-    published = PUBLISHED["pulling"][key]
-    claim = f"{label} {published:g}"
+    published = PUBLISHED["pulling"][of]
+    claim = [label, FULL, f"{published:g}"]
     values = full_runs(found, runs, key)
     if not values:
-        return [claim, NOT_YET, "-", "-", COMMAND]
+        return [*claim, NOT_YET, "-", "-"]
     mean, low, high = student(values)
     shown = "-" if low is None or high is None else f"{form.format(low)} to {form.format(high)}"
     measured = f"{form.format(mean)}, {len(values)} seed{'s' if len(values) > 1 else ''}"
-    return [claim, level_verdict(published, low, high, larger, unit), measured, shown, COMMAND]
+    return [*claim, level_verdict(published, low, high, larger, unit), measured, shown]
 
 
 def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record | None:
@@ -108,12 +108,17 @@ def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record |
     return next((r for r in rows if (r["claim"], r["split"], r["metric"]) == wanted), None)
 
 
-def _increment_row(found: Record | None, claim: str, words: str) -> list[str]:
-    entry = _of(found, claim)
+def _increment_row(found: Record | None, comparison: Comparison) -> list[str]:
+    published, entry = comparison.published or 0.0, _of(found, comparison.claim)
+    claim = [
+        comparison.says,
+        f"{comparison.with_} - {comparison.without}",
+        f"{published:+.2f} dB{SCOPE if comparison in STEPS else ''}",
+    ]
     if entry is None:
-        return [words, NOT_YET, "-", "-", COMMAND]
-    verdict = increment_verdict(entry["published"], entry["student_low"], entry["student_high"], entry["pairs"])
-    return [words, verdict, f"{entry['mean']:+.3f} dB", interval_text(entry, "student", 3) + _unit(entry), COMMAND]
+        return [*claim, NOT_YET, "-", "-"]
+    verdict = increment_verdict(published, entry["student_low"], entry["student_high"], entry["pairs"])
+    return [*claim, verdict, f"{entry['mean']:+.3f} dB", interval_text(entry, "student", 3) + _unit(entry)]
 
 
 def _unit(entry: Record) -> str:
@@ -121,36 +126,37 @@ def _unit(entry: Record) -> str:
 
 
 def _largest_row(found: Record | None) -> list[str]:
-    claim = "A is the largest single gain"
-    entries = [_of(found, name) for name, _ in INCREMENTS[:3]]
-    known = [entry for entry in entries if entry is not None]
-    if len(known) < 3:
-        return [claim, NOT_YET, "-", "-", COMMAND]
-    means = ", ".join(f"{e['with']} {e['mean']:+.3f}" for e in known) + " dB"
+    claim = ["Temporal appearance is the largest of the three steps", "the three steps above", "-"]
+    known = [entry for step in STEPS if (entry := _of(found, step.claim)) is not None]
+    if len(known) < len(STEPS):
+        return [*claim, NOT_YET, "-", "-"]
+    means = ", ".join(f"{e['claim'][0]} {e['mean']:+.3f}" for e in known) + " dB"
     if min(e["pairs"] for e in known) < LEAST_PAIRS:
-        return [claim, f"not decided: {min(e['pairs'] for e in known)} of {LEAST_PAIRS} seeds", means, "-", COMMAND]
-    others = max(e["student_high"] for e in known[1:])
-    if known[0]["student_low"] > others:
-        return [claim, "reproduced", means, "-", COMMAND]
-    largest = max(known, key=lambda e: e["mean"]) is known[0]
-    return [claim, "not decided: the intervals overlap" if largest else "not reproduced", means, "-", COMMAND]
+        return [*claim, f"not decided: {min(e['pairs'] for e in known)} of {LEAST_PAIRS} seeds", means, "-"]
+    appearance = next(entry for entry in known if entry["claim"].startswith("A"))
+    others = max(entry["student_high"] for entry in known if entry is not appearance)
+    if appearance["student_low"] > others:
+        return [*claim, "reproduced", means, "-"]
+    largest = max(known, key=lambda e: e["mean"]) is appearance
+    return [*claim, "not decided: the intervals overlap" if largest else "not reproduced", means, "-"]
 
 
 def _motion_row(found: Record | None) -> list[str]:
     """Not stated by the paper, but what its motion is for."""
-    claim = "The motion carries something between the frames: better than the cross-fade of the own renders"
+    claim = ["Ours: between the frames the motion is better than a cross-fade of the model's own renders",
+             f"{FULL} - cross-fade, tissue", "-"]  # fmt: skip
     rows = [] if found is None else [r for r in found["rows"] if (r["configuration"], r["split"]) == (FULL, SPLIT)]
     values = [
         r["psnr_tissue"] - r["cross_fade_psnr_tissue"] for r in rows
         if r.get("psnr_tissue") is not None and r.get("cross_fade_psnr_tissue") is not None
     ]  # fmt: skip
     if not values:
-        return [claim, NOT_YET, "-", "-", COMMAND]
+        return [*claim, NOT_YET, "-", "-"]
     mean, low, high = student(values)
     if low is None or high is None:
-        return [claim, "not decided: one seed", f"{mean:+.2f} dB tissue", "-", COMMAND]
+        return [*claim, "not decided: one seed", f"{mean:+.2f} dB", "-"]
     verdict = "yes" if low > 0 else "no" if high < 0 else "not decided"
-    return [claim, verdict, f"{mean:+.2f} dB tissue", f"{low:+.2f} to {high:+.2f} dB", COMMAND]
+    return [*claim, verdict, f"{mean:+.2f} dB", f"{low:+.2f} to {high:+.2f} dB"]
 
 
 def tables(found: Record | None) -> str:

@@ -40,11 +40,11 @@ def test_the_results_are_paired_and_written_three_times_over(done):
     assert record == json.loads((done / "out" / "ablation.json").read_text())
     found = {(f["claim"], f["metric"]): f for f in record["increments"]}
     rows = {row["configuration"]: row for row in record["rows"]}
-    entry = found["A, temporal appearance", "psnr_tissue"]
+    entry = found["A alone", "psnr_tissue"]
     assert entry["mean"] == pytest.approx(rows["A"]["psnr_tissue"] - rows["base"]["psnr_tissue"])
     assert entry["mean_low"] is None and entry["pairs"] == 1
     assert ("A, fixed count", "psnr_full") in found
-    assert "A, temporal appearance" in (done / "out" / "ablation.md").read_text()
+    assert "| A alone (ours) |" in (done / "out" / "ablation.md").read_text()
     assert (done / "out" / "ablation.png").stat().st_size > 1000
 
 

@@ -14,6 +14,7 @@ from endotsr.sweeps.ablation import (
     COMPARISONS,
     CONFIGURATIONS,
     FIXED,
+    STEPS,
     ablation_spec,
     estimate,
     increments,
@@ -44,9 +45,9 @@ def pairs(**groups):
 
 def test_a_difference_is_paired_by_seed():
     """The levels of the seeds are far apart, the differences are not."""
-    rows = [row("base", s, 30.0 + 5 * s) for s in range(3)] + [row("A", s, 30.2 + 5 * s + 0.1 * s) for s in range(3)]
+    rows = [row("S", s, 30.0 + 5 * s) for s in range(3)] + [row("A+S", s, 30.2 + 5 * s + 0.1 * s) for s in range(3)]
     found = next(f for f in increments(rows) if f.metric == "psnr_full")
-    assert found.comparison.claim == "A, temporal appearance" and found.comparison.published == 0.29
+    assert found.comparison.claim == "A beside S" and found.comparison.published == 0.29
     assert found.estimate.mean == pytest.approx(0.3) and found.estimate.median == pytest.approx(0.3)
     assert 0.199 <= found.estimate.mean_low < 0.3 < found.estimate.mean_high <= 0.401
     assert [p["seed"] for p in found.pairs] == [0, 1, 2]
@@ -126,6 +127,15 @@ def test_every_comparison_is_between_configurations_that_are_made():
     assert len(made) == 2 * len(CONFIGURATIONS)
 
 
+def test_the_steps_of_the_paper_lead_from_the_base_to_the_whole_method():
+    """Each step begins where the one before ended; at a fixed count the paper begins with motion alone."""
+    assert [(c.with_, c.without) for c in STEPS] == [("S", "base"), ("A+S", "S"), ("A+S+L", "A+S")]
+    assert [c.published for c in STEPS] == [0.04, 0.29, 0.12]
+    fixed = [(c.with_, c.without) for c in COMPARISONS if c.published == 0.25]
+    assert fixed == [(f"A+S+L{FIXED}", f"S{FIXED}")]
+    assert all((c.published is None) == (not c.says) for c in COMPARISONS)
+
+
 def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
     spec = spec_of(ablation_spec(["simulated"], 3, fixed_at=3000), "test", tmp_path)
     configs = {c.name: c for c in spec.configurations}
@@ -141,13 +151,13 @@ def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
 
 
 def test_the_files_hold_what_was_measured(tmp_path):
-    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "A") for s in range(3)]
-    record = write_ablation(tmp_path, [*rows, open_row("S", 0)], ["endotsr", "ablate"])
+    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "S") for s in range(3)]
+    record = write_ablation(tmp_path, [*rows, open_row("A", 0)], ["endotsr", "ablate"])
     assert json.loads((tmp_path / FILES[0]).read_text()) == json.loads(json.dumps(record))
     assert record["runs"] == {"planned": 7, "finished": 6, "failed": []}
     text = (tmp_path / FILES[1]).read_text()
-    assert "| A, temporal appearance | PSNR full, dB | +0.25 | +0.25 to +0.25 | +0.25 to +0.25 | +0.25 |" in text
-    assert "+0.29 | 3 on 1 |" in text
+    assert "| S | PSNR full, dB | +0.25 | +0.25 to +0.25 | +0.25 to +0.25 | +0.25 |" in text
+    assert "+0.04 | 3 on 1 |" in text
     assert (tmp_path / FILES[2]).read_bytes()[:4] == b"\x89PNG"
 
 
@@ -160,16 +170,16 @@ def test_without_a_pair_there_is_no_picture(tmp_path):
 def test_the_picture_has_a_mark_for_every_mean_pair_and_published_value(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(style, "save", lambda figure, path: drawn.append(figure))
-    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "A", "A+S") for s in range(3)]
+    rows = [row(name, s, 30.0 + s + 0.25 * (name != "base")) for name in ("base", "S", "A+S") for s in range(3)]
     write_ablation(tmp_path, rows, [])
     (axes,) = drawn[0].axes
     marks = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
     assert [name.get_text() for name in axes.get_yticklabels()] == [
-        "A, temporal appearance", "S beside A", "A and S together"
+        "S", "A beside S", "A and S together (ours)"
     ]  # fmt: skip
     np.testing.assert_allclose(marks["mean"], [(0.25, 0), (0.0, 1), (0.25, 2)], atol=1e-12)
-    assert len(marks["one pair"]) == 9 and marks["published for pulling"].tolist() == [[0.29, 0.0]]
+    assert len(marks["one pair"]) == 9 and marks["as published"].tolist() == [[0.04, 0.0], [0.29, 1.0]]
     (legend,) = drawn[0].legends
     assert [text.get_text() for text in legend.get_texts()] == [
-        "95 %, Student", "95 %, bootstrap", "one pair", "mean", "published for pulling"
+        "95 %, Student", "95 %, bootstrap", "one pair", "mean", "as published"
     ]  # fmt: skip

@@ -19,6 +19,7 @@ ROW_KEYS = (
     "name", "sequence", "split", "configuration", "seed", "iterations", "gaussians", "seconds", "psnr_full",
     "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric", "training_psnr_full", "training_psnr_tissue",
     "cross_fade_psnr_full", "cross_fade_psnr_tissue", "preset", "width", "height", "threads", "baselines", "measures",
+    "arrays_sha256",
 )  # fmt: skip
 SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
 
@@ -92,13 +93,18 @@ def increment_table(record: dict[str, Any], split: str) -> str:
         label = next(head for key, head, _ in SHOWN if key == found["metric"])
         stated = found["published"] if found["metric"] == "psnr_full" else None
         rows.append([
-            found["claim"], label, _signed(found["mean"], digits),
+            name_of(found), label, _signed(found["mean"], digits),
             *(interval_text(found, of, digits) for of in ("student", "mean")),
             _signed(found["median"], digits), interval_text(found, "median", digits), _signed(stated, digits),
             f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
     heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
     return markdown(heads, rows)
+
+
+def name_of(found: dict[str, Any]) -> str:
+    """The name of a difference, marked where the paper does not make it."""
+    return found["claim"] + ("" if found["published"] is not None else " (ours)")
 
 
 def interval_text(found: dict[str, Any], of: str, digits: int) -> str:
@@ -138,8 +144,8 @@ def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
     axes.plot([f["mean"] for f in chosen], places, "o", color=style.BLUE, label="mean")
     stated = [(f["published"], place) for place, f in enumerate(chosen) if f["published"] is not None]
     if stated:
-        axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="published for pulling")
-    axes.set_yticks(list(places), [found["claim"] for found in chosen])
+        axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="as published")
+    axes.set_yticks(list(places), [name_of(found) for found in chosen])
     axes.invert_yaxis()
 
 
