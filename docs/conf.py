@@ -53,7 +53,8 @@ html_theme_options |= {"navbar_persistent": []}  # one search, in the sidebar
 html_sidebars = {"_modules/**": [], "search": ["navbar-logo.html", "sbt-sidebar-nav.html"]}  # one search a page
 html_show_sphinx = False
 
-MATHJAX_CDN = "https://cdn.jsdelivr.net/npm/mathjax@3/es5/tex-chtml.js"
+MATHJAX = "tex-chtml-full.js"  # with every extension of TeX: a smaller bundle loads \boldsymbol from a file of its own
+MATHJAX_CDN = f"https://cdn.jsdelivr.net/npm/mathjax@3/es5/{MATHJAX}"
 
 
 def _copy_mathjax() -> str:
@@ -62,15 +63,15 @@ def _copy_mathjax() -> str:
     if spec is None or not spec.submodule_search_locations:
         return MATHJAX_CDN
     source = Path(spec.submodule_search_locations[0]) / "static" / "mathjax" / "es5"
-    if not (source / "tex-chtml.js").is_file():
+    if not (source / MATHJAX).is_file():
         return MATHJAX_CDN
     target = HERE / "_static" / "mathjax"
     fonts = Path("output") / "chtml" / "fonts" / "woff-v2"
     (target / fonts).mkdir(parents=True, exist_ok=True)
-    shutil.copy2(source / "tex-chtml.js", target / "tex-chtml.js")
+    shutil.copy2(source / MATHJAX, target / MATHJAX)
     for font in (source / fonts).glob("*.woff"):
         shutil.copy2(font, target / fonts / font.name)
-    return "mathjax/tex-chtml.js"
+    return f"mathjax/{MATHJAX}"
 
 
 mathjax_path = _copy_mathjax()

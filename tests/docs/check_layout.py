@@ -5,30 +5,16 @@ At 1400 and 1000 px every column of every table is visible. On a telephone (390 
 box. At every width a page shows at most one search box. Without a browser the check says so and ends with exit code 0.
 """
 
-import functools
 import json
-import subprocess
 import sys
-import tempfile
-import threading
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "views"))
-from browser import FLAGS, found_browser
+from page_visits import found_browser, pages_of, visits
 
 WIDTHS = (1400, 1000, 390)  # px
 ALL_COLUMNS_FROM = 800  # px: from this width on, a table shows all of its columns
-LEFT_OUT = ("_static", "_modules", "_sources")  # folders of a book that hold no pages of its own
-SECONDS_A_PAGE = 20.0
-RUNNER = """<!doctype html><body><img src="/wait"><script>
-const pages = PAGES, widths = WIDTHS, found = [];
-const frame = document.createElement("iframe");
-frame.style = "border:0;height:900px";
-document.body.append(frame);
-const pause = (ms) => new Promise((done) => setTimeout(done, ms));
-const loaded = (url) => new Promise((done) => { frame.onload = done; frame.src = url; });
+SCRIPT = """
 const name = (table) => (table.caption || table.rows[0] || table).textContent.trim().replace(/\\s+/g, " ").slice(0, 60);
 function box(table) {
   for (let up = table.parentElement; up; up = up.parentElement)
@@ -52,17 +38,16 @@ function widest(root, width) {
   const inner = wide.find((e) => ![...e.children].some((child) => wide.includes(child)));
   return inner ? inner.tagName.toLowerCase() + " " + inner.textContent.trim().slice(0, 40) : "";
 }
-(async () => {
-  for (const page of pages) for (const width of widths) {
+async function visit(page) {
+  for (const width of WIDTHS) {
     frame.style.width = width + "px";
-    await loaded("/pages/" + page);
+    await open(page);
     await pause(50);
     for (const folded of frame.contentDocument.querySelectorAll("details")) folded.open = true;
     measure(page, width);
   }
-  fetch("/done", {method: "POST", body: JSON.stringify(found)});
-})().catch((error) => fetch("/done", {method: "POST", body: JSON.stringify([{kind: "error", what: String(error)}])}));
-</script></body>"""
+}
+"""
 
 
 def layout_problems(root: Path, pages: list[str]) -> list[dict[str, Any]]:
@@ -70,57 +55,8 @@ def layout_problems(root: Path, pages: list[str]) -> list[dict[str, Any]]:
 
     Raises: RuntimeError without a browser or an answer.
     """
-    program = found_browser()
-    if program is None:
-        raise RuntimeError("no browser found")
-    runner = RUNNER.replace("PAGES", json.dumps(pages)).replace("WIDTHS", json.dumps(WIDTHS))
-    runner = runner.replace("ALL_COLUMNS_FROM", str(ALL_COLUMNS_FROM))
-    done, answers = threading.Event(), []
-    longest = 60 + SECONDS_A_PAGE * len(pages)
-
-    class Handler(SimpleHTTPRequestHandler):
-        def do_GET(self) -> None:
-            if self.path == "/wait":  # the browser ends when everything is loaded: not before the answer
-                done.wait(longest)
-            if self.path.startswith("/pages/"):
-                self.path = self.path.removeprefix("/pages")
-                return super().do_GET()
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html; charset=utf-8")
-            self.end_headers()
-            self.wfile.write(runner.encode() if self.path == "/" else b"")
-
-        def do_POST(self) -> None:
-            answers.extend(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-            self.send_response(204)
-            self.end_headers()
-            done.set()
-
-        def log_message(self, *_: object) -> None:
-            pass
-
-    handler = functools.partial(Handler, directory=str(root))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, tempfile.TemporaryDirectory() as profile:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        words = [program, *FLAGS, f"--user-data-dir={profile}", "--window-size=1500,1000", "--dump-dom"]
-        with subprocess.Popen(
-            [*words, f"http://127.0.0.1:{server.server_port}/"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        ) as running:
-            answered = done.wait(longest)
-            try:
-                running.wait(20)
-            except subprocess.TimeoutExpired:
-                running.kill()
-        server.shutdown()
-    if not answered:
-        raise RuntimeError(f"no answer of the browser within {longest:.0f} s")
-    return answers
-
-
-def pages_of(root: Path) -> list[str]:
-    """The pages of a book, relative to its folder."""
-    files = (file.relative_to(root) for file in sorted(root.rglob("*.html")))
-    return [file.as_posix() for file in files if not set(file.parts) & set(LEFT_OUT)]
+    script = SCRIPT.replace("WIDTHS", json.dumps(WIDTHS)).replace("ALL_COLUMNS_FROM", str(ALL_COLUMNS_FROM))
+    return visits(root, pages, script).found
 
 
 def main(words: list[str]) -> int:
