@@ -1,4 +1,4 @@
-"""Helpers of the tests folder made importable; profiles of the property tests.
+"""Helpers of the tests folder and programs of the repository made importable; profiles of the property tests.
 
 quick   the default: a few examples, new ones every run
 ci      where CI is set: the same examples every run, and a blob that repeats a failure
@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE / "splatting")]  # made_up_scenes is used in other folders too
+sys.path += [str(HERE.parent / "golden")]  # programs of the repository, which are not installed
 
 # No deadline: the first call of a kernel compiles it. Fixtures hold nothing that an example changes.
 COMMON = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}

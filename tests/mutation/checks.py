@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 from _pytest.runner import runtestprotocol
 
+from endotsr.golden.contract import all_operations
 from endotsr.golden.judge.compare import judged
 from endotsr.golden.judge.format import Case
 from endotsr.golden.judge.store import Golden
-from endotsr.golden.vectors.reference import reference, stored
-from endotsr.golden.vectors.registry import all_operations
+from endotsr.golden.reference import reference, stored
 from endotsr.gradcheck import Pair
 from mutation.gradients import Recorded, live, replay
 

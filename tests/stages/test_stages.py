@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from endotsr.golden.contract import all_operations
 from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.golden.vectors.registry import all_operations
 from endotsr.gradcheck import all_pairs, pair_of
 from endotsr.stages import registry
 from endotsr.stages.registry import all_stages

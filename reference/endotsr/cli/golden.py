@@ -1,6 +1,5 @@
-"""`endotsr golden`: the conformance target of ports: judge outputs, run a port, check or rewrite the vectors."""
+"""`endotsr golden`: the conformance target of ports: judge outputs, run a port, write the reference's own outputs."""
 
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,20 +55,6 @@ class RunOptions(_Reported):
 
 
 @dataclass
-class GenerateOptions:
-    """Recompute all cases and compare with the folder; exit code 1 if anything differs."""
-
-    golden: Annotated[Path | None, Option("DIR")] = None
-    """folder of the golden cases"""
-    within_tolerance: bool = False
-    """accept other bits within the float64 tolerance also on the class of machine that wrote the vectors"""
-    json: JsonFile = None
-    """also write the differences as JSON"""
-    write: bool = False
-    """replace the vectors, print which expected values changed, and still end with exit code 1"""
-
-
-@dataclass
 class ReferenceOptions:
     """Write the reference's own outputs; with --requests, as a port that reads the requests alone."""
 
@@ -84,24 +69,10 @@ class ReferenceOptions:
     """folder of the golden cases"""
 
 
-@dataclass
-class WrongPortOptions:
-    """Write the outputs of a deliberately wrong port, in float64; without a name, list all mistakes."""
-
-    name: Annotated[str, Option("[FLAG]", positional=True)] = ""
-    outdir: Outdir = Path()
-    golden: Annotated[Path | None, Option("DIR")] = None
-    """folder of the golden cases"""
-    json: JsonFile = None
-    """also write the mistake, or the list of them, as JSON"""
-
-
 DOORS = {
     "judge": "judge a folder of outputs",
     "run": "call a port's command and judge its outputs",
     "reference": "write the reference's own outputs in the same form",
-    "negative": "write the outputs of a deliberately wrong port",
-    "generate": "check the vectors against a fresh computation; --write replaces them",
 }
 
 
@@ -169,28 +140,9 @@ def _tell(report, golden, outdir: Path, options: _Reported) -> int:
     return 0 if accepted else 1
 
 
-def _generate(words: list[str]) -> int:
-    from endotsr.golden.judge.store import golden_folder
-    from endotsr.golden.vectors.generate import check, write
-
-    options = parse(GenerateOptions, words, "golden generate")
-    refuse_unwritable(options.json)
-    folder = golden_folder(options.golden)
-    if options.write:
-        lines = write(folder)
-        write_result(options.json, folder=folder, written=True, changes=lines)
-        print("\n".join(lines) or "no expected value moved")
-        print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
-        return 1
-    lines, summary = check(folder, bitwise=not options.within_tolerance)
-    write_result(options.json, folder=folder, written=False, changes=lines, summary=summary)
-    print("\n".join([*lines, f"golden: {summary}, {len(lines)} differ"]))
-    return 1 if lines else 0
-
-
 def _reference(words: list[str]) -> int:
     from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.vectors.reference import answer_all, answer_requests
+    from endotsr.golden.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
     refuse_unwritable(options.json)
@@ -200,24 +152,4 @@ def _reference(words: list[str]) -> int:
         count = answer_all(read_golden(golden_folder(options.golden)), options.outdir, options.precision)
     print(f"golden: {count} cases answered in {options.outdir}")
     write_result(options.json, cases=count, folder=options.outdir)
-    return 0
-
-
-def _negative(words: list[str]) -> int:
-    from endotsr.golden.judge.store import golden_folder, read_golden
-    from endotsr.golden.vectors.reference import answer_wrongly
-    from endotsr.golden.vectors.registry import all_wrong_ports
-
-    options = parse(WrongPortOptions, words, "golden negative")
-    refuse_unwritable(options.json)
-    known = all_wrong_ports()
-    if not options.name:
-        print("\n".join(f"{w.flag}: {w.title} ({w.wrong})" for w in known.values()))
-        write_result(options.json, mistakes={w.flag: {"title": w.title, "wrong": w.wrong} for w in known.values()})
-        return 0
-    if options.name not in known or options.outdir == Path():
-        raise InputError("golden negative: give the FLAG of a mistake (without arguments: a list) and OUTDIR")
-    count = answer_wrongly(read_golden(golden_folder(options.golden)), options.outdir, known[options.name])
-    print(f"golden: {count} cases answered wrongly in {options.outdir}")
-    write_result(options.json, mistake=options.name, cases=count, folder=options.outdir)
     return 0

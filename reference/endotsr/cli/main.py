@@ -37,7 +37,7 @@ COMMANDS = {
     "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
     "tradeoff": "measure error against time, and find the best setting within a budget",
     "completion": "print a script that completes commands and options in bash, zsh or fish",
-    "golden": "golden vectors for ports: judge outputs, run a port, check the vectors",
+    "golden": "golden vectors for ports: judge outputs, run a port, answer as the reference",
 }
 
 OTHER_PROGRAMS = "end other programs that hold memory"

@@ -1,6 +1,6 @@
 """Single mistakes for the reference in the image losses, exposure and correction of poses; see in_reference.py."""
 
-from endotsr.golden.vectors.wrong import WrongPort, edit, port
+from makers.wrong import WrongPort, edit, port
 
 L1, SSIM, DEPTH, SMOOTH = "losses.masked_l1", "losses.masked_ssim", "losses.depth", "losses.smoothness"
 EXPOSURE, POSE = "equations.exposure", "equations.pose"

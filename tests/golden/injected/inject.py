@@ -28,15 +28,17 @@ from endotsr.golden.judge.command import run_port, write_requests
 from endotsr.golden.judge.npy import write_npy
 from endotsr.golden.judge.store import Golden, golden_folder, in_precision, read_golden
 from endotsr.golden.judge.verdict import Report, conclude, judge, judge_case
-from endotsr.golden.vectors.copies import changed_copy
-from endotsr.golden.vectors.reference import stored
-from endotsr.golden.vectors.registry import all_wrong_ports
+from endotsr.golden.reference import stored
 from endotsr.runs.files import write_json
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[3] / "golden"))
 import autodiff
 import c99
 import in_reference
+
+from makers.copies import changed_copy
+from makers.registry import all_wrong_ports
 
 SOURCES = golden_folder() / "ports" / "c99"
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.golden.vectors.copies import changed_text
-from endotsr.golden.vectors.registry import FAMILIES, all_wrong_ports, families
+from makers.copies import changed_text
+from makers.registry import FAMILIES, all_wrong_ports, families
 
 sys.path.insert(0, str(Path(__file__).parent))
 import autodiff

@@ -13,7 +13,7 @@ from endotsr.golden.judge.npy import npy_bytes, read_plain
 from endotsr.golden.judge.report import as_table
 from endotsr.golden.judge.store import golden_folder, read_golden
 from endotsr.golden.judge.verdict import judge
-from endotsr.golden.vectors.reference import answer_all
+from endotsr.golden.reference import answer_all
 
 
 @pytest.fixture(scope="module")

@@ -37,8 +37,8 @@ def test_the_judge_imports_numpy_msgspec_errors_checks_of_files_and_itself():
 
 
 def test_what_is_foreign_is_told_apart():
-    assert foreign({"endotsr.equations", "endotsr.golden", "endotsr.golden.vectors.making", "numba"}) == {
-        "endotsr.equations", "endotsr.golden", "endotsr.golden.vectors.making", "numba",
+    assert foreign({"endotsr.equations", "endotsr.golden", "endotsr.golden.reference", "numba"}) == {
+        "endotsr.equations", "endotsr.golden", "endotsr.golden.reference", "numba",
     }  # fmt: skip
     assert foreign({"endotsr.golden.judge.npy", "numpy.typing", "collections.abc"}) == set()
 

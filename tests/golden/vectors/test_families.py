@@ -3,12 +3,13 @@
 import msgspec
 import pytest
 
+from endotsr.golden.contract import all_operations
 from endotsr.golden.judge.format import Manifest, read_struct
 from endotsr.golden.judge.store import golden_folder
-from endotsr.golden.vectors import registry
-from endotsr.golden.vectors.files import rendered_files
-from endotsr.golden.vectors.generate import solve_these
-from endotsr.golden.vectors.registry import FAMILIES, all_operations, all_specs, all_wrong_ports, families
+from makers import registry
+from makers.files import rendered_files
+from makers.generate import solve_these
+from makers.registry import FAMILIES, all_specs, all_wrong_ports, families
 
 PUBLISHED = read_struct(golden_folder() / "manifest.json", Manifest)
 

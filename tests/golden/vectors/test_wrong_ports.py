@@ -4,12 +4,13 @@ import sys
 
 import pytest
 
+import make
+from endotsr.golden.contract import all_operations
 from endotsr.golden.judge.store import golden_folder, read_golden
 from endotsr.golden.judge.verdict import conclude, judge_case
-from endotsr.golden.vectors.copies import Edit, changed_text
-from endotsr.golden.vectors.reference import answer_wrongly
-from endotsr.golden.vectors.registry import all_operations, all_wrong_ports
-from endotsr.golden.vectors.wrong import Question, answers
+from makers.copies import Edit, changed_text
+from makers.registry import all_wrong_ports
+from makers.wrong import Question, answer_wrongly, answers
 
 WRONG_PORTS = all_wrong_ports()
 
@@ -90,3 +91,16 @@ def test_no_integer_or_boolean_is_the_fingerprint_of_two_mistakes(golden):
             shown = [m.shows[output] for m in case.mistakes.values() if output in m.shows]
             prints = [one.fingerprint for one in shown if one.fingerprint is not None and one.distance is not None]
             assert len(set(prints)) == len(prints), (case.name, output)
+
+
+def test_mistakes_are_listed_and_written(tmp_path, capsys):
+    """The list of flags.json; the outputs of one port; a flag that is not known is refused."""
+    assert make.main(["wrong"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said == [f"{port.flag}: {port.title} ({port.wrong})" for port in WRONG_PORTS.values()]
+    assert make.main(["wrong", "l1_over_all_pixels", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.startswith("golden: 5 cases answered wrongly in ")
+    assert (tmp_path / "out" / "motion" / "generic" / "translation.npy").is_file()
+    for words in (["no_such_flag", str(tmp_path)], ["l1_over_all_pixels"]):
+        with pytest.raises(SystemExit, match="give the FLAG of a mistake"):
+            make.main(["wrong", *words])

@@ -1,0 +1,76 @@
+"""Make the golden vectors of this folder, and ports that each make one mistake.
+
+    python golden/make.py check [--within-tolerance] [--golden DIR]    compare the files with a fresh computation
+    python golden/make.py write [--golden DIR]                         replace the files, and print what moved
+    python golden/make.py wrong                                        list the mistakes
+    python golden/make.py wrong FLAG OUTDIR [--golden DIR]             write what a port with this mistake answers
+
+`check` compares bit by bit on the class of machine that the manifest names, and elsewhere, or with
+`--within-tolerance`, within the float64 tolerance. It ends with exit code 1 if anything differs. `write` always ends
+with exit code 1, so that no test run rewrites its own expected values. `wrong` writes in float64.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from endotsr.errors import InputError
+from endotsr.golden.judge.store import golden_folder, read_golden
+from makers.generate import check, write
+from makers.registry import all_wrong_ports
+from makers.wrong import answer_wrongly
+
+HERE = Path(__file__).parent
+
+
+def run_check(options: argparse.Namespace) -> int:
+    """Compare the folder with a fresh computation."""
+    lines, summary = check(golden_folder(options.golden), bitwise=not options.within_tolerance)
+    print("\n".join([*lines, f"golden: {summary}, {len(lines)} differ"]))
+    return 1 if lines else 0
+
+
+def run_write(options: argparse.Namespace) -> int:
+    """Replace the generated files of the folder."""
+    folder = golden_folder(options.golden)
+    lines = write(folder)
+    print("\n".join(lines) or "no expected value moved")
+    print(f"golden: written, {len(lines)} changes; if values moved, raise {folder / 'VERSION'}", file=sys.stderr)
+    return 1
+
+
+def run_wrong(options: argparse.Namespace) -> int:
+    """List the mistakes, or write the outputs of a port that makes one. Raises: InputError for an unknown flag."""
+    known = all_wrong_ports()
+    if options.flag is None:
+        print("\n".join(f"{port.flag}: {port.title} ({port.wrong})" for port in known.values()))
+        return 0
+    if options.flag not in known or options.outdir is None:
+        raise InputError("wrong: give the FLAG of a mistake (without arguments: a list) and OUTDIR")
+    count = answer_wrongly(read_golden(golden_folder(options.golden)), options.outdir, known[options.flag])
+    print(f"golden: {count} cases answered wrongly in {options.outdir}")
+    return 0
+
+
+def main(words: list[str]) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for name, call in {"check": run_check, "write": run_write, "wrong": run_wrong}.items():
+        command = commands.add_parser(name, help=call.__doc__)
+        command.add_argument("--golden", type=Path, metavar="DIR", default=HERE, help="folder of the golden cases")
+        command.set_defaults(call=call)
+        if name == "check":
+            command.add_argument("--within-tolerance", action="store_true", help="accept other bits on any machine")
+        if name == "wrong":
+            command.add_argument("flag", nargs="?", metavar="FLAG", help="name of the mistake")
+            command.add_argument("outdir", nargs="?", type=Path, metavar="OUTDIR", help="folder for the outputs")
+    options = parser.parse_args(words)
+    try:
+        return options.call(options)
+    except InputError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,69 @@
+"""Family `appearance`: equation (2), the bounded colour residual beta tanh(A phi_bar) / Y00.
+
+Coefficients A, normalised atoms and a gradient by the residual come in. The cases separate the factor 1 / Y00 from the
+bound, show that zero coefficients still have a gradient, and saturate the tanh.
+"""
+
+from makers.making import Seeds, Spec
+from makers.wrong import edit, port
+
+OPERATIONS = ("appearance",)
+
+
+def cases() -> list[Spec]:
+    """Coefficients of three sizes."""
+    out = []
+    for case, size, title, flags in (
+        ("generic", 0.4, "beta tanh(A phi_bar) / Y00", ("missing_y00", "tanh_missing")),
+        ("zero", 0.0, "Zero coefficients: no residual, but a gradient", ("zero_coefficients_zero_gradient",)),
+        ("saturated", 4.0, "A saturated residual keeps its bound and its derivative",
+         ("tanh_missing", "missing_y00", "tanh_gradient_missing")),
+    ):  # fmt: skip
+        seeds = Seeds("appearance", case)
+        inputs = {
+            "appearance_coefficients": seeds.uniform("colour_coefficients", -size, size, 3, 6, 7),
+            "phi_bar": seeds.uniform("phi_bar", -1.5, 1.5, 6),
+            "d_residual": seeds.uniform("d_residual", -1.0, 1.0, 3, 7),
+        }
+        out.append(Spec("appearance", case, "appearance", title, flags, {"beta": 0.3}, inputs))
+    return out
+
+
+# ---- mistakes ----
+
+SOURCE = "equations.appearance"
+
+WRONG_PORTS = [
+    port(
+        "missing_y00",
+        "1 / Y00 missing in the colour residual",
+        "beta tanh; right: beta tanh / Y00",
+        "appearance scene",
+        edit(SOURCE, "type(beta / Y00)", "type(beta)"),
+    ),
+    port(
+        "tanh_missing",
+        "Colour residual not bounded",
+        "beta A phi_bar; right: beta tanh(A phi_bar)",
+        "appearance scene",
+        edit(SOURCE, "v, d = _tanh_and_slope_kernel(x[k])", "v, d = x[k], type(x[k])(1)"),
+    ),
+    port(
+        "tanh_gradient_missing",
+        "Derivative of tanh left out",
+        "1; right: 1 - tanh^2",
+        "appearance",
+        edit(SOURCE, "derivative[k] = scale * d", "derivative[k] = scale"),
+    ),
+    port(
+        "zero_coefficients_zero_gradient",
+        "No gradient to zero coefficients",
+        "component skipped while it is 0; right: its gradient starts it",
+        "appearance",
+        edit(
+            SOURCE,
+            "    d_argument = argument_gradient(d_residual, saved)\n",
+            "    d_argument = argument_gradient(d_residual, saved) * saved.appearance_coefficients.any()\n",
+        ),
+    ),
+]

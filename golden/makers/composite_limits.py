@@ -1,0 +1,210 @@
+"""Family `composite`, its thresholds: the cutoff and the clamp of alpha, and the stop at small transmittance (B5).
+
+Most cases are flat over the image, so that every pixel takes the same decision. The values lie just below, at and above
+a threshold. Two cases are exactly on the cutoff, where rounding may decide either way: in one, some pixels may flip; in
+the other, image and gradient have to take the same decision.
+"""
+
+import math
+
+from endotsr.splatting.settings import LEGACY, PAPER
+from makers.copies import Edit
+from makers.making import Made, Seeds, Spec, changed, given
+from makers.screens import flat_covariance, raster_settings, screen_inputs
+from makers.views import logit_of
+from makers.wrong import edit, port, with_raster
+
+OPERATIONS = ("composite",)
+CUTOFF = 1 / 255
+
+
+def _flat(case: str, opacity: list[float], depth: list[float]) -> dict[str, Made]:
+    inputs = screen_inputs(Seeds("composite", case), len(opacity), 4.0, 90.0)
+    inputs |= {"covariance2d": flat_covariance(len(opacity)), "opacity_logit": logit_of(opacity)}
+    return inputs | {"depth": given(depth, ", ".join(map(str, depth)), "scene unit")}
+
+
+def _around_thresholds() -> list[Spec]:
+    near, cut, paper = [3.0, 4.0, 5.0, 6.0, 7.0], CUTOFF, raster_settings(PAPER)
+    return [
+        Spec("composite", "alpha_cutoff", "composite", "Alpha a thousandth below and above 1/255",
+             ("cutoff_missing", "cutoff_1_over_256"), paper,
+             _flat("alpha_cutoff", [cut * 0.999, cut * 1.001, cut * 0.998, cut * 1.002, 0.3], near)),
+        Spec("composite", "alpha_clamp", "composite", "Alpha below, at and above 0.99: gradient 0 where clamped",
+             ("alpha_clamp_999", "alpha_clamp_missing", "clamped_alpha_gradient"), paper,
+             _flat("alpha_clamp", [0.9895, 0.99002, 0.9985, 0.5, 0.9999], [7.0, 6.0, 5.0, 3.0, 4.0])),
+        Spec("composite", "transmittance_stop", "composite", "Stop before T falls below 1e-4, not after",
+             ("stop_missing", "stop_after", "stop_at_1e-3"), paper,
+             _flat("transmittance_stop", [0.98, 0.98, 0.7, 0.1, 0.9, 0.6], [*near, 8.0]),
+             without=("d_mean2d", "d_covariance2d")),
+        _stop_ends_pixel(),
+        _legacy_clamp(),
+    ]  # fmt: skip
+
+
+def _stop_ends_pixel() -> Spec:
+    """Five Gaussians in the order of the index; the third stops every pixel."""
+    inputs = _flat("stop_ends_pixel", [0.98, 0.98, 0.9, 0.5, 0.1], [3.0, 4.0, 5.0, 6.0, 7.0])
+    inputs["depth"] = given([3.0, 4.0, 5.0, 6.0, 7.0], "3, 4, 5, 6, 7", "scene unit")
+    title = "A weak Gaussian behind the one that stops is not drawn"
+    return Spec("composite", "stop_ends_pixel", "composite", title, ("stop_skips", "stop_after"),
+                raster_settings(PAPER), inputs,
+                without=("d_mean2d", "d_covariance2d"))  # fmt: skip
+
+
+def _legacy_clamp() -> Spec:
+    inputs = screen_inputs(Seeds("composite", "legacy_clamp"), 5, 60.0, 400.0)
+    inputs["opacity_logit"] = logit_of([0.9999, 0.995, 0.9, 0.999, 0.5])
+    return Spec("composite", "legacy_clamp", "composite", "Preset legacy: the gradient passes the clamp of alpha",
+                ("clamp_blocks_legacy",), raster_settings(LEGACY), inputs)  # fmt: skip
+
+
+def _on_the_cutoff() -> Spec:
+    """Peaks at 1/255, each at a pixel centre."""
+    inputs = screen_inputs(Seeds("composite", "on_the_cutoff"), 5, 4.0, 6.0)
+    middles = [[2.5, 6.5, 9.5, 13.5, 16.5], [3.5, 9.5, 5.5, 10.5, 2.5]]
+    inputs |= {"mean2d": given(middles, "pixel centres", "px"), "opacity_logit": logit_of([CUTOFF] * 5)}
+    names = ("mean2d", "covariance2d", "opacity_logit", "colour", "depth", "background")
+    return Spec("composite", "on_the_cutoff", "composite", "Peaks of alpha at 1/255: each may be drawn or not",
+                ("cutoff_missing",), raster_settings(PAPER), inputs, ("opacity_logit", "mean2d", "covariance2d"),
+                without=tuple(f"d_{name}" for name in names), flip_budget=5)  # fmt: skip
+
+
+def _one_on_the_cutoff() -> Spec:
+    """One decision that rounding may take either way and that determines the whole answer, gradients included."""
+    inputs, settings = screen_inputs(Seeds("composite", "one_on_the_cutoff"), 3, 4.0, 90.0), raster_settings(PAPER)
+    one = (slice(None), 1)
+    inputs["mean2d"] = changed(inputs["mean2d"], one, [9.5, 6.5], "[:, 1] is (9.5, 6.5), a pixel centre")
+    inputs["covariance2d"] = changed(inputs["covariance2d"], one, [1.5, 0.25, 2.0], "[:, 1] is 1.5, 0.25, 2")
+    inputs["opacity_logit"] = changed(
+        inputs["opacity_logit"], 1, -math.log(254.0), "[1] is -log 254, rounded: opacity 1/255 - 7e-10"
+    )
+    drawn = settings | {"raster": settings["raster"] | {"alpha_cutoff": (1 - 1e-5) / 255}}
+    title = "One peak of alpha at 1/255: drawn or not, but the same in image and gradient"
+    return Spec("composite", "one_on_the_cutoff", "composite", title, ("cutoff_decided_twice",), settings, inputs,
+                ("opacity_logit", "mean2d", "covariance2d"), either=(drawn,))  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """Values around each threshold, then on the cutoff."""
+    return [*_around_thresholds(), _on_the_cutoff(), _one_on_the_cutoff()]
+
+
+# ---- mistakes ----
+
+SOURCE = "splatting.compositing"
+BOTH = "composite render objective"
+STOP = "                    if behind < stop:\n                        break\n"
+AFTER = "                    {0} = behind\n"
+
+
+def _deviation(name: str, value: bool) -> Edit:
+    return with_raster(f"deviations=found.deviations._replace({name}={value})")
+
+
+WRONG_PORTS = [
+    port(
+        "clamped_alpha_gradient",
+        "Gradient passes the clamp of alpha",
+        "passed; right: 0 where clamped",
+        BOTH,
+        _deviation("pass_clamped_alpha", True),
+    ),
+    port(
+        "cutoff_missing",
+        "No alpha cutoff",
+        "every alpha; right: from 1/255 on",
+        BOTH,
+        with_raster("alpha_cutoff=1e-9 if found.alpha_cutoff > 0 else 0.0"),
+    ),
+    port(
+        "cutoff_1_over_256",
+        "Alpha cutoff of 1/256",
+        "1/256; right: 1/255",
+        BOTH,
+        with_raster("alpha_cutoff=1 / 256 if found.alpha_cutoff > 0 else 0.0"),
+    ),
+    port(
+        "cutoff_decided_twice",
+        "Cutoff decided anew in the reverse pass",
+        "in the image, but without gradient; right: one decision",
+        "composite",
+        edit(
+            "splatting.binning", "math.log(settings.alpha_cutoff) if", "math.log(settings.alpha_cutoff * (1 - 1e-4)) if"
+        ),
+        edit(
+            SOURCE,
+            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff:",
+            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff * decided:",
+            2,
+        ),
+        edit(
+            SOURCE,
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = depth.shape\n",
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 - 1e-5\n "
+            "   height, width = depth.shape\n",
+        ),
+        edit(
+            SOURCE,
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = d_depth.shape\n",
+            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 + 1e-5\n "
+            "   height, width = d_depth.shape\n",
+        ),
+    ),
+    port(
+        "cutoff_added",
+        "Alpha cutoff in preset exact",
+        "1/255; right: none",
+        BOTH,
+        with_raster("alpha_cutoff=found.alpha_cutoff or 1 / 255"),
+    ),
+    port(
+        "alpha_clamp_999",
+        "Alpha clamped at 0.999",
+        "0.999; right: 0.99",
+        BOTH,
+        with_raster("alpha_max=0.999 if found.alpha_max < 1 else 1.0"),
+    ),
+    port("alpha_clamp_missing", "Alpha not clamped", "up to 1; right: 0.99", BOTH, with_raster("alpha_max=1.0")),
+    port(
+        "stop_missing",
+        "No stop at small transmittance",
+        "all Gaussians; right: stop before T < 1e-4",
+        BOTH,
+        with_raster("transmittance_stop=0.0"),
+    ),
+    port(
+        "stop_at_1e-3",
+        "Stop at a transmittance of 1e-3",
+        "1e-3; right: 1e-4",
+        BOTH,
+        with_raster("transmittance_stop=10 * found.transmittance_stop"),
+    ),
+    port(
+        "stop_after",
+        "Stop after T fell below 1e-4",
+        "one Gaussian too many; right: stop before",
+        "composite render",
+        edit(SOURCE, STOP, "", 2),
+        edit(
+            SOURCE,
+            "                    t = behind\n",
+            "                    t = behind\n                    if t < stop:\n                        break\n",
+            2,
+        ),
+    ),
+    port(
+        "stop_skips",
+        "The Gaussian that stops a pixel skipped",
+        "goes on behind it; right: the pixel ends",
+        "composite render",
+        edit(SOURCE, STOP, STOP.replace("break", "continue"), 2),
+    ),
+    port(
+        "clamp_blocks_legacy",
+        "Clamp of alpha blocks the gradient in preset legacy",
+        "0; right: passed",
+        BOTH,
+        _deviation("pass_clamped_alpha", False),
+    ),
+]

@@ -1,0 +1,92 @@
+"""Family `deformation`: the offsets of the flexible deformation model (B1) at one time, in both time bases.
+
+Weights, centres, widths, a time and a gradient by the offsets come in. The cases fix the two bases, that the sign of a
+width matters to its gradient only, and the floor of a squared width.
+"""
+
+import numpy as np
+
+from makers.making import Seeds, Spec, changed, given, scalar
+from makers.wrong import edit, port
+
+OPERATIONS = ("deformation",)
+
+
+def cases() -> list[Spec]:
+    """Both time bases, and widths of 0."""
+    out = []
+    shape, t = (10, 3, 5), 0.453125
+    for basis in ("quartic", "gaussian"):
+        seeds = Seeds("deformation", basis)
+        centre = seeds.uniform("fdm_centre", 0.25, 0.65, *shape)
+        inputs = {
+            "fdm_weight": seeds.uniform("fdm_weight", -1.0, 1.0, *shape, unit="raw parameter"),
+            "fdm_centre": centre,
+            "fdm_width": changed(seeds.uniform("fdm_width", 0.08, 0.3, *shape), (slice(None), 1),
+                                 -seeds.uniform("fdm_width", 0.08, 0.3, *shape).array[:, 1], "basis 1 negated"),
+            "t": scalar(t),
+            "d_offsets": seeds.uniform("d_offsets", -1.0, 1.0, 10, 5),
+        }  # fmt: skip
+        flags = ("basis_swapped", "width_without_floor", "width_gradient_of_size", "time_gradient_sign",
+                 *(("basis_gaussian_without_half",) if basis == "gaussian" else ()))  # fmt: skip
+        title = f"The {basis} time basis; the sign of a width does not matter, its gradient has it"
+        out.append(Spec("deformation", basis, "deformation", title, flags, {"basis": basis}, inputs))
+    seeds = Seeds("deformation", "width_zero")
+    inputs = {
+        "fdm_weight": seeds.uniform("fdm_weight", -1.0, 1.0, 10, 2, 3),
+        "fdm_centre": given(np.full((10, 2, 3), 0.4921875), "63/128"),
+        "fdm_width": given(np.zeros((10, 2, 3)), "0"),
+        "t": scalar(0.5),
+        "d_offsets": seeds.uniform("d_offsets", -1.0, 1.0, 10, 3),
+    }
+    out.append(Spec("deformation", "width_zero", "deformation", "A width of 0 is finite: its square has a floor",
+                    ("width_without_floor",), {"basis": "quartic"}, inputs))  # fmt: skip
+    return out
+
+
+# ---- mistakes ----
+
+SOURCE = "equations.deformation"
+BOTH = "deformation scene"
+
+WRONG_PORTS = [
+    port(
+        "basis_swapped",
+        "The other time basis",
+        "Gaussian for quartic or back",
+        BOTH,
+        edit(SOURCE, 'basis == "quartic"', 'basis != "quartic"', 2),
+    ),
+    port(
+        "basis_gaussian_without_half",
+        "Gaussian basis without its 1/2",
+        "exp(-x^2 / S); right: exp(-x^2 / (2 S))",
+        BOTH,
+        edit(
+            SOURCE,
+            "return real(-0.5 * LOG2_E), real(0), real(1), real(2 * LARGEST_U), real(1)",
+            "return real(-LOG2_E), real(0), real(1), real(LARGEST_U), real(2)",
+        ),
+    ),
+    port(
+        "width_without_floor",
+        "Squared width without its floor",
+        "s^2; right: s^2 + 1e-4",
+        BOTH,
+        edit(SOURCE, "WIDTH_FLOOR = 1e-4", "WIDTH_FLOOR = 0.0"),
+    ),
+    port(
+        "width_gradient_of_size",
+        "Gradient by the size of the width",
+        "sign lost; right: that of the width",
+        "deformation",
+        edit(SOURCE, "common * u * (width[i] * inverse)", "common * u * (abs(width[i]) * inverse)"),
+    ),
+    port(
+        "time_gradient_sign",
+        "Gradient by time with the sign of the centre",
+        "+; right: minus the sum",
+        "deformation",
+        edit(SOURCE, "-float(row_sums.sum())", "float(row_sums.sum())"),
+    ),
+]

@@ -1,0 +1,270 @@
+"""Family `density`: density control (B11), the statistics of some views and one densification.
+
+Raw parameters, screen gradients and visibility by view, the noise of splits and camera poses come in. The cases fix
+which Gaussians are pruned, cloned and split, in which order the new Gaussians follow, which candidates are taken when
+there is no room for all, the extent of moving cameras, and on which side of a threshold its own value lies.
+"""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from endotsr.config import DensityConfig
+from makers.making import Made, Seeds, Spec, changed, given, permutation
+from makers.views import pose
+from makers.wrong import edit, port
+
+OPERATIONS = ("density",)
+VIEWS, COUNT = 3, 12
+
+
+def _screen_gradients(seeds: Seeds) -> dict[str, Made]:
+    """Two thirds of the Gaussians are steep; 0 is never visible, 1 is exactly on the threshold of 1/4."""
+    d_mean = seeds.uniform("d_mean2d", -1.0, 1.0, VIEWS, 2, COUNT, unit="loss per px")
+    steep = np.where(permutation(seeds.seed("steep"), COUNT) % 3 > 0, 2.0**-3, 2.0**-8)
+    d_mean = changed(d_mean, ..., d_mean.array * steep, "times 2^-3, or 2^-8 where rank % 3 = 0 of the words of " +
+                     seeds.seed("steep"))  # fmt: skip
+    visible = (np.add.outer(np.arange(VIEWS), np.arange(COUNT)) % 4) != 1
+    visible[:, 0], visible[:, 1] = False, [True, False, True]
+    on = np.zeros((VIEWS, 2))
+    on[:, 0] = [2.0**-5, 1.0, -(2.0**-5)]
+    d_mean = changed(d_mean, (slice(None), slice(None), 1), on, "[:, :, 1] is (1/32, 0), (1, 0), (-1/32, 0)")
+    recipe = "(v + n) % 4 != 1; Gaussian 0 never, Gaussian 1 in views 0 and 2"
+    return {"d_mean2d": d_mean, "visible": given(visible, recipe)}
+
+
+def _inputs(seeds: Seeds, moving: bool) -> dict[str, Made]:
+    """An image of 16 x 8 pixels; a Gaussian of log-scale 0 is larger than a hundredth of the extent."""
+    large = np.where(permutation(seeds.seed("large"), COUNT) % 2 > 0, 0.0, -4.0)
+    scale = seeds.uniform("log_scale", -0.5, 0.5, 3, COUNT)
+    logit = seeds.uniform("opacity_logit", -1.0, 2.0, COUNT)
+    shift = np.stack([np.array([0.5 * k, -0.25 * k, 0.125]) for k in range(VIEWS)]) * moving
+    turned = pose()["rotation_matrix"]
+    return {
+        "position": seeds.uniform("position", -2.0, 2.0, 3, COUNT, unit="scene unit"),
+        "quaternion": changed(seeds.uniform("quaternion", -1.0, 1.0, 4, COUNT), (slice(None), 5), 0.0,
+                              "quaternion 5 is 0"),
+        "log_scale": changed(scale, ..., scale.array + large, "minus 4 where rank % 2 = 0 of the words of " +
+                             seeds.seed("large")),
+        "opacity_logit": changed(logit, slice(2, None, 5), -6.0, "[2::5] is -6: pruned"),
+        **_screen_gradients(seeds),
+        "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, COUNT),
+        "rotation_matrices": given(np.stack([turned.array] * VIEWS), f"{turned.recipe} for all"),
+        "translations": given(shift, "(k / 2, -k / 4, 1 / 8)" if moving else "0", "scene unit"),
+    }  # fmt: skip
+
+
+def _decisions() -> list[Spec]:
+    def spec(case: str, title: str, flags: tuple[str, ...], moving=False, change=None, **config: Any) -> Spec:
+        inputs = _inputs(Seeds("density", case), moving)
+        if change:
+            change(inputs)
+        density = msgspec.to_builtins(DensityConfig(gradient_threshold=0.25, extent=30.0, **config))
+        settings = {"width": 16, "height": 8, "density": density | ({"extent": "cameras"} if moving else {})}
+        return Spec("density", case, "density", title, flags, settings, inputs, ("d_mean2d",))
+
+    def tie(inputs: dict[str, Made]) -> None:
+        d = inputs["d_mean2d"]
+        d = changed(d, ..., d.array[:, :, :1] * 0 + 2.0**-3, "1/8 everywhere: all equally steep")
+        inputs["d_mean2d"] = changed(d, (slice(None), slice(None), [8, 10]), 0.25, "Gaussians 8, 10: 1/4, the steepest")
+
+    def faint(inputs: dict[str, Made]) -> None:
+        inputs["opacity_logit"] = changed(inputs["opacity_logit"], ..., -7.0, "all -7")
+
+    flags = ("density_over_all_views", "density_sum_of_views", "clone_and_split_swapped",
+             "faint_ones_densified", "split_parent_kept", "children_not_smaller", "children_interleaved",
+             "children_inherit_moments", "children_not_turned", "densify_threshold_in_pixels",
+             "screen_gradient_without_half",
+             "density_norm_of_sum")  # fmt: skip
+    return [
+        spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand", flags),
+        spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",), change=tie,
+             maximum=14),
+        spec("extent_of_cameras", "The extent that divides clones from splits, from moving cameras",
+             ("extent_without_margin",), moving=True, dense_fraction=0.5),
+        spec("all_pruned", "Nothing is left", ("faint_ones_densified",), change=faint),
+    ]  # fmt: skip
+
+
+def _on_the_thresholds() -> Spec:
+    """Opacity 1/2 at a prune threshold of 1/2, largest axis 1 at a limit of 1: neither is beyond."""
+    seeds, count = Seeds("density", "on_the_thresholds"), 6
+    noise, turned = seeds.uniform("split_noise", -1.5, 1.5, 2, 3, count), pose()["rotation_matrix"]
+    logit = seeds.uniform("opacity_logit", 0.5, 2.0, count)
+    scale = seeds.uniform("log_scale", -2.0, -0.5, 3, count)
+    inputs = {
+        "position": seeds.uniform("position", -2.0, 2.0, 3, count, unit="scene unit"),
+        "quaternion": seeds.uniform("quaternion", -1.0, 1.0, 4, count),
+        "log_scale": changed(scale, (0, slice(1, 4)), [0.0, 0.0, 0.25], "[0, 1:4] is 0, 0, 1/4"),
+        "opacity_logit": changed(logit, slice(0, 2), 0.0, "[0:2] is 0: opacity 1/2, the prune threshold"),
+        "d_mean2d": given(np.stack([np.full((2, count), 2.0**-4), np.full((2, count), 2.0**-5)]),
+                          "1/16 in view 0, 1/32 in view 1", "loss per px"),
+        "visible": given(np.ones((2, count), bool), "all True"),
+        "split_noise": noise,
+        "rotation_matrices": given(np.stack([turned.array] * 2), f"{turned.recipe} for all"),
+        "translations": given(np.zeros((2, 3)), "0"),
+    }  # fmt: skip
+    config = DensityConfig(gradient_threshold=0.25, extent=4.0, dense_fraction=0.25, prune_opacity=0.5)
+    settings = {"width": 24, "height": 10, "density": msgspec.to_builtins(config)}
+    flags = ("prune_at_the_threshold", "split_at_the_limit", "density_width_for_height")
+    return Spec("density", "on_the_thresholds", "density", "On the prune threshold it stays, on the size limit it is "
+                "cloned; W of x and H of y", flags, settings, inputs, ("log_scale", "opacity_logit"))  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """Decisions, their order, and values on the thresholds."""
+    return [*_decisions(), _on_the_thresholds()]
+
+
+# ---- mistakes ----
+
+SOURCE, STAGE = "scene.density_control", "stages.optimiser"
+BOTH = "density training"
+MEAN = "statistics.gradient_sum / np.maximum(statistics.visits, 1)"
+HALVES = "d_mean[0] * np.float64(0.5 * width), d_mean[1] * np.float64(0.5 * height)"
+OFFSET = "offset = np.stack([(rotation[row] * local).sum(axis=0) for row in range(3)])"
+
+WRONG_PORTS = [
+    port(
+        "densify_threshold_in_pixels",
+        "Screen gradient in pixels",
+        "per px; right: times half the image size",
+        BOTH,
+        edit(SOURCE, HALVES, "d_mean[0], d_mean[1]"),
+    ),
+    port(
+        "screen_gradient_without_half",
+        "Screen gradient times the whole image size",
+        "g_u W, g_v H; right: g_u W / 2, g_v H / 2",
+        BOTH,
+        edit(SOURCE, HALVES, "d_mean[0] * width, d_mean[1] * height"),
+    ),
+    port(
+        "density_width_for_height",
+        "Screen gradient scaled by W / 2 on both axes",
+        "W; right: W of x, H of y",
+        BOTH,
+        edit(SOURCE, "np.float64(0.5 * height)", "np.float64(0.5 * width)"),
+    ),
+    port(
+        "density_over_all_views",
+        "Screen gradient averaged over all views",
+        "over views; right: visible ones",
+        BOTH,
+        edit(SOURCE, "statistics.visits[:] += visible", "statistics.visits[:] += 1"),
+    ),
+    port(
+        "density_sum_of_views",
+        "Screen gradients added, not averaged",
+        "sum; right: mean over visible views",
+        BOTH,
+        edit(SOURCE, MEAN, "statistics.gradient_sum"),
+        edit(STAGE, MEAN, "statistics.gradient_sum"),
+    ),
+    port(
+        "density_norm_of_sum",
+        "Norm of the summed screen gradient",
+        "|sum g|; right: sum |g|",
+        "density",
+        edit(
+            SOURCE, "np.where(visible, np.sqrt(g_x * g_x + g_y * g_y), 0.0)", "np.where(visible, g_x + 1j * g_y, 0.0)"
+        ),
+        edit(
+            SOURCE, "DensityStatistics(np.zeros(count, np.float64)", "DensityStatistics(np.zeros(count, np.complex128)"
+        ),
+        edit(SOURCE, MEAN, "abs(statistics.gradient_sum) / np.maximum(statistics.visits, 1)"),
+        edit(STAGE, MEAN, "abs(statistics.gradient_sum) / np.maximum(statistics.visits, 1)"),
+    ),
+    port(
+        "clone_and_split_swapped",
+        "Large ones cloned, small ones split",
+        "swapped; right: small ones cloned",
+        BOTH,
+        edit(SOURCE, "candidates[small], candidates[~small]", "candidates[~small], candidates[small]"),
+    ),
+    port(
+        "faint_ones_densified",
+        "Faint Gaussians densified, not pruned",
+        "gradient first; right: pruned first",
+        BOTH,
+        edit(
+            SOURCE,
+            "    candidates = np.flatnonzero(alive",
+            "    alive |= steepness >= config.gradient_threshold\n    candidates = np.flatnonzero(alive",
+        ),
+    ),
+    port(
+        "split_parent_kept",
+        "Parent of a split kept",
+        "three Gaussians; right: two children",
+        BOTH,
+        edit(SOURCE, "    keep[split] = False\n", ""),
+    ),
+    port(
+        "children_not_smaller",
+        "Children as large as their parent",
+        "s; right: s - ln 1.6",
+        BOTH,
+        edit(SOURCE, "log_scale - np.log(SHRINK)", "log_scale"),
+    ),
+    port(
+        "children_not_turned",
+        "Children placed without the rotation of their parent",
+        "exp(s) n; right: R exp(s) n",
+        BOTH,
+        edit(SOURCE, OFFSET, "offset = local"),
+    ),
+    port(
+        "children_interleaved",
+        "Children of one parent side by side",
+        "first, second, first, ...; right: all first children, then all second",
+        BOTH,
+        edit(SOURCE, "*[split] * CHILDREN]", "np.repeat(split, CHILDREN)]"),
+        edit(
+            SOURCE,
+            "slice(first + child * split.size, first + (child + 1) * split.size)",
+            "slice(first + child, None, CHILDREN)",
+        ),
+    ),
+    port(
+        "children_inherit_moments",
+        "Children keep the moments of their parent",
+        "copied; right: zero",
+        BOTH,
+        edit(STAGE, "made.plan.source, made.plan.survivors)", "made.plan.source, made.plan.source.size)"),
+        edit(
+            "fitting.trainer",
+            "result.plan.source, result.plan.survivors)",
+            "result.plan.source, result.plan.source.size)",
+        ),
+    ),
+    port(
+        "first_candidates_win",
+        "First candidates take the room",
+        "by index; right: steepest first",
+        BOTH,
+        edit(SOURCE, 'np.argsort(-steepness[candidates], kind="stable")[:room]', "np.arange(room)"),
+    ),
+    port(
+        "extent_without_margin",
+        "Extent of the cameras without its margin",
+        "radius; right: 1.1 times",
+        BOTH,
+        edit(SOURCE, "CAMERA_MARGIN = 1.1", "CAMERA_MARGIN = 1.0"),
+    ),
+    port(
+        "prune_at_the_threshold",
+        "Pruned on the threshold",
+        "<=; right: <",
+        BOTH,
+        edit(SOURCE, "astype(np.float64) < bound", "astype(np.float64) <= bound"),
+    ),
+    port(
+        "split_at_the_limit",
+        "Split on the size limit",
+        ">=; right: >",
+        BOTH,
+        edit(SOURCE, "largest[candidates] <= config", "largest[candidates] < config"),
+    ),
+]

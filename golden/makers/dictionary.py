@@ -1,0 +1,148 @@
+"""Families `frequencies`, `dictionary` and `atoms`: equation (1), atoms of a time and their normalisation.
+
+Frequencies, a time and training stamps come in. The cases fix the order of sines and cosines, the factor 2 pi, the
+statistics (over distinct training stamps, of the centred atom) and the dead atom, which is 0 in value and in gradient.
+"""
+
+import numpy as np
+
+from makers.clock import omegas, stamps, train_index
+from makers.making import Made, Seeds, Spec, given, scalar
+from makers.wrong import edit, port
+
+OPERATIONS = ("frequencies", "dictionary", "atoms")
+
+
+def _frequencies() -> list[Spec]:
+    return [
+        Spec("frequencies", "published", "frequencies", "Eight log-spaced frequencies with exact ends",
+             ("frequencies_linear",), {"count": 8, "low": 1.0, "high": 16.0}, {}),
+        Spec("frequencies", "one", "frequencies", "One frequency is the lowest", (),
+             {"count": 1, "low": 2.0, "high": 16.0}, {}),
+    ]  # fmt: skip
+
+
+def _dictionary(case: str, t: float, omega: Made, title: str) -> Spec:
+    inputs = {"t": scalar(t), "omega": omega, "d_phi": Seeds("dictionary", case).uniform("d_phi", -1.0, 1.0, 10)}
+    flags = ("atoms_interleaved", "frequency_without_two_pi", "dictionary_gradient_sign")
+    return Spec("dictionary", case, "dictionary", title, flags, {}, inputs)
+
+
+def _atoms(
+    case: str, times: Made, train: Made, omega: Made, title: str, flags: tuple[str, ...], still: tuple[str, ...] = ()
+) -> Spec:
+    seeds = Seeds("atoms", case)
+    inputs = {
+        "times": times,
+        "train_index": train,
+        "omega": omega,
+        "phi": seeds.uniform("phi", -1.0, 1.0, 6),
+        "d_phi_bar": seeds.uniform("d_phi_bar", -1.0, 1.0, 6),
+    }
+    return Spec("atoms", case, "atoms", title, flags, {}, inputs, still)
+
+
+def cases() -> list[Spec]:
+    """Frequencies, atoms of one time, and normalised atoms; the last case repeats stamps."""
+    turns = given([1.0, 2.0, 3.0, 8.0, 16.0], "1, 2, 3, 8, 16", "cycles")
+    octaves = given([1.0, 4.0, 16.0], "1, 4, 16", "cycles per sequence")
+    repeated = np.arange(16) // np.array([1, 2])[np.arange(16) % 2] / 16
+    return [
+        *_frequencies(),
+        _dictionary("generic", 0.3671875, omegas(5), "Sines first, then cosines"),
+        _dictionary("quarter_turns", 0.25, turns, "Exact zeros at quarter turns"),
+        _atoms("generic", stamps(21), train_index(21), omegas(3, 8.0),
+               "Statistics over the training stamps only, RMS of the centred atom",
+               ("statistics_over_all_frames", "rms_not_centred", "atoms_not_normalised",
+                "atoms_not_centred")),
+        _atoms("dead_atom", stamps(32), train_index(32), octaves,
+               "sin(2 pi 16 k/32) is 0 at every stamp: the atom is dead, 0 in value and gradient",
+               ("dead_atom_amplified", "rms_not_centred"), ("times", "omega")),
+        _atoms("repeated_stamps", given(repeated, "k / 16 for even k, floor(k / 2) / 16 for odd k"),
+               given(np.arange(16), "all", "frame"), omegas(3, 5.0), "A stamp that is repeated counts once",
+               ("repeated_stamps_counted",), ("times",)),
+    ]  # fmt: skip
+
+
+# ---- mistakes ----
+
+SOURCE = "equations.dictionary"
+MOVING = "dictionary atoms scene objective"
+PAIRED = "np.stack([sine, cosine], axis=-1).reshape(*sine.shape[:-1], -1)"
+
+WRONG_PORTS = [
+    port(
+        "frequencies_linear",
+        "Frequencies spaced linearly",
+        "linspace; right: geomspace",
+        "frequencies scene objective",
+        edit(SOURCE, "np.geomspace(low, high, count)", "np.linspace(low, high, count)"),
+    ),
+    port(
+        "atoms_interleaved",
+        "Sines and cosines interleaved",
+        "[sin, cos, sin, ...]; right: all sines first",
+        MOVING,
+        edit(SOURCE, "np.concatenate([sine, cosine])", PAIRED),
+        edit(SOURCE, "np.concatenate([sine, cosine], axis=1)", PAIRED),
+        edit(SOURCE, "d_phi[:count] * saved.cosine - d_phi[count:]", "d_phi[::2] * saved.cosine - d_phi[1::2]"),
+    ),
+    port(
+        "frequency_without_two_pi",
+        "Frequency taken as angular",
+        "sin(w t); right: sin(2 pi w t)",
+        MOVING,
+        edit(SOURCE, "turn = phase - np.rint(phase)", "turn = phase / (2 * np.pi)"),
+        edit(SOURCE, "d_phase = 2.0 * np.pi * (", "d_phase = ("),
+    ),
+    port(
+        "dictionary_gradient_sign",
+        "Derivative of the cosine without its sign",
+        "+sin; right: -sin",
+        "dictionary",
+        edit(SOURCE, "saved.cosine - d_phi", "saved.cosine + d_phi"),
+    ),
+    port(
+        "statistics_over_all_frames",
+        "Atom statistics over test frames too",
+        "mean and RMS over all stamps; right: over the training stamps",
+        "atoms scene objective training",
+        edit("stages.requests", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]', 2),
+        edit("fitting.state", "sequence.times[sequence.train_index]", "sequence.times", 2),
+    ),
+    port(
+        "rms_not_centred",
+        "RMS of the atom itself",
+        "sqrt(mean phi^2); right: of phi - mean",
+        "atoms scene objective",
+        edit(SOURCE, "(column - m) ** 2", "column**2"),
+    ),
+    port(
+        "atoms_not_normalised",
+        "Atoms centred but not divided by their RMS",
+        "phi - mean; right: over RMS",
+        "atoms scene objective",
+        edit(SOURCE, "    phi_bar = (phi.astype", "    gain = np.ones_like(gain)\n    phi_bar = (phi.astype"),
+    ),
+    port(
+        "atoms_not_centred",
+        "Atoms divided by their RMS but not centred",
+        "phi / RMS; right: (phi - mean) / RMS",
+        "atoms scene objective",
+        edit(SOURCE, "(phi.astype(np.float64) - statistics.mean)", "phi.astype(np.float64)"),
+    ),
+    port(
+        "dead_atom_amplified",
+        "Dead atom divided by rounding noise",
+        "1 / rms; right: 0",
+        "atoms",
+        edit(SOURCE, "rms, rms < DEAD_RMS)", "rms, rms < 0)"),
+    ),
+    port(
+        "repeated_stamps_counted",
+        "Repeated stamps counted more than once",
+        "list; right: set of stamps",
+        "atoms",
+        edit(SOURCE, "np.unique(np.asarray(times, np.float64))", "np.asarray(times, np.float64)"),
+    ),
+]

@@ -1,0 +1,98 @@
+"""The generated files of `golden/` as bytes: cases, schemas, the list of mistakes, the manifest.
+
+A case or mistake that the manifest already lists keeps its place there, and a new one follows in the order of the
+families; a new version of the vectors differs from the last one in what was added or changed and in nothing else.
+"""
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable
+
+import msgspec
+import numpy as np
+
+from endotsr.golden.judge.format import SCHEMAS, FileEntry, FlagNote, Manifest, schema_text, to_json
+from endotsr.golden.judge.npy import header_of, npy_bytes
+from makers.solve import Solved
+from makers.wrong import WrongPort
+
+
+def machine_class() -> str:
+    """On machines of one class the reference gives the same bits."""
+    import llvmlite.binding
+    import numba
+
+    return (
+        f"{platform.machine()} {llvmlite.binding.get_host_cpu_name()} numpy {np.__version__} numba {numba.__version__}"
+    )
+
+
+def rendered_files(
+    solved: list[Solved], wrong_ports: dict[str, WrongPort], version: str, published: Manifest | None
+) -> dict[str, bytes]:
+    """Every generated file by its path within golden/, the manifest last, in the order of the published manifest."""
+    solved, wrong_ports = _in_published_order(solved, wrong_ports, published)
+    files: dict[str, bytes] = {}
+    for one in solved:
+        root = f"cases/{one.case.family}/{one.case.case}"
+        mistakes = {flag: one.case.mistakes[flag] for flag in wrong_ports if flag in one.case.mistakes}
+        files[f"{root}/case.json"] = to_json(msgspec.structs.replace(one.case, mistakes=mistakes)).encode()
+        for name, array in one.inputs.items():
+            files[f"{root}/inputs/{name}.npy"] = npy_bytes(array)
+        files |= {f"{root}/{path}": npy_bytes(array) for _, path, array in one.files()}
+    files |= {f"schemas/{name}.schema.json": schema_text(kind).encode() for name, kind in SCHEMAS.items()}
+    files["negative/flags.json"] = _flags_text(solved, wrong_ports).encode()
+    families: dict[str, tuple[str, ...]] = {}
+    for one in solved:
+        families[one.case.family] = (*families.get(one.case.family, ()), one.case.case)
+    manifest = Manifest(
+        version=version,
+        machine=machine_class(),
+        families=families,
+        flags={flag: FlagNote(title=w.title, wrong=w.wrong) for flag, w in wrong_ports.items()},
+        files=tuple(_entry(path, data) for path, data in files.items()),
+    )
+    return files | {"manifest.json": to_json(manifest).encode()}
+
+
+def _in_published_order(
+    solved: list[Solved], wrong_ports: dict[str, WrongPort], published: Manifest | None
+) -> tuple[list[Solved], dict[str, WrongPort]]:
+    if published is None:
+        return solved, wrong_ports
+    paths = [entry.path.split("/") for entry in published.files]
+    cases = [f"{path[1]}/{path[2]}" for path in paths if path[0] == "cases" and path[-1] == "case.json"]
+    by_name = {one.case.name: one for one in solved}
+    flags = _places_kept(wrong_ports, published.flags)
+    return [by_name[name] for name in _places_kept(by_name, cases)], {flag: wrong_ports[flag] for flag in flags}
+
+
+def _places_kept(names: Iterable[str], published: Iterable[str]) -> list[str]:
+    """The names in the published order, new ones last."""
+    place = {name: k for k, name in enumerate(published)}
+    return sorted(names, key=lambda name: place.get(name, len(place)))
+
+
+def _flags_text(solved: list[Solved], wrong_ports: dict[str, WrongPort]) -> str:
+    rows = []
+    for flag, wrong_port in wrong_ports.items():
+        made_for = [one.case.name for one in solved if flag in one.case.flags]
+        shown = [one.case.name for one in solved if _shows(one, flag) and flag not in one.case.flags]
+        rows.append({"flag": flag, "title": wrong_port.title, "wrong": wrong_port.wrong, "made_for": made_for,
+                     "also_shown_by": shown})  # fmt: skip
+    return json.dumps(rows, indent=1) + "\n"
+
+
+def _shows(one: Solved, flag: str) -> bool:
+    return flag in one.case.mistakes and bool(one.case.mistakes[flag].shows)
+
+
+def _entry(path: str, data: bytes) -> FileEntry:
+    digest = hashlib.sha256(data).hexdigest()
+    if not path.endswith(".npy"):
+        return FileEntry(path=path, sha256=digest, bytes=len(data))
+    header = header_of(data)
+    return FileEntry(
+        path=path, sha256=digest, bytes=len(data), offset=header.offset, dtype=header.dtype, shape=header.shape
+    )

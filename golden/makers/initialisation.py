@@ -1,0 +1,169 @@
+"""Family `initialisation`: the first Gaussians, from depth maps of the training frames (B12).
+
+Images, masks, prior depths and camera poses come in; every candidate is taken, so that no random number is drawn. The
+cases are three training frames of six, a clip long enough that frames are skipped, and a single point.
+"""
+
+import msgspec
+import numpy as np
+
+from endotsr.config import InitialisationConfig, ModelConfig
+from makers.making import Made, Seeds, Spec, changed, given
+from makers.views import pose
+from makers.wrong import edit, port
+
+OPERATIONS = ("initialisation",)
+LENS = {"fx": 7.0, "fy": 9.0, "cx": 2.75, "cy": 2.25, "width": 6, "height": 5}
+
+
+def _frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
+    """Each frame differs from a common depth map by a step of its own, clearly more or less than the threshold of 5."""
+    height, width = int(LENS["height"]), int(LENS["width"])
+    shape = (count, height, width)
+    grey = seeds.uniform("images", 0.0, 256.0, count, 3, height, width).array
+    common = seeds.uniform("depth", 40.0, 50.0, height, width).array
+    step = seeds.uniform("step", -7.0, 7.0, *shape).array
+    step = np.where(np.abs(np.abs(step) - 5.0) < 0.01, 0.0, step)
+    mask = seeds.uniform("mask", 0.0, 1.0, *shape).array < 0.8
+    depth = given(np.where(np.arange(count)[:, None, None] > 0, common + np.round(step * 8) / 8, common),
+                  f"uniform(40, 50) seed {seeds.seed('depth')} plus, after frame 0, eighths of uniform(-7, 7) seed "
+                  f"{seeds.seed('step')}", "scene unit")  # fmt: skip
+    hole = seeds.uniform("hole", 0.0, 1.0, *shape).array < 0.1
+    turned = pose()["rotation_matrix"]
+    return {
+        "images": given(np.floor(grey).astype(np.int64), f"floor of uniform(0, 256) seed {seeds.seed('images')}",
+                        "display / 255"),
+        "masks": given(mask, f"uniform(0, 1) seed {seeds.seed('mask')} < 0.8"),
+        "prior_depths": changed(depth, hole, 0.0, f"0 where uniform(0, 1) seed {seeds.seed('hole')} < 0.1"),
+        "train_index": given(np.array(train), ", ".join(map(str, train)), "frame"),
+        "rotation_matrices": given(np.stack([turned.array] * count), turned.recipe),
+        "translations": given(np.stack([np.array([0.25, -0.125, 0.5]) * k for k in range(count)]),
+                              "(1/4, -1/8, 1/2) k", "scene unit"),
+    }  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """A short clip, a long clip, one point."""
+    model = msgspec.to_builtins(ModelConfig(bases=3, harmonics_degree=1, initial_width=0.125))
+
+    def spec(case: str, title: str, flags: tuple[str, ...], inputs: dict[str, Made]) -> Spec:
+        drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)
+        settings = {"camera": LENS, "initialisation": msgspec.to_builtins(drawn), "model": model}
+        return Spec("initialisation", case, "initialisation", title, flags, settings, inputs)
+
+    one = _frames(Seeds("initialisation", "one_point"), 1, [0])
+    alone = np.zeros(one["masks"].array.shape, bool)
+    alone[0, 2, 3] = True
+    one["masks"] = given(alone, "True at (2, 3) only")
+    one["prior_depths"] = changed(one["prior_depths"], (0, 2, 3), 44.0, "(2, 3) is 44")
+    long = _frames(Seeds("initialisation", "long_clip"), 152, [*range(1, 8), 150, 151])
+    kept = long["masks"].array & (np.arange(30).reshape(5, 6) % 7 == 0)
+    long["masks"] = given(kept, f"{long['masks'].recipe} and (6 y + x) % 7 = 0")
+    flags = ("backprojected_at_corner", "initialised_from_test_frames", "moved_pixels_ignored", "holes_initialised",
+             "points_left_in_camera", "mean_distance_for_scale", "neighbours_count_itself",
+             "initial_colour_without_y00", "initial_opacity_as_logit")  # fmt: skip
+    frames = _frames(Seeds("initialisation", "frames"), 6, [2, 3, 5])
+    return [
+        spec("frames", "Depth maps of three training frames of six, lifted with their own cameras", flags, frames),
+        spec("long_clip", "Of 152 frames every second one is visited", ("long_clip_every_frame",), long),
+        spec("one_point", "A single point: the floor of the scale", ("single_point_without_floor",), one),
+    ]  # fmt: skip
+
+
+# ---- mistakes ----
+
+SOURCE, CAMERA = "scene.initialisation", "splatting.camera"
+ONE = "initialisation"
+
+WRONG_PORTS = [
+    port(
+        "backprojected_at_corner",
+        "Pixels lifted at their corner",
+        "i - cx; right: i + 1/2 - cx",
+        ONE,
+        edit(CAMERA, "(column + 0.5 - camera.cx)", "(column - camera.cx)"),
+        edit(CAMERA, "(row + 0.5 - camera.cy)", "(row - camera.cy)"),
+    ),
+    port(
+        "initialised_from_test_frames",
+        "Held-out frames initialise too",
+        "all frames; right: training frames",
+        ONE,
+        edit(SOURCE, "train = [int(k) for k in sequence.train_index]", "train = list(range(sequence.count))"),
+    ),
+    port(
+        "moved_pixels_ignored",
+        "Pixels that moved are not candidates",
+        "new ones only; right: or moved ones",
+        ONE,
+        edit(SOURCE, "(~seen | moved)", "~seen"),
+    ),
+    port(
+        "holes_initialised",
+        "Pixels without depth initialised",
+        "at the least depth; right: left out",
+        ONE,
+        edit(
+            SOURCE,
+            "    return sequence.masks[k] & (depth > 0) & np.isfinite(depth)",
+            "    depth[depth <= 0] = depth[depth > 0].min()\n    return sequence.masks[k] & np.isfinite(depth)",
+        ),
+    ),
+    port(
+        "points_left_in_camera",
+        "Points left in camera axes",
+        "x; right: W^T (x - d)",
+        ONE,
+        edit(
+            CAMERA,
+            "camera.rotation.T @ (np.stack([x, y, depth]) - camera.translation[:, None])",
+            "np.stack([x, y, depth])",
+        ),
+    ),
+    port(
+        "mean_distance_for_scale",
+        "Scale from the mean distance",
+        "mean d; right: sqrt(mean d^2)",
+        ONE,
+        edit(SOURCE, "(distance**2).mean(axis=1)", "distance.mean(axis=1) ** 2"),
+    ),
+    port(
+        "neighbours_count_itself",
+        "Point counted among its neighbours",
+        "itself and two; right: three others",
+        ONE,
+        edit(SOURCE, "k=others + 1)[0][:, 1:]", "k=others + 1)[0][:, :-1]"),
+    ),
+    port(
+        "initial_colour_without_y00",
+        "First harmonic set to the colour",
+        "rgb - 1/2; right: over Y00",
+        ONE,
+        edit(SOURCE, "(colour - 0.5) / Y00", "colour - 0.5"),
+    ),
+    port(
+        "initial_opacity_as_logit",
+        "Initial opacity taken for its logit",
+        "0.1; right: logit of 0.1",
+        ONE,
+        edit(SOURCE, "np.log(START_OPACITY / (1.0 - START_OPACITY))", "START_OPACITY"),
+    ),
+    port(
+        "long_clip_every_frame",
+        "No frame skipped in a long clip",
+        "all; right: every second beyond 150",
+        ONE,
+        edit(SOURCE, "stride = 2 if count > LONG_CLIP else 1", "stride = 1"),
+    ),
+    port(
+        "single_point_without_floor",
+        "Scale of a single point without floor",
+        "log 0; right: 1e-7",
+        ONE,
+        edit(
+            SOURCE,
+            "np.maximum(squared_neighbour_distance(position), SQUARED_DISTANCE_FLOOR)",
+            "squared_neighbour_distance(position)",
+        ),
+    ),
+]

@@ -1,0 +1,222 @@
+"""Family `training`: calibration and twenty iterations, everything together.
+
+First Gaussians, a short clip, the order of frames and the noise of splits come in. One case covers every event of a
+training: two densifications, the activation of both residuals, the ramp of the Laplacian weight, two degrees.
+"""
+
+import msgspec
+import numpy as np
+
+from endotsr.config import (
+    Config,
+    DensityConfig,
+    InitialisationConfig,
+    LossConfig,
+    ModelConfig,
+    OptimiserConfig,
+    RasterConfig,
+    TrainingConfig,
+)
+from makers.clock import stamps, train_index
+from makers.images import tissue
+from makers.making import Made, Seeds, Spec, changed, given
+from makers.moving import BASES, FRAMES, FREQUENCIES, LENS
+from makers.views import pose, scene_inputs
+from makers.wrong import edit, port
+
+OPERATIONS = ("training",)
+COUNT, ITERATIONS, SHORT = 16, 20, 12
+
+
+def _settings() -> Config:
+    """Twenty iterations: both residuals activated, the Laplacian weight ramped, the degree raised, densification."""
+    return Config(
+        model=ModelConfig(bases=BASES, frequencies=FREQUENCIES, initial_width=0.25, harmonics_degree=2),
+        raster=RasterConfig(near=0.2),
+        loss=LossConfig(
+            ssim_weight=0.25, smoothness_weight=0.0, smoothness_from=1000, lambda_lap="auto", laplacian_from=4,
+            laplacian_full=12, calibration_views=4,
+        ),
+        optimiser=OptimiserConfig(position=0.004, deformation=0.002),
+        density=DensityConfig(start=5, interval=6, until=14, gradient_threshold=0.02, extent=30.0, prune_opacity=0.02),
+        initialisation=InitialisationConfig(first_frame_points=100, other_frame_points=0, motion_threshold=1.0),
+        training=TrainingConfig(iterations=ITERATIONS, residual_activation=8, harmonics_interval=7),
+    )  # fmt: skip
+
+
+def _first_gaussians(seeds: Seeds) -> dict[str, Made]:
+    """One faint Gaussian, which is pruned, and five small ones, which are cloned."""
+    inputs = scene_inputs(seeds, COUNT, 2, pose(static=True))
+    for name in ("rotation_matrix", "translation"):
+        del inputs[name]
+    inputs["opacity_logit"] = changed(inputs["opacity_logit"], 3, -5.0, "[3] is -5: pruned")
+    small, scale = (slice(None), slice(5, 10)), inputs["log_scale"]
+    inputs["log_scale"] = changed(scale, small, scale.array[small] - 1.75, "[:, 5:10] minus 1.75: cloned")
+    shape = (10, BASES, COUNT)
+    return inputs | {
+        "fdm_weight": seeds.uniform("fdm_weight", -0.03, 0.03, *shape),
+        "fdm_centre": seeds.uniform("fdm_centre", 0.1, 0.8, *shape),
+        "fdm_width": seeds.uniform("fdm_width", 0.25, 0.5, *shape),
+    }
+
+
+def _clip(seeds: Seeds) -> dict[str, Made]:
+    height, width = int(LENS["height"]), int(LENS["width"])
+    grey = seeds.uniform("images", 0.0, 256.0, FRAMES, 3, height, width).array
+    moved = np.stack([np.array([0.02 * k, -0.01 * k, 0.015625 * k]) for k in range(FRAMES)])
+    mask = np.broadcast_to(tissue(height, width, 4, 5).array, (FRAMES, height, width)).copy()
+    mask[::2, 0, :] = False
+    return {
+        "images": given(np.floor(grey).astype(np.int64), f"floor of uniform(0.0, 256.0) seed {seeds.seed('images')}",
+                        "display / 255"),
+        "masks": given(mask, "False in the last 4 rows of the last 5 columns, and in row 0 of even frames"),
+        "prior_depths": seeds.uniform("prior_depths", 2.0, 7.0, FRAMES, height, width, unit="scene unit"),
+        "times": stamps(FRAMES),
+        "train_index": train_index(FRAMES),
+        "rotation_matrices": given(np.stack([np.eye(3)] * FRAMES), "identity"),
+        "translations": given(moved, "(0.02, -0.01, 1/64) k", "scene unit"),
+    }  # fmt: skip
+
+
+def _inputs(seeds: Seeds, iterations: int) -> dict[str, Made]:
+    order = seeds.uniform("frame_order", 0.0, 10.0, iterations).array
+    return _first_gaussians(seeds) | _clip(seeds) | {
+        "frame_order": given(np.floor(order).astype(np.int64), f"floor of uniform(0.0, 10.0) seed "
+                             f"{seeds.seed('frame_order')}; positions within train_index", "frame"),
+        "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, 32),
+    }  # fmt: skip
+
+
+def _out_of_view() -> Spec:
+    """Every second frame is seen from one side or the other, where some of the Gaussians are out of view.
+
+    Without residuals: where a Gaussian has no gradient but rounding, Adam moves a coefficient by a whole rate.
+    """
+    seeds, config = Seeds("training", "out_of_view"), _settings()
+    inputs = _inputs(seeds, SHORT)
+    k = np.arange(FRAMES)
+    sideways = 4.0 * (k % 2) * (1 - 2 * (k // 2 % 2))
+    recipe = "(4, 0, k / 64) for k % 4 = 1, (-4, 0, k / 64) for k % 4 = 3, else (0, 0, k / 64)"
+    inputs["translations"] = given(np.stack([sideways, 0 * k, 0.015625 * k], axis=1), recipe, "scene unit")
+    config = msgspec.structs.replace(
+        config,
+        density=msgspec.structs.replace(config.density, start=3, interval=4, until=10),
+        training=msgspec.structs.replace(config.training, iterations=SHORT, residual_activation=SHORT),
+    )
+    flags = ("visible_if_in_front", "density_over_all_views", "statistics_not_reset")
+    title = "Gaussians leave the view and come back: only views in which one is visible count for its densification"
+    return Spec("training", "out_of_view", "training", title, flags,
+                {"camera": LENS, "config": msgspec.to_builtins(config)}, inputs)  # fmt: skip
+
+
+def cases() -> list[Spec]:
+    """The trajectory, and a shorter one whose Gaussians leave the view."""
+    settings = {"camera": LENS, "config": msgspec.to_builtins(_settings())}
+    flags = ("skipped_step_when_densifying", "residuals_activated_late", "rates_not_decaying",
+             "laplacian_weight_not_ramped", "penalty_dropped_in_training", "calibration_of_half_ratio",
+             "densify_threshold_in_pixels", "children_inherit_moments", "statistics_not_reset", "degree_late",
+             "laplacian_ramp_late", "residual_steps_from_start", "statistics_from_start", "moments_not_gathered",
+             "frame_order_of_all_frames", "densified_before_the_step")  # fmt: skip
+    title = "Calibration, then twenty iterations: densification at 6 and 12, residuals from 9 on, detail ramp, degree 2"
+    inputs = _inputs(Seeds("training", "twenty_iterations"), ITERATIONS)
+    return [Spec("training", "twenty_iterations", "training", title, flags, settings, inputs), _out_of_view()]
+
+
+# ---- mistakes ----
+
+SOURCE, STEP = "fitting.trainer", "fitting.fused.step"
+BOTH = "training"
+
+WRONG_PORTS = [
+    port(
+        "skipped_step_when_densifying",
+        "No optimiser step when densifying",
+        "skipped; right: taken",
+        BOTH,
+        edit(SOURCE, "if not (dense and config.optimiser.legacy_skip):", "if not dense:"),
+    ),
+    port(
+        "penalty_dropped_in_training",
+        "Matern penalty left out of training",
+        "0; right: lambda_msp",
+        BOTH,
+        edit(SOURCE, "config.loss.lambda_msp * (penalty or 0.0)", "0.0 * (penalty or 0.0)"),
+        edit(STEP, "saved.motion, config.loss.lambda_msp, grads", "saved.motion, 0.0, grads"),
+    ),
+    port(
+        "calibration_of_half_ratio",
+        "Calibration with another ratio",
+        "r / 2; right: r",
+        BOTH,
+        edit(
+            "fitting.objective",
+            "calibrate(views, config.loss.gradient_ratio)",
+            "calibrate(views, config.loss.gradient_ratio / 2)",
+        ),
+    ),
+    port(
+        "statistics_not_reset",
+        "Screen gradients kept after densification",
+        "carried over; right: zero",
+        BOTH,
+        edit(
+            SOURCE,
+            "    state.gaussians, state.statistics = result.gaussians, result.statistics\n",
+            "    kept = type(state.statistics)(*(a[result.plan.source] for a in state.statistics))\n"
+            "    state.gaussians, state.statistics = result.gaussians, kept\n",
+        ),
+    ),
+    port(
+        "moments_not_gathered",
+        "Moments not reordered with their Gaussians",
+        "all zero; right: those of the survivors kept",
+        BOTH,
+        edit(SOURCE, "result.plan.source, result.plan.survivors)", "result.plan.source, 0)"),
+    ),
+    port(
+        "residual_steps_from_start",
+        "Step count of the residuals from the first iteration",
+        "k = i; right: 1 at their first step",
+        BOTH,
+        edit(
+            SOURCE,
+            "add_array(state.adam, name, array)",
+            "add_array(state.adam, name, array)\n            state.adam.step[name] = state.iteration",
+        ),
+    ),
+    port(
+        "frame_order_of_all_frames",
+        "Frame order read as frame numbers",
+        "frame_order[i]; right: train_index[frame_order[i]]",
+        BOTH,
+        edit(
+            "fitting.sampling",
+            "int(sequence.train_index[rng.integers(len(sequence.train_index))])",
+            "int(rng.integers(len(sequence.train_index)))",
+        ),
+    ),
+    port(
+        "densified_before_the_step",
+        "Density control before the optimiser step",
+        "old parameters; right: those after the step",
+        BOTH,
+        edit(
+            SOURCE,
+            "    dense, state.ahead = densify_now(iteration, config), None\n",
+            "    dense, state.ahead = densify_now(iteration, config), None\n"
+            "    if dense:\n        before = Gaussians(*(None if a is None else a.copy() for a in state.gaussians))\n",
+        ),
+        edit(
+            SOURCE,
+            "            _control_density(state, shop)\n",
+            "            moved, state.gaussians = state.gaussians, before\n"
+            "            plan = densify(before, state.statistics, config.density, "
+            "copy.deepcopy(state.rng), shop.extent).plan\n"
+            "            _control_density(state, shop)\n"
+            "            for old, new in zip(moved, state.gaussians):\n"
+            "                if new is not None:\n"
+            "                    new[..., : plan.survivors] = old[..., plan.source[: plan.survivors]]\n",
+        ),
+        edit(SOURCE, "import math\n", "import copy\nimport math\n"),
+    ),
+]

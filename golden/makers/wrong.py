@@ -1,0 +1,112 @@
+"""Wrong ports: each is a copy of the reference with one plausible mistake in its source, forward and reverse.
+
+In: the cases of golden as inputs and settings. Out: what a port that makes the mistake answers, for the operations that
+are examined. These answers give the size and the fingerprints of the mistake. The judge must refuse every wrong port
+and name its mistake.
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.golden.judge.npy import write_npy
+from endotsr.golden.judge.store import Golden, in_precision
+from endotsr.golden.reference import stored
+from endotsr.stages.stage import Inputs, Outputs
+from makers.copies import Edit, changed_copy, without_compiler
+
+
+class WrongPort(NamedTuple):
+    """A port that makes one mistake."""
+
+    flag: str  # the name of the mistake
+    title: str
+    wrong: str  # the wrong rule and the right one
+    operations: tuple[str, ...]  # on which the mistake is examined
+    edits: tuple[Edit, ...]  # the mistake, in the source of the reference
+    rounding: bool = False  # loses digits and is right otherwise: its wrong digits differ from port to port
+
+
+SLOW = ("render", "objective", "training")  # operations that take seconds without the compiler
+ALWAYS = "render/paper"  # the one case of them that every mistake in a kernel is examined on
+
+
+class Question(NamedTuple):
+    """A case, as a wrong port is asked."""
+
+    name: str
+    operation: str
+    inputs: Inputs
+    settings: Mapping[str, Any]
+    made_for: tuple[str, ...]  # flags
+
+
+def edit(module: str, old: str, new: str, times: int = 1) -> Edit:
+    """A change of one module, see `Edit`."""
+    return Edit(module, old, new, times)
+
+
+def port(flag: str, title: str, wrong: str, operations: str, *edits: Edit, rounding: bool = False) -> WrongPort:
+    """A wrong port; the operations are separated by spaces."""
+    return WrongPort(flag, title, wrong, tuple(operations.split()), edits, rounding)
+
+
+def with_raster(fields: str) -> Edit:
+    """Reads the settings `found` of the rasteriser and takes them with other fields, an expression of keywords."""
+    return edit(
+        "stages.requests",
+        "    return RasterSettings(**fields)\n",
+        f"    found = RasterSettings(**fields)\n    return found._replace({fields})\n",
+    )
+
+
+class Wrong(NamedTuple):
+    """What a wrong port answers to a case; `single` in float32, for mistakes that lose digits only."""
+
+    double: Outputs
+    single: Outputs | None
+
+
+def answers(wrong_port: WrongPort, questions: Iterable[Question]) -> dict[str, Wrong]:
+    """What the wrong port answers, by case, to the questions on which it is examined."""
+    found, examined = {}, [question for question in questions if is_examined(wrong_port, question)]
+    with changed_copy(wrong_port.edits) as operation, np.errstate(all="ignore"):
+        for question in examined:
+
+            def run(precision: str, question: Question = question) -> Outputs:
+                settings = dict(question.settings) | {"_compositor": "definition"}
+                return operation(question.operation).compute(in_precision(question.inputs, precision), settings)
+
+            found[question.name] = Wrong(run("float64"), run("float32") if wrong_port.rounding else None)
+    return found
+
+
+def is_examined(wrong_port: WrongPort, question: Question) -> bool:
+    """Whether a case is of an operation of the mistake; of the slow ones only some, if a kernel is changed."""
+    if question.operation not in wrong_port.operations:
+        return False
+    slow = question.operation in SLOW and without_compiler(wrong_port.edits)
+    return not slow or wrong_port.flag in question.made_for or question.name == ALWAYS
+
+
+def answer_wrongly(golden: Golden, outputs: Path, wrong_port: WrongPort, *, spoiled_only: bool = False) -> int:
+    """Write the outputs of a wrong port in float64; returns the number of cases on which its mistake is examined.
+
+    All other cases are as expected; with `spoiled_only` they are not written.
+    """
+    questions = [
+        Question(case.name, case.operation, golden.inputs(case), case.settings, case.flags) for case in golden.cases
+    ]
+    made = answers(wrong_port, questions)
+    for case in golden.cases:
+        if case.name in made:
+            found = {name: stored(array) for name, array in made[case.name].double.items() if name in case.outputs}
+        elif spoiled_only:
+            continue
+        else:
+            found = {name: golden.array(case, output.file) for name, output in case.outputs.items()}
+        for name, value in found.items():
+            write_npy(outputs / case.name / f"{name}.npy", value)
+    return len(made)

@@ -1,0 +1,61 @@
+"""The operations that a golden case may ask for.
+
+Two belong to the contract alone and have no equation: how arrays are laid out, and the generator of the inputs. All
+others are the stages of the method.
+"""
+
+import numpy as np
+
+from endotsr.golden.judge.words import fnv1a, unit_numbers, words
+from endotsr.stages.registry import all_stages
+from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage
+
+
+def _reading(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    array, mask = inputs["harmonics"], inputs["mask"]
+    return {
+        "column": np.array(array[..., settings["gaussian"]]),
+        "flat": array.reshape(-1),
+        "scalar": np.array(inputs["scalar"]),
+        "empty": np.array(inputs["empty"]),
+        "tissue_pixels": np.array(int(mask.sum()), np.int64),
+        "tissue_row": np.flatnonzero(mask[settings["row"]]).astype(np.int64),
+        "sample_x": (np.arange(mask.shape[1]) + 0.5).astype(array.dtype),
+        "sample_y": (np.arange(mask.shape[0]) + 0.5).astype(array.dtype),
+    }, None
+
+
+def _generator(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    found = words(fnv1a(settings["seed"]), settings["count"])
+    return {"words": found, "unit_numbers": unit_numbers(found)}, None
+
+
+STAGES = [
+    Stage(
+        name="reading",
+        equation="",
+        text="echo parts of the inputs",
+        function="",
+        inputs={"harmonics": "1", "mask": "1", "scalar": "1", "empty": "1"},
+        forward=_reading,
+        asked={
+            **{name: Asked(0, scale="exact") for name in ("column", "flat", "scalar", "empty")},
+            **{name: Asked(0, scale="exact") for name in ("tissue_pixels", "tissue_row")},
+            **{name: Asked(0, "px", "exact") for name in ("sample_x", "sample_y")},
+        },
+    ),
+    Stage(
+        name="generator",
+        equation="",
+        text="words of the written-out generator",
+        function="endotsr.golden.judge.words.words",
+        inputs={},
+        forward=_generator,
+        asked={name: Asked(0, scale="exact") for name in ("words", "unit_numbers")},
+    ),
+]
+
+
+def all_operations() -> dict[str, Stage]:
+    """Every operation by name: those of the contract alone, then the stages of the method."""
+    return {stage.name: stage for stage in STAGES} | all_stages()

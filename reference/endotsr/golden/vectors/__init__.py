@@ -1,1 +1,0 @@
-"""Makers of the golden cases: one module a family, which holds its cases and its wrong ports."""
