@@ -16,8 +16,8 @@ ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
 PEERS = [
-    PACKAGE / "bench" / name for name in ("peer_gsplat.py", "peers.py")
-]  # another program beside ours, never needed
+    ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")
+]  # another program beside ours
 
 # Forward functions whose check runs under the name of another pair, and why.
 ALIASES: dict[str, str] = {}
@@ -113,7 +113,7 @@ def test_no_file_is_too_long():
 
 @pytest.mark.parametrize("library", ["torch", "jax", "tensorflow", "autograd", "pickle", "dill", "joblib"])
 def test_no_autodiff_library_and_no_pickle(library):
-    assert [str(f) for f in SOURCES if library in imported(f) and f not in PEERS] == []
+    assert [str(f) for f in SOURCES if library in imported(f)] == []
 
 
 def test_comparisons_with_other_programs_load_them_inside_functions_only():

@@ -1,9 +1,12 @@
-"""Write the generated parts of docs/bench.md, and its pictures, from the JSON files of `endotsr bench all`.
+"""Measure where the time goes, and write the generated parts of docs/bench.md and its pictures.
 
-    python docs/pages/bench.py              from docs/results
+    python docs/pages/bench.py measure [WHAT ...] [--scenes FILE ...] [--out FOLDER]
+                                            on a machine that has nothing else to do: start, stages, peers and scaling,
+                                            or those named; `effects` belongs to docs/effects.md
+    python docs/pages/bench.py              the page from docs/results
     python docs/pages/bench.py FOLDER       from the files of another folder; pictures are written there too
 
-To measure: `endotsr bench all --out docs/results`, on a machine that has nothing else to do.
+`endotsr bench` of the package times the stages of this machine alone.
 """
 
 import sys
@@ -11,17 +14,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import bench_charts
 import bench_parts
+import bench_suite
 from marks import read_json, write_marked
 
-from endotsr.bench import charts
-from endotsr.bench.suite import PEERS_FILE, SCALING_FILE, STAGES_FILE, START_FILE
 from endotsr.errors import InputError
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "bench.md", DOCS / "results"
-FILES = {"stages": STAGES_FILE, "scaling": SCALING_FILE, "peers": PEERS_FILE, "start": START_FILE}
-COMMAND = "endotsr bench all --out FOLDER"
+FILES = {name: bench_suite.FILES[name] for name in ("stages", "scaling", "peers", "start")}
+COMMAND = "python docs/pages/bench.py measure"
 
 
 def read(folder: Path) -> dict[str, dict[str, Any]]:
@@ -57,16 +60,18 @@ def fragments(found: Mapping[str, dict[str, Any]], runs: Mapping[str, dict[str, 
 
 def main(words: list[str], page: Path = PAGE) -> None:
     """The command."""
-    if len(words) > 1:
+    if len(words) > 1 and words[0] != "measure":
         sys.exit(__doc__)
     folder = Path(words[0]) if words else RESULTS
     try:
+        if words[:1] == ["measure"]:
+            return bench_suite.main(words[1:])
         found = read(folder)
         write_marked(page, fragments(found, read_runs(folder)), "bench")
     except InputError as error:
         sys.exit(f"error: {error}")
-    charts.stage_bars(found["stages"]["cases"], folder / "bench_stages.png")
-    charts.scaling_curves(found["scaling"]["axes"], folder / "scaling.png")
+    bench_charts.stage_bars(found["stages"]["cases"], folder / "bench_stages.png")
+    bench_charts.scaling_curves(found["scaling"]["axes"], folder / "scaling.png")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Generated parts of docs/bench.md, one function a part, as Markdown; the input is the JSON of `endotsr bench all`."""
+"""Generated parts of docs/bench.md, one function a part, as Markdown; the input is the JSON of `bench.py measure`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from endotsr.bench import peers as peer_results
+import bench_peers
+
 from endotsr.bench.clock import REST
 from endotsr.errors import InputError
 from endotsr.report.tables import markdown
@@ -190,7 +191,7 @@ def peers(found: Result) -> str:
     for case in found["cases"]:
         times = [f"{case[name]['median_ms']:,.0f}" for name in ("ours", "gsplat", "pair_lists")]
         size = [f"{case['gaussians']:,}", case["precision"]]
-        rows.append([*size, *times, f"{case['ratio']:.0f}", peer_results.verdict(case)])
+        rows.append([*size, *times, f"{case['ratio']:.0f}", bench_peers.verdict(case)])
         blocks.append([*size, *(f"{error:.1e}" for error in case["errors"].values())])
     first = found["cases"][0]
     head = ["Gaussians", "precision", "endotsr, ms", "gsplat, ms", "its pair lists, ms", "ratio", "largest error"]
@@ -230,4 +231,4 @@ def find(results: Sequence[Result], wanted: Mapping[str, Any]) -> Result:
     for result in results:
         if all(result["case"][key] == value for key, value in wanted.items()):
             return result
-    raise InputError(f"the stages hold no case with {dict(wanted)}; measure it with `endotsr bench all`")
+    raise InputError(f"the stages hold no case with {dict(wanted)}; measure it with `bench.py measure`")

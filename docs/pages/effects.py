@@ -8,7 +8,7 @@
     python docs/pages/effects.py                             write the page from docs/results
 
 An interrupted `detect`, `train` or `truth` goes on where it stopped when it is started again with the same words.
-`endotsr bench effects --json docs/results/bench_effects.json` measures the time of the parts.
+`python docs/pages/bench.py measure effects` measures the time of the parts.
 """
 
 import sys
@@ -24,11 +24,10 @@ import kept
 import msgspec
 from marks import read_json, write_marked
 
-from endotsr.bench.suite import dated
 from endotsr.config import DEMO, PAPER
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
-from endotsr.runs.machine import now
+from endotsr.runs.machine import dated, now
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "effects.md", DOCS / "results"

@@ -17,11 +17,11 @@ from effects_parts import machine
 from marks import write_marked
 
 from endotsr.api import Run, open_run
-from endotsr.bench.suite import dated
 from endotsr.errors import InputError
 from endotsr.evaluation.metrics import psnr
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
+from endotsr.runs.machine import dated
 
 DOCS = Path(__file__).parents[1]
 PAGE, FILE = DOCS / "guides" / "show.md", DOCS / "results" / "show.json"

@@ -19,10 +19,10 @@ import numpy as np
 from effects_parts import machine
 from marks import write_marked
 
-from endotsr.bench.suite import dated
 from endotsr.opencv import write_png
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
+from endotsr.runs.machine import dated
 from endotsr.simulator.folder import write_sequence
 from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.scenes import SCENES, named_scene

@@ -1,20 +1,27 @@
-"""The pictures, the tables and the refusals of `endotsr bench`."""
+"""The cases of `endotsr bench`; the pictures, tables and refusals of the measurements for docs/bench.md."""
 
 import json
 from pathlib import Path
 
+import bench_charts
+import bench_peers
+import bench_scaling
+import bench_start
+import bench_suite
 import numpy as np
 import pytest
 
-from endotsr.bench import charts, peers, scaling, stages, start, suite, trained
+import bench
+from endotsr.bench import stages, trained
 from endotsr.bench.case import Case, measure
 from endotsr.bench.limits import limits
-from endotsr.bench.stages import grid, ns_per_pair
+from endotsr.bench.stages import ns_per_pair
+from endotsr.cli.bench import BenchOptions, cases_of
 from endotsr.cli.main import main
-from endotsr.cli.parts.bench_options import StagesOptions
 from endotsr.config import PAPER
 from endotsr.errors import InputError
 from endotsr.export import npz
+from endotsr.runs.machine import dated
 
 PEAKS = {
     "threads": 1,
@@ -31,11 +38,11 @@ def results():
     measured = [measure(case) for case in small]
     for result in measured:
         result |= {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)}
-    axis = scaling.axes(1000)["gaussians"]._replace(along=lambda result: float(result["view"]["visible"]))
-    grown = {"gaussians": scaling.summary(axis, measured)}
+    axis = bench_scaling.axes(1000)["gaussians"]._replace(along=lambda result: float(result["view"]["visible"]))
+    grown = {"gaussians": bench_scaling.summary(axis, measured)}
     return {
-        suite.STAGES_FILE: {"peaks": [PEAKS], "cases": measured},
-        suite.SCALING_FILE: {"axes": grown, "memory": scaling.memory(grown)},
+        bench_suite.FILES["stages"]: {"peaks": [PEAKS], "cases": measured},
+        bench_suite.FILES["scaling"]: {"axes": grown, "memory": bench_scaling.memory(grown)},
     }
 
 
@@ -49,63 +56,70 @@ def keys(result) -> object:
 def test_results_have_the_keys_of_the_committed_ones(results):
     """The pages are made from the committed files: a key that changes has to change there too."""
     committed = {name: json.loads((RESULTS / name).read_text(encoding="utf-8")) for name in results}
-    made = suite.dated(results[suite.STAGES_FILE])
-    records = [found | {"versions": {}} for found in (made, committed[suite.STAGES_FILE])]  # other libraries are others
+    made = dated(results[bench_suite.FILES["stages"]])
+    known = committed[bench_suite.FILES["stages"]]
+    records = [found | {"versions": {}} for found in (made, known)]  # other libraries are others
     assert keys(records[0]) == keys(records[1])
-    grown, known = (found[suite.SCALING_FILE]["axes"]["gaussians"] for found in (results, committed))
+    grown, known = (found[bench_suite.FILES["scaling"]]["axes"]["gaussians"] for found in (results, committed))
     assert keys(grown) == keys(known)
 
 
 def test_pictures_are_drawn(results, tmp_path):
-    charts.stage_bars(results[suite.STAGES_FILE]["cases"], tmp_path / "bars.png")
-    charts.scaling_curves(results[suite.SCALING_FILE]["axes"], tmp_path / "curves.svg")
+    bench_charts.stage_bars(results[bench_suite.FILES["stages"]]["cases"], tmp_path / "bars.png")
+    bench_charts.scaling_curves(results[bench_suite.FILES["scaling"]]["axes"], tmp_path / "curves.svg")
     assert (tmp_path / "bars.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "curves.svg").read_text()
 
 
-def test_grid_is_every_combination():
-    cases = grid(StagesOptions(gaussians=(10, 20), scenes=(Path("a.npz"),), threads=(1, 2)))
-    assert len(cases) == 3 * 2 * 2 and len(set(cases)) == 12
-    assert [c.scene for c in cases[-4:]] == ["a.npz"] * 4
+def test_cases_are_every_combination():
+    """The common workload first, grouped by size, for the command and for the page."""
+    chosen = BenchOptions((10, 20), (Path("a.npz"),), ("float32", "float64"), (1, 2))
+    for cases, sizes in ((cases_of(chosen), 2), (bench_suite.grid((Path("a.npz"),)), 3)):
+        assert len(set(cases)) == len(cases) and {(c.precision, c.threads) for c in cases[:4]} == {
+            (precision, threads) for precision in ("float32", "float64") for threads in (1, 2)
+        }
+        assert len({c.gaussians for c in cases if not c.scene}) == sizes and cases[-1].scene == "a.npz"
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["everything"], "allowed: iteration, stages, effects, scaling, peers, start, all"),
-        (["stages", "--gaussians", "3"], "--gaussians 3 is not allowed"),
-        (["stages", "--plot", "bars.pdf"], "--plot bars.pdf is not allowed; allowed: a file whose name ends in .png"),
-        (["scaling", "--largest", "10"], "--largest 10 is not allowed"),
-        (["start", "--repeats", "0"], "--repeats 0 is not allowed"),
-        (["stages", "--precisions", "float16"], "float16"),
-    ],
-)
-def test_refusals(words, said, capsys):
-    assert main(["bench", *words]) == 2
-    assert said in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("words", [["stages"], ["all", "--out", "{}/out"]])
-def test_wrong_scene_is_refused_before_anything_is_measured(words, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("measure", [lambda scene: main(["bench", "--scenes", scene]),
+                                     lambda scene: bench.main(["measure", "--scenes", scene])])  # fmt: skip
+def test_wrong_scene_is_refused_before_anything_is_measured(measure, tmp_path, monkeypatch, capsys):
     measured = lambda *arguments: pytest.fail("measured before the scenes were looked at")
     monkeypatch.setattr(stages, "apart", measured)
-    monkeypatch.setattr(start, "measure_start", measured)
-    words = [word.format(tmp_path) for word in words]
-    assert main(["bench", *words, "--scenes", str(tmp_path / "none.npz")]) == 2
-    assert "none.npz: cannot be read: No such file" in capsys.readouterr().err
+    monkeypatch.setattr(bench_start, "measure_start", measured)
+    try:
+        assert measure(str(tmp_path / "none.npz")) == 2
+        said = capsys.readouterr().err
+    except SystemExit as refusal:
+        said = str(refusal)
+    assert "none.npz: cannot be read: No such file" in said
 
 
-def test_peers_without_torch_say_what_to_install(monkeypatch, capsys):
-    monkeypatch.setattr(peers, "apart", lambda function: "ModuleNotFoundError: No module named 'torch'")
-    assert main(["bench", "peers"]) == 2
-    said = capsys.readouterr().err
-    assert "No module named 'torch'" in said and all(line in said for line in peers.PIP_LINES)
+def test_an_unknown_measurement_is_refused():
+    with pytest.raises(SystemExit, match="'iteration' is not allowed; allowed: start, stages, peers,"):
+        bench.main(["measure", "iteration"])
+
+
+@pytest.mark.parametrize("names", [("peers",), ("peers", "scaling")])
+def test_peers_without_torch_say_what_to_install(names, monkeypatch, tmp_path):
+    """The last figures stay; it is an error where nothing else is asked for."""
+    said: list[str] = []
+    monkeypatch.setattr(bench_peers, "apart", lambda function: "ModuleNotFoundError: No module named 'torch'")
+    monkeypatch.setattr(bench_scaling, "measure_scaling", lambda *_: {"axes": {}, "memory": {}})
+    if len(names) == 1:
+        with pytest.raises(InputError) as refusal:
+            bench_suite.run_all(tmp_path, names, (), said.append)
+        said.append(str(refusal.value))
+    else:
+        bench_suite.run_all(tmp_path, names, (), said.append)
+    assert [path.name for path in tmp_path.iterdir()] == ["scaling.json"] * (len(names) - 1)
+    assert "No module named 'torch'" in said[0] and all(line in said[0] for line in bench_peers.PIP_LINES)
 
 
 def test_error_beyond_the_limit_is_said():
     case = {"precision": "float64", "errors": {"colour": 1e-12, "position": 2e-9}}
-    assert peers.verdict(case) == "2.0e-09 (position), BEYOND 1e-09"
-    assert peers.relative_error(np.array([3.0, 4.5]), np.array([3.0, 4.0])) == pytest.approx(0.1)
+    assert bench_peers.verdict(case) == "2.0e-09 (position), BEYOND 1e-09"
+    assert bench_peers.relative_error(np.array([3.0, 4.5]), np.array([3.0, 4.0])) == pytest.approx(0.1)
 
 
 def test_trained_scene_fills_the_picture(tmp_path):

@@ -1,11 +1,11 @@
-"""`bench effects`: a part that is off holds and allocates what a build without the part does."""
+"""`bench.py measure effects`: a part that is off holds and allocates what a build without the part does."""
 
+import bench_effects
 import numba
 import numpy as np
 import pytest
+from bench_effects import PARTS, benchmark_effects, table
 
-from endotsr.bench import effects
-from endotsr.bench.effects import PARTS, benchmark_effects, table
 from endotsr.fitting import objective
 from endotsr.kernels.threads import use_threads
 
@@ -37,14 +37,14 @@ def test_every_part_is_measured_with_its_memory(result):
 
 def test_an_allocation_of_a_part_that_is_off_is_seen(monkeypatch):
     """A megabyte that only the build with the part allocates."""
-    plain = effects._step
+    plain = bench_effects._step
 
     def wasteful(state, shop):
         waste = None if objective.normalised_depth_forward is None else np.ones(1 << 17)
         plain(state, shop)
         del waste
 
-    monkeypatch.setattr(effects, "_step", wasteful)
+    monkeypatch.setattr(bench_effects, "_step", wasteful)
     part = next(part for part in PARTS if part.name == "depth")
-    found = effects._one(part, 60, 1, 48, 32, effects.PAPER)
+    found = bench_effects._one(part, 60, 1, 48, 32, bench_effects.PAPER)
     assert found["allocated_over_absent"] > 1.2

@@ -5,11 +5,12 @@ import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
 
+import bench_scaling as scaling
 import numba
 import numpy as np
 import pytest
 
-from endotsr.bench import clock, pairs, peaks, scaling, timing
+from endotsr.bench import clock, pairs, peaks, timing
 from endotsr.bench.case import Case, measure, prepare, representative
 from endotsr.bench.clock import STAGES
 from endotsr.bench.limits import limits, work

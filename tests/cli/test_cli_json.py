@@ -5,19 +5,17 @@ import json
 import pytest
 from tiny import assert_refused, written_folder
 
-from endotsr.cli.bench import MEASURES
 from endotsr.cli.golden import DOORS
 from endotsr.cli.main import COMMANDS, main
 
-NOT_ALONE = {"golden", "bench"}  # only with a second word
+NOT_ALONE = {"golden"}  # only with a second word
 WITHOUT = {
     "completion": "prints a script, not a result",
-    "bench all": "the folder it writes holds the JSON files of every measurement",
     "sweep": "the folder it writes holds results.json",
     "tradeoff train": "the folder it writes holds training.json",
 }
 EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), "tradeoff train"]
-EVERY += [f"golden {door}" for door in DOORS] + [f"bench {what}" for what in MEASURES]
+EVERY += [f"golden {door}" for door in DOORS]
 PRINTING = [name for name in EVERY if name not in WITHOUT]
 NUMBERS = range(len(EVERY))  # not the names: `pytest -k gradcheck` selects the gradient checks alone
 

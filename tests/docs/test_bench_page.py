@@ -3,12 +3,12 @@
 import json
 import re
 
+import bench_start
 import pytest
 from bench_parts import MAIN
 from marks import replaced
 
 import bench
-from endotsr.bench import start
 from endotsr.errors import InputError
 
 MARKED = re.compile(r"<!-- bench:(\w+):start -->")
@@ -29,7 +29,7 @@ def test_committed_page_is_what_the_results_say(found):
 def test_command_fills_a_page_and_keeps_its_words(found, tmp_path):
     folder, page = tmp_path / "results", tmp_path / "page.md"
     folder.mkdir()
-    changed = found | {"start": found["start"] | {"warm": dict.fromkeys(start.MOMENTS, 123.4)}}
+    changed = found | {"start": found["start"] | {"warm": dict.fromkeys(bench_start.MOMENTS, 123.4)}}
     for name, file in bench.FILES.items():
         (folder / file).write_text(json.dumps(changed[name]), encoding="utf-8")
     marked = "<!-- bench:start:start -->\nto be replaced\n<!-- bench:start:end -->"
@@ -43,7 +43,7 @@ def test_command_fills_a_page_and_keeps_its_words(found, tmp_path):
 
 
 def test_target_that_is_missed_says_so(found):
-    slow = dict.fromkeys(start.MOMENTS, 99.0)
+    slow = dict.fromkeys(bench_start.MOMENTS, 99.0)
     text = bench.fragments(found | {"start": found["start"] | {"cold": slow}}, {})["targets"]
     line = next(line for line in text.splitlines() if "cold start" in line)
     assert "99 s" in line and "**not met**" in line
@@ -55,7 +55,7 @@ def test_page_names_what_is_missing(tmp_path):
     page.write_text("<!-- bench:colour:start -->\n<!-- bench:colour:end -->")
     with pytest.raises(SystemExit, match=r"page\.md: mark bench:colour has no end or no meaning; allowed: machine,"):
         bench.main([], page)
-    with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*endotsr bench all"):
+    with pytest.raises(SystemExit, match=r"bench_stages\.json: cannot be read.*bench\.py measure"):
         bench.main([str(tmp_path)], page)
     with pytest.raises(SystemExit, match=r"python docs/pages/bench\.py"):
         bench.main(["one", "two"], page)

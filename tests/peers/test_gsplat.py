@@ -3,11 +3,11 @@
 Needs torch (the CPU build is enough) and gsplat, `pip install '.[peers]'`; skipped without.
 """
 
+import bench_gsplat as peer_gsplat
 import numpy as np
 import pytest
 from made_up_scenes import random_scene, turned_camera
 
-from endotsr.bench import peer_gsplat
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import render_forward, render_reverse
 from endotsr.splatting.settings import EXACT, PAPER, LegacyDeviations

@@ -1,11 +1,10 @@
-"""`endotsr bench stages`: every stage of a training iteration over sizes, precisions and threads, beside its limit."""
+"""Every stage of a training iteration over sizes, precisions and threads, beside its limit."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from endotsr.bench.case import Case, Precision, apart, measure
+from endotsr.bench.case import Case, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
 from endotsr.export.npz import read_arrays
@@ -13,31 +12,6 @@ from endotsr.report.tables import plain
 from endotsr.report.words import memory
 
 Say = Callable[[str], None]
-
-
-class Grid(Protocol):
-    """The choices of the command line."""
-
-    gaussians: tuple[int, ...]
-    scenes: tuple[Path, ...]
-    precisions: tuple[Precision, ...]
-    threads: tuple[int, ...]
-    width: int
-    height: int
-    repeats: int
-
-
-def grid(chosen: Grid) -> list[Case]:
-    """Every combination of scene, precision and threads; the common workload comes first, grouped by size."""
-    base = Case(width=chosen.width, height=chosen.height, repeats=chosen.repeats)
-    scenes = [replace(base, gaussians=n) for n in chosen.gaussians]
-    scenes += [replace(base, scene=str(path)) for path in chosen.scenes]
-    return [
-        replace(scene, precision=precision, threads=threads)
-        for scene in scenes
-        for precision in chosen.precisions
-        for threads in chosen.threads
-    ]
 
 
 def measure_stages(cases: Iterable[Case], say: Say) -> dict[str, Any]:

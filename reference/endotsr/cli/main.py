@@ -34,7 +34,7 @@ COMMANDS = {
     "sweep": "make many runs from one file, on this machine or on a cluster, with a table of their results",
     "ablate": "test the paper's claims: components on and off, over seeds, with paired differences",
     "gradcheck": "check every reverse pass against finite differences",
-    "bench": "measure times: stages and their limits, growth with size, a peer, cold start",
+    "bench": "measure the time of each stage of an iteration and its lower limit",
     "tradeoff": "measure error against time, and find the best setting within a budget",
     "completion": "print a script that completes commands and options in bash, zsh or fish",
     "golden": "golden vectors for ports: judge outputs, run a port, answer as the reference",

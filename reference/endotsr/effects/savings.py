@@ -1,12 +1,12 @@
 """Time and memory of a configuration relative to the published one: what a plan can save.
 
 Memory is counted: numbers of a Gaussian, each held three times (value and two moments). Time is a table of measured
-differences, scaled with the size of the part; `endotsr bench effects` measures it again on any machine.
+differences, scaled with the size of the part; `python docs/pages/bench.py measure effects` measures it again.
 """
 
 from endotsr.config import PAPER, Config
 
-# Fraction of an iteration of the published settings that each part takes: `endotsr bench effects`, file
+# Fraction of an iteration of the published settings that each part takes: `docs/pages/bench_effects.py`, file
 # docs/results/bench_effects.json (a test compares the two).
 MEASURED = {
     "deformation": 0.47,

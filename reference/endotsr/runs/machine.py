@@ -49,6 +49,11 @@ def peak_memory_bytes() -> int | None:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
+def dated(result: dict[str, Any]) -> dict[str, Any]:
+    """The result with the date, the machine and the versions it belongs to."""
+    return {"date": now(), "machine": machine(), "versions": versions()} | result
+
+
 def now() -> str:
     """The time in UTC, to the second."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

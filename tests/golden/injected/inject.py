@@ -23,13 +23,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from endotsr.bench.suite import dated
 from endotsr.golden.judge.command import run_port, write_requests
 from endotsr.golden.judge.npy import write_npy
 from endotsr.golden.judge.store import Golden, golden_folder, in_precision, read_golden
 from endotsr.golden.judge.verdict import Report, conclude, judge, judge_case
 from endotsr.golden.reference import stored
 from endotsr.runs.files import write_json
+from endotsr.runs.machine import dated
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[3] / "golden"))

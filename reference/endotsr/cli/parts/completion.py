@@ -14,7 +14,7 @@ from endotsr.simulator.scenes import SCENES
 
 ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
 SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # a command whose options are those of another
-CHOICES = {"bench": "MEASURES", "golden": "DOORS"}  # the table of a command module whose keys are its first words
+CHOICES = {"golden": "DOORS"}  # the table of a command module whose keys are its first words
 FIRST_WORDS = {
     "tradeoff": ("train",),
     "train": ("simulated",),
@@ -29,7 +29,7 @@ def words_of(command: str) -> list[str]:
     module, name = SHARED_MODULE.get(command, (command, f"{command.capitalize()}Options"))
     command_module: Any = importlib.import_module(f"endotsr.cli.{module}")
     found = list(getattr(command_module, CHOICES[command]) if command in CHOICES else FIRST_WORDS.get(command, ()))
-    options = getattr(command_module, name, None)  # bench and golden have a class for each first word instead
+    options = getattr(command_module, name, None)  # golden has a class for each first word instead
     if options is not None:
         found += [word for word in option_names(fields_of(options)) if word not in ALWAYS]
     return [*found, *ALWAYS]

@@ -1,4 +1,4 @@
-"""`endotsr bench effects`: what every part that can be switched off takes of an iteration, and that off is free.
+"""`bench.py measure effects`: what every part that can be switched off takes of an iteration, and that off is free.
 
 For each part two states of the common workload take turns, one with everything and one with the part off, so that other
 work on the machine disturbs both alike. A third build takes turns with them: the second state, while the functions of

@@ -1,8 +1,8 @@
-"""`endotsr bench start`: from the call of the interpreter to the end of the first training iteration.
+"""`bench.py measure start`: from the call of the interpreter to the end of the first training iteration.
 
 A cold start begins with an empty kernel cache, a warm start with a full one. Each runs in a fresh process with the
 initialisation of a real run, and ends with one iteration at which everything is active, which needs the remaining
-kernels. The fresh process runs this module (`python -m endotsr.bench.start`).
+kernels. The fresh process runs this module (`python docs/pages/bench_start.py`).
 """
 
 import json
@@ -37,7 +37,7 @@ def fresh_process(cache: str) -> dict[str, float]:
     environment = os.environ | {"NUMBA_CACHE_DIR": cache}
     began = time.perf_counter()
     with subprocess.Popen(
-        [sys.executable, "-u", "-m", __spec__.name], env=environment, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-u", __file__], env=environment, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None
         seconds = {json.loads(line): time.perf_counter() - began for line in process.stdout}

@@ -1,4 +1,4 @@
-"""`endotsr bench peers`: gsplat's pure-torch reference on the same arrays in the same run; no time without an error.
+"""`bench.py measure peers`: gsplat's pure-torch reference on the same arrays in the same run.
 
 One view of the common workload without time: colour and depth forward, then the gradients of a fixed random
 combination of the two images, one after the other in one process. A substitute makes the lists of pairs, which gsplat
@@ -36,7 +36,7 @@ def measure_peers(
     gaussians: Sequence[int], precisions: Sequence[Precision], threads: int, repeats: int
 ) -> dict[str, Any]:
     """{"cases": of `compare`}. Raises: InputError with the pip lines where torch or gsplat is missing."""
-    from endotsr.bench.peer_gsplat import available
+    from bench_gsplat import available
 
     reason = apart(available)  # torch is not imported in this process
     if reason is not None:
@@ -110,13 +110,13 @@ def _ours(scene: Any, camera: Any, settings: Any, d_colour: FloatArray, d_depth:
 
 def _theirs(view: tuple[Any, ...], repeats: int) -> tuple[dict[str, FloatArray], list[float], list[float]]:
     """Images and gradients by name, the seconds of each repeat without the pair lists, and those of the lists."""
-    from endotsr.bench import peer_gsplat
+    import bench_gsplat
 
     seconds, lists, found = [], [], {}
     for _ in range(repeats):
-        with _list_seconds(peer_gsplat) as spent:
+        with _list_seconds(bench_gsplat) as spent:
             began = time.perf_counter()
-            render = peer_gsplat.render_with_gradients(*view)
+            render = bench_gsplat.render_with_gradients(*view)
             seconds.append(time.perf_counter() - began - sum(spent))
         lists.append(sum(spent))
         found = {"colour": render.colour, "depth": render.depth} | render.gradients

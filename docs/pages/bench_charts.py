@@ -1,7 +1,7 @@
 """Charts of benchmark results: stacked bars of the stages, and cost against each size.
 
-In: the results of `bench.stages` and `bench.scaling`. Out: a picture file, png or svg, in the colours and the style of
-`endotsr.report.style`.
+In: the results of `endotsr.bench.stages` and `bench_scaling`. Out: a picture file, png or svg, in the colours and the
+style of `endotsr.report.style`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -115,8 +115,7 @@ def _short(value: float, _: object) -> str:
 
 def _power(panel: Any, size: Sequence[float], times: Sequence[float], name: str, power: float | None) -> None:
     import numpy as np
-
-    from endotsr.bench.scaling import upper_decade
+    from bench_scaling import upper_decade
 
     colour = CURVE_COLOURS[name]
     label = name if power is None else f"{name}, exponent {power:.2f}"

@@ -1,4 +1,4 @@
-"""`endotsr bench scaling`: growth of cost with each size alone, with fitted exponents.
+"""`bench.py measure scaling`: growth of cost with each size alone, with fitted exponents.
 
 Every point is measured in a process of its own, so that its peak memory is that of its size. It is measured twice, once
 with sizes ascending and once descending, and the faster time is used, so that a temporary load of the machine does not
