@@ -160,7 +160,6 @@ def test_the_demo_preset_is_sharp_with_another_length_and_size():
     stretched, demo = settings_by_key(with_iterations(SHARP, 1500)), settings_by_key(DEMO)
     assert {key: demo[key] for key in demo if demo[key] != stretched[key]} == {
         "preset": "demo",
-        "training.visits_per_frame": 0,
         "density.gradient_threshold": 4e-4,
         "initialisation.first_frame_points": 6000,
         "initialisation.other_frame_points": 1500,

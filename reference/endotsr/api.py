@@ -34,6 +34,7 @@ from endotsr.config import (
     checked,
     config_from_dict,
     lengthened,
+    merged,
     read_toml,
     refuse_unknown_keys,
     with_iterations,
@@ -85,8 +86,9 @@ def make_config(
 
     preset       paper (default), sharp or demo
     file         TOML file, as `endotsr train --config`
-    iterations   length of the run; every milestone keeps its fraction of the run. training={"iterations": n} changes
-                 the length and leaves the milestones where they are
+    iterations   exact length of the run; every milestone keeps its fraction of the run. training={"iterations": n}
+                 changes the length and leaves the milestones where they are. training={"visits_per_frame": v} makes a
+                 run with more than n / v training frames longer
     sections     changes by section: model={"appearance": False}, training={"seed": 3, "threads": 2}
 
     Raises: InputError naming the file or the key, the value and what is allowed.
@@ -419,8 +421,5 @@ def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapp
         if isinstance(iterations, bool) or not isinstance(iterations, int) or iterations < 1:
             raise InputError(f"iterations = {iterations!r} is not allowed; allowed: an integer >= 1")
         config = with_iterations(config, iterations)
-    data = msgspec.to_builtins(config)
-    for section, values in sections.items():
-        known = data.get(section)
-        data[section] = known | dict(values) if isinstance(known, dict) and isinstance(values, Mapping) else values
-    return config_from_dict(data, "arguments")
+    changes = {name: dict(values) if isinstance(values, Mapping) else values for name, values in sections.items()}
+    return config_from_dict(merged(msgspec.to_builtins(config), changes), "arguments")

@@ -217,9 +217,9 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     """Length, seed and bookkeeping of a run."""
 
     iterations: PositiveCount = 6000
-    """number of iterations; each renders one view"""
+    """number of iterations, each of which renders one view; the milestones are written for it"""
     visits_per_frame: Count = 0
-    """least number of iterations per training frame; stretches a run whose length is that of its preset"""
+    """least iterations per training frame: more than `iterations` stretch the run; 0 = exactly `iterations`"""
     residual_activation: Count = 3000
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
@@ -277,7 +277,10 @@ MILESTONES = {
 
 
 def with_iterations(config: Config, iterations: int) -> Config:
-    """The same schedule stretched to `iterations`: every milestone of `MILESTONES` keeps its fraction of the run."""
+    """The same schedule over exactly `iterations`: every milestone of `MILESTONES` keeps its fraction of the run.
+
+    The length is then fixed: `visits_per_frame` is 0.
+    """
     ratio = iterations / config.training.iterations
     changed = {}
     for section, names in MILESTONES.items():
@@ -286,19 +289,21 @@ def with_iterations(config: Config, iterations: int) -> Config:
             old, **{name: max(1, round(getattr(old, name) * ratio)) for name in names}
         )
     changed["training"] = msgspec.structs.replace(changed["training"], iterations=iterations)
-    return msgspec.structs.replace(config, **changed)
+    return with_fixed_length(msgspec.structs.replace(config, **changed))
+
+
+def with_fixed_length(config: Config) -> Config:
+    """The same settings with exactly `training.iterations`, whatever the number of frames."""
+    return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=0))
 
 
 def lengthened(config: Config, training_frames: int) -> Config:
-    """The schedule stretched to `visits_per_frame` iterations for every training frame.
+    """The settings of a run on so many training frames: its length is max(iterations, visits_per_frame x frames).
 
-    Edges: a run that is longer already, or whose length is not that of its preset, stays as it is: the length that a
-           user asks for is kept, and a second call changes nothing.
+    The schedule is stretched to that length and the length is then fixed, so that a second call changes nothing.
     """
-    training, wanted = config.training, config.training.visits_per_frame * training_frames
-    if training.iterations != PRESETS[config.preset].training.iterations or wanted <= training.iterations:
-        return config
-    return with_iterations(config, wanted)
+    wanted = config.training.visits_per_frame * training_frames
+    return with_iterations(config, wanted) if wanted > config.training.iterations else with_fixed_length(config)
 
 
 DEMO = with_iterations(SHARP, 1500)
@@ -308,7 +313,6 @@ DEMO = msgspec.structs.replace(
     # points and threshold suit its 160x128 pixels
     density=msgspec.structs.replace(DEMO.density, gradient_threshold=4e-4),
     initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
-    training=msgspec.structs.replace(DEMO.training, visits_per_frame=0),
 )
 PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
 
@@ -319,7 +323,7 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
     if not isinstance(preset, str) or preset not in PRESETS:
         raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
     refuse_unknown_keys(data, Config, where)
-    config = checked(_merge(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
+    config = checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
     _refuse_contradictions(config, where)
     return config
 
@@ -349,10 +353,17 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
-def _merge(base: dict, override: dict) -> dict:
+def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Settings as plain data with the changes of one source, such as a file, over those of the sources before it.
+
+    A source that gives `iterations` and not `visits_per_frame` gives the length of the run, and ends the
+    `visits_per_frame` of the sources before it.
+    """
+    if "iterations" in changes and "visits_per_frame" in base:
+        changes = {"visits_per_frame": 0} | changes
     return base | {
-        key: _merge(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
-        for key, value in override.items()
+        key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
+        for key, value in changes.items()
     }
 
 

@@ -164,10 +164,8 @@ def test_tracked_motion_is_trained_from_the_first_iteration_at_a_constant_rate_u
     assert "motion_coefficients" not in learning_rates(1, without)
 
 
-def test_a_run_of_the_presets_length_follows_the_number_of_frames():
-    assert lengthened(SHARP, 55).training.iterations == 55 * 128
+def test_the_visits_of_a_frame_stretch_a_run_and_fix_its_length():
     assert lengthened(SHARP, 55) == with_iterations(SHARP, 55 * 128)
     assert lengthened(lengthened(SHARP, 55), 70) == lengthened(SHARP, 55)
-    assert lengthened(SHARP, 20) is SHARP and lengthened(PAPER, 10_000) is PAPER
-    asked = with_iterations(SHARP, 300)
-    assert lengthened(asked, 55) is asked
+    assert lengthened(SHARP, 20) == with_iterations(SHARP, 6000) and lengthened(PAPER, 10_000) == PAPER
+    assert lengthened(SHARP, 55).training.visits_per_frame == 0

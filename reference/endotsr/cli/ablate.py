@@ -35,7 +35,7 @@ class AblateOptions:
     preset: Literal["paper", "sharp", "demo"] = "paper"
     """settings of every run"""
     iterations: Annotated[int | None, Option("N")] = None
-    """length of every run; stretches the schedule"""
+    """exact length of every run; stretches the schedule"""
     scale: float = 1.0
     """image scale"""
     splits: Annotated[tuple[str, ...], Option("SPLIT")] = ("every_eighth",)
@@ -122,7 +122,9 @@ def spec_data(options: AblateOptions) -> dict[str, Any]:
     if length < 2:
         raise InputError(f"ablate: --iterations {length} is not allowed; allowed: an integer >= 2")
     activation = with_iterations(PRESETS[options.preset], length).training.residual_activation
-    keys: dict[str, Any] = {"preset": options.preset, "iterations": length, "splits": list(options.splits)}
+    keys: dict[str, Any] = {"preset": options.preset, "splits": list(options.splits)}
+    if options.iterations is not None:
+        keys["iterations"] = length
     if options.lpips is not None:
         keys["lpips"] = str(options.lpips)
     return ablation_spec(

@@ -7,6 +7,7 @@ from typing import Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import HELP_ALL, parse
 from endotsr.cli.parts.result import JsonFile
+from endotsr.config import DEMO
 from endotsr.errors import InputError
 from endotsr.runs.sources import SIMULATED
 
@@ -20,8 +21,8 @@ class DemoOptions:
 
     out: Annotated[Path, Option("RUN")]
     """run folder to create"""
-    iterations: Annotated[int, Option("N")] = 600
-    """length of the run; stretches the schedule"""
+    iterations: Annotated[int, Option("N")] = DEMO.training.iterations
+    """exact length of the run; stretches the schedule"""
     scale: float = 1.0
     """size of the simulated pictures; 1 = 160x128"""
     seed: int = 0

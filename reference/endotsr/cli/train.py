@@ -43,7 +43,7 @@ class TrainOptions:
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
     iterations: Annotated[int | None, Option("N")] = None
-    """length of the run; stretches the schedule. With --resume: a larger number extends the run"""
+    """exact length of the run; stretches the schedule. With --resume: a larger number extends the run"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
     scale: float | None = None
@@ -125,7 +125,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     sequence = load_sequence(source, config, options.simulator)
     if options.evaluate and source != SIMULATED:
         recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
-    config = lengthened(config, len(sequence.train_index))
+    config, schedule_note = _of_length(config, len(sequence.train_index), schedule_note)
     threads = use_threads(config.training.threads)
     found: dict[str, Any] = {}
     lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
@@ -148,10 +148,10 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
 
     folder = open_run(out)
     kept = folder.config()
-    base = asked_settings(words, kept)
     remembered, simulator = run_source(folder)
-    options = parse(TrainOptions, words, "train", TrainOptions(settings=base, simulator=simulator))
-    asked = _settings(options)
+    options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0], simulator=simulator))
+    frames = len(folder.sequence_record("train_index")["train_index"])
+    asked = asked_settings(TrainOptions, words, lengthened(_settings(options), frames), kept)
     extended = asked.training.iterations > kept.training.iterations
     allowed = RESUMABLE | ({"training.iterations"} if extended else set())
     refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in allowed]
@@ -166,6 +166,17 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
         extend_run(folder, asked.training.iterations)
     resume_run(folder, sequence, threads, Progress(asked.training.iterations))
     return folder, sequence
+
+
+def _of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
+    """The settings with the length of a run on so many training frames, and the line on its schedule."""
+    found, (before, visits) = lengthened(config, frames), (config.training.iterations, config.training.visits_per_frame)
+    if found.training.iterations > before:
+        note = (
+            f"schedule: stretched from {before} to {found.training.iterations} iterations, {visits} for each of "
+            f"{frames} training frames (--iterations N trains exactly N)"
+        )
+    return found, note
 
 
 def _say_settings(config: Config, schedule_note: str) -> None:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from endotsr.config import Config, config_to_toml, load_config
+from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, replacing_folder, write_json
 from endotsr.runs.records import check_run_record, check_sequence_record
@@ -52,8 +52,8 @@ class RunFolder:
         return self.path / "log.jsonl"
 
     def config(self) -> Config:
-        """The resolved settings of the run."""
-        return load_config(self.path / "config.toml")
+        """The resolved settings of the run: its length is `training.iterations`, in runs of earlier versions too."""
+        return with_fixed_length(load_config(self.path / "config.toml"))
 
     def record(self, *needed: str) -> dict[str, Any]:
         """run.json, read anew and checked. Raises InputError if a `needed` key (`input.source`) is missing."""

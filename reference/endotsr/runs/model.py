@@ -23,7 +23,11 @@ if TYPE_CHECKING:
     from endotsr.scene.gaussians import Gaussians
     from endotsr.scene.parameters import FrameParameters
 
-CHANGE_NO_NUMBER = {"training.threads", "training.checkpoint_every"}  # may differ from the checkpoint's
+CHANGE_NO_NUMBER = {  # settings that may differ from the checkpoint's; the length of the run is `training.iterations`
+    "training.threads",
+    "training.checkpoint_every",
+    "training.visits_per_frame",
+}
 
 
 class Model(NamedTuple):

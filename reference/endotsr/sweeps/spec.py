@@ -27,6 +27,7 @@ from endotsr.config import (
     SequenceConfig,
     checked,
     config_from_dict,
+    merged,
     read_toml,
     refuse_unknown_keys,
     with_iterations,
@@ -165,12 +166,11 @@ def _configuration(name: str, values: Any, data: dict[str, Any], where: str) -> 
 
 def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
     refuse_unknown_keys(changes, Config, where)
-    merged = msgspec.to_builtins(config)
     for section, values in changes.items():
         if section == "preset":
             raise InputError(f"{where}: settings.preset is not allowed; allowed: preset beside settings")
-        merged[section] = merged[section] | _table(values, f"{where}: {section}")
-    return config_from_dict(merged, where)
+        _table(values, f"{where}: {section}")
+    return config_from_dict(merged(msgspec.to_builtins(config), changes), where)
 
 
 def _start(value: Any, where: str, config: Config) -> tuple[str, int]:

@@ -1,6 +1,7 @@
 """The settings of a run from preset, TOML file and command line.
 
-Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option.
+Order of the settings: preset < TOML file < `--iterations` (stretches the schedule) < every other option. A source that
+gives the length of the run gives it exactly: `config.merged`.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from endotsr.config import (
     Config,
     config_from_dict,
     read_toml,
+    with_fixed_length,
     with_iterations,
 )
 from endotsr.errors import InputError
@@ -54,7 +56,7 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
     if sources.schedule == "absolute":
         training = msgspec.structs.replace(config.training, iterations=sources.iterations)
         note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
-        return msgspec.structs.replace(config, training=training), note
+        return with_fixed_length(msgspec.structs.replace(config, training=training)), note
     note = (
         f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its fraction "
         "(--schedule absolute leaves them in place)"
@@ -62,24 +64,24 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
     return with_iterations(config, sources.iterations), note if sources.iterations != before else ""
 
 
-def asked_settings(words: list[str], kept: Config) -> Config:
-    """The settings `kept` of a run, changed by the TOML file, `--iterations` and `--schedule` of the command line.
+def asked_settings(options: type, words: list[str], wanted: Config, kept: Config) -> Config:
+    """The settings `kept` of a run, changed where the command line or its TOML file names a setting.
 
-    Every other setting is that of the run, so that only explicit changes can differ from the run.
+    wanted   settings that a new run with these words would have, of the length for its number of frames
     """
-    base, _ = base_settings(words)
-    sources = parse_known(Sources, words)
-    asked = read_toml(sources.config) if sources.config else {}
-    named = {(section, key) for section, values in asked.items() if isinstance(values, dict) for key in values}
-    if sources.iterations is not None:
-        named.add(("training", "iterations"))
-        if sources.schedule is not None:
-            named |= {(section, key) for section, keys in MILESTONES.items() for key in keys}
-    data, wanted = msgspec.to_builtins(kept), msgspec.to_builtins(base)
-    for section, key in named:
-        data[section][key] = wanted[section][key]
-    if sources.preset or "preset" in asked:
-        data["preset"] = wanted["preset"]
+    sources, named = parse_known(Sources, words), explicit_settings(options, words)
+    if sources.iterations is not None or "training.visits_per_frame" in named:
+        named |= {"training.iterations"}
+    if sources.iterations is not None and sources.schedule is not None:
+        named |= {f"{section}.{key}" for section, keys in MILESTONES.items() for key in keys}
+    if sources.preset or (sources.config and "preset" in read_toml(sources.config)):
+        named |= {"preset"}
+    data, new = msgspec.to_builtins(kept), msgspec.to_builtins(wanted)
+    for section, _, key in (name.partition(".") for name in named):
+        if not key:
+            data[section] = new[section]
+        elif section in data:  # the simulator's sections are no settings of a run
+            data[section][key] = new[section][key]
     return config_from_dict(data, str(sources.config or "command line"))
 
 

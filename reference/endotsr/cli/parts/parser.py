@@ -15,7 +15,7 @@ import msgspec
 from endotsr.cli.parts.fields import REQUIRED, Field, fields_of
 from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
-from endotsr.config import allowed_values, checked
+from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
 
 T = TypeVar("T")
@@ -194,7 +194,7 @@ def _built(options: type[T], fields: list[Field], given: dict[tuple[str, ...], A
     for name, changes in sections.items():
         start = values.get(name, getattr(options, name))
         flat = any(field.path[0] == name and not field.key.startswith(f"{name}.") for field in fields)
-        data = _merged(msgspec.to_builtins(start), changes)
+        data = merged(msgspec.to_builtins(start), changes)
         values[name] = checked(data, type(start), "command line", "" if flat else f"{name}.")
     return options(**values)
 
@@ -203,7 +203,3 @@ def _put(tree: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
     for name in path[:-1]:
         tree = tree.setdefault(name, {})
     tree[path[-1]] = value
-
-
-def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    return base | {k: _merged(base[k], v) if isinstance(v, dict) else v for k, v in changes.items()}
