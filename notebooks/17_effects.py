@@ -24,6 +24,7 @@
 import os
 
 import matplotlib.pyplot as plt
+import msgspec
 import numpy as np
 
 from endotsr.config import PAPER
@@ -33,8 +34,8 @@ from endotsr.effects.noise import temporal_noise
 from endotsr.effects.plan import apply_plan, make_plan
 from endotsr.effects.rigid import inverse_depth
 from endotsr.effects.savings import memory_fraction, numbers_of_a_gaussian
-from endotsr.effects.study import settings_of
 from endotsr.equations.dictionary import frequencies, report_atoms
+from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
@@ -45,7 +46,8 @@ CLIPS = {
     "beating": ("noise", "pulsation"),
     "light": ("noise", "exposure"),
 }
-made = {name: simulate(settings_of(effects, 7, FRAMES)) for name, effects in CLIPS.items()}
+plain = SimulatorSettings(frames=FRAMES, seed=7)
+made = {name: simulate(with_effects(plain, *effects)) for name, effects in CLIPS.items()}
 found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 
 # %% [markdown]
@@ -140,7 +142,9 @@ def seen_at_text(camera, start, x, y, rho):
 
 
 # %%
-swing = simulate(settings_of(("noise", "camera_motion"), 7, 9, 5.0))
+change = msgspec.structs.replace
+settings = with_effects(SimulatorSettings(frames=9, seed=7), "noise", "camera_motion")
+swing = simulate(change(settings, camera_motion=change(settings.camera_motion, amplitude=5.0)))
 clip = training_clip(swing.sequence)
 start, reference = clip.cameras[clip.reference], int(swing.sequence.train_index[clip.reference])
 row, column = 3 * TILE, 5 * TILE

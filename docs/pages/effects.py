@@ -50,7 +50,7 @@ SCENES = {
 
 def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
     """The study of the tests, with seeds that no threshold was set with."""
-    from endotsr.effects.study import FIRST_SEED, answer_of, summary, trials, wrong
+    from effects_study import FIRST_SEED, answer_of, summary, trials, wrong
 
     chosen = range(FIRST_SEED if first is None else first, (FIRST_SEED if first is None else first) + seeds)
     clips = {trial.key: trial for trial in trials(chosen)}
@@ -100,7 +100,8 @@ def _real_pair(folder: Path, seed: int) -> dict[str, Any]:
 
 
 def _clip(name: str, seed: int) -> Any:
-    from endotsr.effects.study import settings_of
+    from effects_study import settings_of
+
     from endotsr.simulator.simulate import simulate
 
     return simulate(settings_of(SCENES[name], seed, TRAIN_FRAMES)).sequence

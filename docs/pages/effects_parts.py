@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from effects_study import ANSWERS, UNITS
 from over_seeds import interval
 
-from endotsr.effects.study import ANSWERS, UNITS
 from endotsr.report.tables import markdown
 
 ANSWERED = {

@@ -50,7 +50,8 @@ def truth(file: Path, seeds: int, iterations: int) -> dict[str, Any]:
 
 def simulated_scene(scene: str, seed: int, frames: int = FRAMES) -> Any:
     """160x128 pixels."""
-    from endotsr.effects.study import settings_of
+    from effects_study import settings_of
+
     from endotsr.simulator.simulate import simulate
 
     return simulate(settings_of(SCENES[scene], seed, frames))

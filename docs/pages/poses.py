@@ -45,8 +45,8 @@ POSES = ("true", "disturbed", "corrected")
 def scene_of(name: str, seed: int) -> Sequence:
     """A simulated scene with its true poses."""
     import msgspec
+    from effects_study import settings_of
 
-    from endotsr.effects.study import settings_of
     from endotsr.simulator.simulate import simulate
 
     found = settings_of(("noise", *SCENES[name], "camera_motion"), seed, FRAMES, SWING)

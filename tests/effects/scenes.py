@@ -2,8 +2,9 @@
 
 from functools import cache
 
+from effects_study import settings_of
+
 from endotsr.effects.inspect import Inspection, inspect_sequence
-from endotsr.effects.study import settings_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.simulate import simulate
 

@@ -1,11 +1,11 @@
 """A moving camera: what a rigid scene explains is no motion of the tissue, and what it does not explain is."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from effects_sinus import read_sinus
+from effects_study import settings_of
 from scenes import clip
 
 from data_folder import data_folder
@@ -13,7 +13,6 @@ from endotsr.effects.clip import TILE, training_clip
 from endotsr.effects.motion import motion_verdict
 from endotsr.effects.noise import estimate_noise
 from endotsr.effects.rigid import fit_rigid, inverse_depth, predicted_flow
-from endotsr.effects.study import settings_of
 from endotsr.effects.tracks import make_tracks
 from endotsr.simulator.simulate import simulate
 
@@ -111,10 +110,5 @@ def test_flow_that_does_not_return_counts_as_noise():
 def test_the_rigid_anatomy_of_a_real_clip_does_not_move():
     """35 frames of a nose, the camera moves: the size of the flow is 20 pixels."""
     folder = data_folder("sinus_endoscopy")
-    sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "pages"))
-    try:
-        from effects_sinus import read_sinus
-    finally:
-        sys.path.pop(0)
     verdict = _motion(read_sinus(folder))
     assert verdict.kind == "none"

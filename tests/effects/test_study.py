@@ -1,8 +1,7 @@
 """The study of the tests: its clips are known, its seeds are fresh, its counts are those of the answers."""
 
 import pytest
-
-from endotsr.effects.study import (
+from effects_study import (
     ANSWERS,
     FIRST_SEED,
     FOUND,
@@ -15,6 +14,7 @@ from endotsr.effects.study import (
     trials,
     wrong,
 )
+
 from endotsr.simulator.settings import EFFECTS
 
 SEEDS = range(FIRST_SEED, FIRST_SEED + 2)

@@ -5,12 +5,12 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from effects_study import blurred, smoky
 from scenes import clip, inspected
 
 from endotsr.effects.clip import training_clip, with_clear_reference
 from endotsr.effects.inspect import inspect_sequence
 from endotsr.effects.noise import estimate_noise
-from endotsr.effects.study import blurred, smoky
 from endotsr.effects.topology import local_correlation, topology_verdict
 from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate

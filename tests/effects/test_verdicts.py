@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from effects_study import blurred, expectation, settings_of, smoky
 from scenes import clip, inspected
 
 from endotsr.effects.clip import training_clip
 from endotsr.effects.inspect import EFFECTS, inspect_sequence, inspection_record
 from endotsr.effects.noise import estimate_noise
-from endotsr.effects.study import blurred, expectation, settings_of, smoky
 from endotsr.effects.verdict import Verdict
 from endotsr.effects.views import view_verdict
 from endotsr.errors import InputError

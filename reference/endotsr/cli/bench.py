@@ -1,6 +1,6 @@
 """`endotsr bench`: the time of each stage of a training iteration on this machine, beside its lower limit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -71,10 +71,11 @@ def _refuse(options: BenchOptions) -> None:
 
 def cases_of(options: BenchOptions) -> list[Case]:
     """Every combination of scene, precision and threads; the common workload comes first, grouped by size."""
-    same = {"width": options.width, "height": options.height, "repeats": options.repeats}
-    scenes = [{"gaussians": n} for n in options.gaussians] + [{"scene": str(path)} for path in options.scenes]
+    base = Case(width=options.width, height=options.height, repeats=options.repeats)
+    scenes = [replace(base, gaussians=n) for n in options.gaussians]
+    scenes += [replace(base, scene=str(path)) for path in options.scenes]
     return [
-        Case(**scene, **same, precision=precision, threads=threads)
+        replace(scene, precision=precision, threads=threads)
         for scene in scenes
         for precision in options.precisions
         for threads in options.threads
