@@ -15,6 +15,10 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
+CONTRACTING = {  # the fast compositing, and measurements that compare with it
+    *("splatting/fast/blocks.py", "splatting/fast/tiles.py"),
+    *("bench/peaks.py", "tradeoff/kernels.py"),
+}
 PEERS = [
     ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")
 ]  # another program beside ours
@@ -86,17 +90,10 @@ def test_compiled_kernels_go_through_the_one_jit():
                 assert node.arg != "fastmath", f"{file}:{node.value.lineno}: fastmath"
 
 
-def test_contraction_only_in_fast_path_files():
-    """`jit(contract=True)` may change the last digit: only files whose docstring says so (contract) use it."""
-    for file in SOURCES:
-        if file.name == "jit.py":
-            continue
-        tree = parse(file)
-        uses = [n for n in ast.walk(tree) if isinstance(n, ast.keyword) and n.arg == "contract"]
-        if uses:
-            assert "fast path" in " ".join((ast.get_docstring(tree) or "").lower().split()), (
-                f"{file} contracts but its docstring does not say that it is a fast path"
-            )
+def test_contraction_only_in_the_fast_compositing():
+    """`jit(contract=True)` may change the last digit: only the kernels that `exact` checks to a bound use it."""
+    uses = [f for f in SOURCES for n in ast.walk(parse(f)) if isinstance(n, ast.keyword) and n.arg == "contract"]
+    assert {f.relative_to(PACKAGE).as_posix() for f in uses} == CONTRACTING
 
 
 @pytest.mark.parametrize("file", ORACLES, ids=lambda file: file.name)
