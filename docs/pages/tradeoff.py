@@ -2,6 +2,7 @@
 
     python docs/pages/tradeoff.py render [SPLATS.npz ...]    the simulated scene, then trained scenes
     python docs/pages/tradeoff.py train SEQUENCE [OPTIONS]   trainings; OPTIONS as of `endotsr tradeoff train`
+    python docs/pages/tradeoff.py draw DIR                   pictures of a measurement of `endotsr tradeoff --out DIR`
     python docs/pages/tradeoff.py                            pictures and page once more from the files
 
 Run it while the machine has nothing else to do. `train` goes on where it was interrupted: its file is kept in
@@ -10,16 +11,24 @@ docs/_build/tradeoff until the study is complete. A SEQUENCE is a sequence folde
 
 import shutil
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from marks import read_json, write_marked
+from tradeoff_curves import draw_training
+from tradeoff_figures import draw
 from tradeoff_parts import fragments
+from tradeoff_study import run_whole_study
 
 from endotsr.cli.main import main as endotsr
-from endotsr.tradeoff.figures import draw
-from endotsr.tradeoff.training_page import draw_training
+from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.tradeoff import RESULT, TradeoffOptions, chosen_scene
+from endotsr.cli.tradeoff_train import TRAINING
+from endotsr.errors import InputError
+from endotsr.kernels.threads import use_threads
+from endotsr.runs.files import write_json
+from endotsr.tradeoff.results import read_result
+from endotsr.tradeoff.study import described
 
 DOCS = Path(__file__).parents[1]
 PAGE, RESULTS = DOCS / "tradeoff.md", DOCS / "results"
@@ -27,12 +36,25 @@ COMMAND = "python docs/pages/tradeoff.py render"
 WORK = DOCS / "_build" / "tradeoff"
 
 
-def measure(name: str, *words: str) -> None:
-    """One scene to docs/results/NAME.json."""
-    with tempfile.TemporaryDirectory() as folder:
-        if endotsr(["tradeoff", "--out", folder, *words]):
-            sys.exit(1)
-        shutil.copy(Path(folder) / "tradeoff.json", RESULTS / f"{name}.json")
+def measure(name: str, splats: Path | None = None) -> None:
+    """One scene, simulated or from a file of Gaussians, to docs/results/NAME.json."""
+    options = TradeoffOptions(splats=splats)
+    use_threads(options.threads)
+    with StepBar("settings") as bar:
+        found = run_whole_study(chosen_scene(options), begin=bar.begin, step=bar.step)
+    write_json(RESULTS / f"{name}.json", described(found))
+
+
+def draw_measured(folder: Path) -> None:
+    """Pictures of the measurements in a folder, beside them. Raises: InputError if there is none."""
+    drawn = []
+    if (folder / RESULT).exists():
+        drawn += draw(read_result(folder / RESULT), folder)
+    if (folder / TRAINING).exists():
+        drawn += draw_training(read_result(folder / TRAINING), folder, "training")
+    if not drawn:
+        raise InputError(f"{folder}: holds no measurement; make one with `endotsr tradeoff --out {folder}`")
+    print(*(folder / f"{stem}.png" for stem in drawn), sep="\n")
 
 
 def train(sequence: str, words: list[str]) -> None:
@@ -71,15 +93,20 @@ def write_page() -> None:
 
 def main(words: list[str]) -> None:
     """The command."""
-    if words[:1] == ["render"]:
-        measure("tradeoff")
-        for splats in words[1:]:
-            measure(f"tradeoff_{Path(splats).stem.removesuffix('_splats')}", "--splats", splats)
-    elif words[:1] == ["train"] and len(words) > 1:
-        train(words[1], words[2:])
-    elif words:
-        sys.exit(__doc__)
-    write_page()
+    try:
+        if words[:1] == ["draw"] and len(words) == 2:
+            return draw_measured(Path(words[1]))
+        if words[:1] == ["render"]:
+            measure("tradeoff")
+            for splats in words[1:]:
+                measure(f"tradeoff_{Path(splats).stem.removesuffix('_splats')}", Path(splats))
+        elif words[:1] == ["train"] and len(words) > 1:
+            train(words[1], words[2:])
+        elif words:
+            sys.exit(__doc__)
+        write_page()
+    except InputError as error:
+        sys.exit(f"error: {error}")
 
 
 if __name__ == "__main__":

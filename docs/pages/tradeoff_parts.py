@@ -2,21 +2,20 @@
 
 from typing import Any
 
+from tradeoff_dials import OMITTED
+
 from endotsr.report.tables import markdown
-from endotsr.tradeoff.page import (
+from endotsr.tradeoff.text import (
     COLUMNS,
     advice,
-    certificate_line,
     eight_bit_setting,
     error_over_cutoff,
     float32_floor,
     front_rows,
     levels,
     made,
-    preset_lines,
 )
-from endotsr.tradeoff.settings import OMITTED
-from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_rows
+from endotsr.tradeoff.training_text import best_by_time, gain_by_minute, summary, training_rows
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 
@@ -41,6 +40,33 @@ def fragments(
         "scenes": scenes(result, others),
         "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
     }
+
+
+def preset_lines(result: dict[str, Any]) -> list[str]:
+    """Status of each preset: on the front, or dominated by other settings and kept for a reason."""
+    lines = []
+    for name, verdict in result["preset_verdicts"].items():
+        better, reason = verdict["dominated_by"], verdict["reason"]
+        if not better:
+            lines.append(f"`{name}`: nothing measured dominates it.")
+        else:
+            stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
+            lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
+    return lines
+
+
+def _more(count: int) -> str:
+    return f" and {count} more" if count else ""
+
+
+def certificate_line(result: dict[str, Any]) -> str:
+    """The figures of the certificate."""
+    c = result["reference"]["certificate"]
+    return (
+        f"Reference: differs from a cutoff of 1e-14 by {c['exact_against_1e14']:.1e}, from mpmath (30 digits) at "
+        f"{c['pixels']} pixels by {c['pixels_against_mpmath']:.1e}; cutoffs 1e-12 and 1e-14 differ by "
+        f"{c['cut_1e12_against_1e14']:.1e}. {'The certificate holds.' if c['holds'] else 'THE CERTIFICATE FAILS.'}"
+    )
 
 
 def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from made_up import moving_scene
+from tradeoff_certificate import certify
 
-from endotsr.tradeoff.certificate import certify
 from endotsr.tradeoff.measure import frame, prepare
 from endotsr.tradeoff.settings import ACCURATE, CLOSE
 from endotsr.tradeoff.study import reference_setting

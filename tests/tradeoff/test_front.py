@@ -33,7 +33,7 @@ def unexplained(result) -> list[str]:
 
 @pytest.fixture(scope="module")
 def result():
-    return run_study(moving_scene(count=80, width=32), repeats=1, wanted=frozenset({"joint"}))
+    return run_study(moving_scene(count=80, width=32), repeats=1)
 
 
 def test_no_preset_is_dominated_without_a_reason(result):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from tradeoff_labels import Label, _line_points, _text_box, place_labels
 
 from endotsr.report.style import new_figure
-from endotsr.tradeoff.labels import Label, _line_points, _text_box, place_labels
 
 
 def chart(points):

@@ -5,18 +5,19 @@ import math
 import numpy as np
 import pytest
 from made_up import moving_scene
+from tradeoff_dials import EXPONENTIALS, TILES
+from tradeoff_kernels import Variant, exponential_coefficients
 
 from endotsr.fitting.model import scene_at
 from endotsr.splatting.render import render_forward
 from endotsr.splatting.settings import EXACT
-from endotsr.tradeoff import settings as dials
-from endotsr.tradeoff.kernels import exponential_coefficients
+from endotsr.tradeoff import settings
 from endotsr.tradeoff.measure import errors, frame, prepare
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
 from endotsr.tradeoff.study import reference_setting
 
-CUTOFFS = sorted(dials.CUTOFFS.values())
-STOPS = sorted(dials.STOPS.values())
+CUTOFFS = sorted(settings.CUTOFFS.values())
+STOPS = sorted(settings.STOPS.values())
 
 
 @pytest.fixture(scope="module")
@@ -64,14 +65,14 @@ def test_errors_rise_and_visits_fall_with_the_dial(field, values):
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_tiles_change_no_bit_of_the_image(scene, precision):
     base = with_raster(alpha_cutoff=1 / 255)._replace(compositor="definition", precision=precision)
-    images = [frame(prepare(scene, base._replace(tile=side)))[0].colour for side in (None, *dials.TILES)]
+    images = [frame(prepare(scene, base._replace(kernels=Variant(tile=side))))[0].colour for side in (None, *TILES)]
     assert all(np.array_equal(image, images[0]) for image in images)
 
 
 def test_tiles_change_gradients_by_rounding_only(scene):
     """Sums over a Gaussian's pixels are grouped by tile: another grouping, another last digit."""
     base = with_raster(alpha_cutoff=1 / 255)._replace(compositor="definition")
-    one, other = (frame(prepare(scene, base._replace(tile=side)))[0] for side in (8, 32))
+    one, other = (frame(prepare(scene, base._replace(kernels=Variant(tile=side))))[0] for side in (8, 32))
     assert errors(one, other).gradient < 1e-13
 
 
@@ -110,12 +111,12 @@ def test_visits_grow_like_the_logarithm_of_one_over_the_cutoff():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [2, *dials.EXPONENTIALS])
+@pytest.mark.parametrize("degree", [2, *EXPONENTIALS])
 def test_the_image_errs_no_more_than_the_exponential(scene, reference, degree):
     """An error of alpha by a factor 1 + d changes the image by less than d times the sum of alpha T, which is < 1."""
     f = np.linspace(-1, 0, 2001)
     relative = np.abs(np.polyval(exponential_coefficients(degree), f) / np.exp2(f) - 1).max()
-    error, _ = measured(scene, reference, ACCURATE._replace(exponential=degree))
+    error, _ = measured(scene, reference, ACCURATE._replace(kernels=Variant(exponential=degree)))
     brightest = 2 * np.abs(reference.colour).max() + 1
     assert error.max <= relative * brightest + 5 * CLOSE.alpha_cutoff
     assert degree > 3 or error.max > 1e-3 * relative

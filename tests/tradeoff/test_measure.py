@@ -5,6 +5,9 @@ import json
 import numpy as np
 import pytest
 from made_up import moving_scene
+from tradeoff_dials import TILES
+from tradeoff_kernels import Variant
+from tradeoff_study import run_whole_study
 
 from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import scene_at
@@ -13,16 +16,15 @@ from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.splatting.projection import footprint
 from endotsr.splatting.render import render_forward
 from endotsr.splatting.settings import PRESETS
-from endotsr.tradeoff.kernels import kernels_of
 from endotsr.tradeoff.measure import _upsampling, errors, forward, frame, prepare, reverse, terms
-from endotsr.tradeoff.settings import ACCURATE, CLOSE, TILES
-from endotsr.tradeoff.study import cost_of, described, run_study
+from endotsr.tradeoff.settings import ACCURATE, CLOSE
+from endotsr.tradeoff.study import cost_of, described
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("images")
-    return described(run_study(moving_scene(count=30, width=24), repeats=1, images=folder)), folder
+    return described(run_whole_study(moving_scene(count=30, width=24), repeats=1, images=folder)), folder
 
 
 def test_every_error_of_the_chart_is_that_of_the_saved_images(study):
@@ -173,7 +175,7 @@ def test_gradients_at_half_size_are_those_of_the_same_functional():
 
 def test_kernels_are_back_in_place_after_use():
     blocks, definition = compositing_blocks._blend_kernel, compositing._composite_kernel
-    with pytest.raises(RuntimeError), kernels_of(ACCURATE._replace(exponential=3, tile=TILES[0])):
+    with pytest.raises(RuntimeError), Variant(exponential=3, tile=TILES[0])():
         assert compositing_blocks._blend_kernel is not blocks
         assert compositing._composite_kernel is not definition
         raise RuntimeError

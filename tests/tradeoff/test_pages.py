@@ -1,16 +1,16 @@
-"""Pictures whose words can be read, and a page that needs no other file."""
+"""Pictures whose words can be read, and sentences with the figures of the measurement."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
 from made_up import moving_scene
+from tradeoff_figures import dials_figure, draw, main_figure
+from tradeoff_study import run_whole_study
 
-from endotsr.tradeoff.figures import dials_figure, draw, main_figure
-from endotsr.tradeoff.page import PICTURES, advice, error_over_cutoff, plain, write_page
 from endotsr.tradeoff.settings import CUTOFFS
-from endotsr.tradeoff.study import described, run_study
+from endotsr.tradeoff.study import described
+from endotsr.tradeoff.text import advice, error_over_cutoff
 
 ROOT = Path(__file__).parents[2]
 COMMITTED = sorted((ROOT / "docs" / "results").glob("tradeoff*.json"))
@@ -18,7 +18,7 @@ COMMITTED = sorted((ROOT / "docs" / "results").glob("tradeoff*.json"))
 
 @pytest.fixture(scope="module")
 def result():
-    return described(run_study(moving_scene(count=24, width=24), repeats=1))
+    return described(run_whole_study(moving_scene(count=24, width=24), repeats=1))
 
 
 def overlaps(figure) -> list[tuple[str, str]]:
@@ -57,16 +57,14 @@ def test_no_word_covers_another_in_the_committed_pictures(file):
 
 
 @pytest.mark.slow
-def test_the_page_stands_alone(result, tmp_path):
+def test_pictures_are_drawn(result, tmp_path):
+    """Of the whole study, and of the measurement of the command, which has no dials."""
     stems = draw(result, tmp_path)
-    assert stems == [f"tradeoff{ending}" for ending in PICTURES]
+    assert stems == ["tradeoff", "tradeoff_dials", "tradeoff_dials_visits", "tradeoff_dials_gradients"]
     for stem in stems:
         assert (tmp_path / f"{stem}.png").read_bytes()[:4] == b"\x89PNG"
         assert "<svg" in (tmp_path / f"{stem}.svg").read_text()
-    text = write_page(result, tmp_path).read_text(encoding="utf-8")
-    assert text.count("data:image/png;base64,") == len(stems)
-    assert not re.search(r'(src|href)="(?!data:)', text)
-    assert all(plain(sentence) in text for sentence in advice(result))
+    assert draw({key: value for key, value in result.items() if key != "dials"}, tmp_path) == ["tradeoff"]
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from endotsr.runs.sources import load_sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.tradeoff import training
 from endotsr.tradeoff.training import changed, configurations, measured, run_training_study
-from endotsr.tradeoff.training_page import best_by_time, gain_by_minute, summary, training_lines, training_rows
+from endotsr.tradeoff.training_text import best_by_time, gain_by_minute, summary, training_lines, training_rows
 
 SMALL = SimulatorSettings(width=64, height=64, frames=9)
 BASE = msgspec.structs.replace(

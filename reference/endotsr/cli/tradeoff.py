@@ -23,7 +23,7 @@ LEAST_REPEATS = 7
 
 @dataclass
 class TradeoffOptions:
-    """Measure error against time for every setting of the renderer: JSON, pictures and a page in --out.
+    """Measure error against time for every setting of the renderer; the figures are kept in --out.
 
     The scene is simulated, a trained --run, or a file of --splats. `endotsr tradeoff train` does the same for training;
     see its --help. With --budget, the setting is chosen from the measurement in --out, which is made if it is missing.
@@ -97,9 +97,9 @@ def _refuse(options: TradeoffOptions) -> None:
 
 def _measure(options: TradeoffOptions) -> dict[str, Any]:
     from endotsr.kernels.threads import use_threads
-    from endotsr.tradeoff.figures import draw
-    from endotsr.tradeoff.page import advice, certificate_line, made, write_page
+    from endotsr.report.tables import plain
     from endotsr.tradeoff.study import described, run_study
+    from endotsr.tradeoff.text import COLUMNS, advice, front_rows, made
 
     use_threads(options.threads)
     out = options.out
@@ -116,9 +116,7 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
         )
     result = described(found)
     write_json(out / RESULT, result)
-    draw(result, out)
-    page = write_page(result, out)
-    print(made(result), certificate_line(result), *advice(result), f"page: {page}", sep="\n")
+    print(made(result), *advice(result), plain(COLUMNS, front_rows(result)), f"figures: {out / RESULT}", sep="\n")
     return result
 
 

@@ -56,7 +56,7 @@ def run(words: list[str]) -> int:
     from endotsr.runs.sources import load_sequence
     from endotsr.simulator.settings import SimulatorSettings
     from endotsr.tradeoff.training import run_training_study
-    from endotsr.tradeoff.training_page import draw_training, training_lines
+    from endotsr.tradeoff.training_text import training_lines
 
     use_threads(options.threads)
     preset = options.preset or ("demo" if options.sequence == SIMULATED else "paper")
@@ -76,6 +76,5 @@ def run(words: list[str]) -> int:
             step=bar.step,
             say=bar.say,
         )
-    draw_training(result, options.out, "training")
     print("\n".join(training_lines(result)))
     return 0

@@ -1,6 +1,6 @@
-"""Accuracy against time: errors against the certified exact renderer, beside seconds and visits.
+"""Accuracy against time: errors against the exact renderer, beside seconds and visits.
 
-`scenes` are the rendered scenes; `settings` the dials; `measure` gives errors and costs of one setting; `certificate`
-verifies the reference; `study` runs the whole measurement; `front` finds the settings that are not dominated; `budget`
-chooses among them; `training` does the same for fits; `figures` and `page` present the results.
+`scenes` are the rendered scenes; `settings` the measured ones; `measure` gives errors and costs of one setting; `study`
+runs the measurement; `front` finds the settings that are not dominated; `budget` chooses among them; `training` does
+the same for fits; `text` and `training_text` put the results into words.
 """

@@ -9,7 +9,7 @@ import re
 from typing import Any, Literal, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.tradeoff.page import levels, milliseconds
+from endotsr.tradeoff.text import levels, milliseconds
 
 Kind = Literal["frame", "error", "training"]
 

@@ -16,11 +16,9 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, RenderSaved, render_forward, render_reverse
-from endotsr.tradeoff.kernels import kernels_of
 from endotsr.tradeoff.scenes import StudyScene, in_precision, scaled
 from endotsr.tradeoff.settings import Setting
 
-LEVELS = 255.0
 BLOCKS = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics", "residual")  # of the deformed scene
 WEIGHT_SEED = 5
 
@@ -127,7 +125,7 @@ def reverse(prepared: Prepared, saved: RenderSaved, scene_saved: SceneSaved) -> 
 
 def frame(prepared: Prepared) -> tuple[Frame, int]:
     """The frame in float64 at full resolution, and its visits."""
-    with kernels_of(prepared.setting), threads(prepared.setting.threads):
+    with prepared.setting.kernels(), threads(prepared.setting.threads):
         out, saved, scene_saved = forward(prepared)
         visits = count_pairs(saved).visited
         grads = reverse(prepared, saved, scene_saved)
@@ -163,7 +161,7 @@ def terms(prepared: Prepared) -> int:
 
 def seconds(prepared: Prepared) -> tuple[float, float]:
     """Seconds of one frame: (forward, forward + reverse)."""
-    with kernels_of(prepared.setting), threads(prepared.setting.threads):
+    with prepared.setting.kernels(), threads(prepared.setting.threads):
         began = time.perf_counter()
         _, saved, scene_saved = forward(prepared)
         middle = time.perf_counter()

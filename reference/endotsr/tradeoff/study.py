@@ -1,6 +1,6 @@
-"""The whole measurement of one scene: reference and certificate, every dial, the joint sweep, the presets, the fronts.
+"""The measurement of one scene: the reference, the joint sweep, the presets, the fronts.
 
-The result is one JSON-able dictionary, `tradeoff.json`; `figures`, `page` and `budget` read nothing else.
+The result is one JSON-able dictionary, `tradeoff.json`; `text` and `budget` read nothing else.
 """
 
 import math
@@ -12,59 +12,35 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.runs.machine import machine, now, versions
-from endotsr.tradeoff.certificate import Certificate, certify
+from endotsr.runs.machine import dated
 from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
-from endotsr.tradeoff.measure import LEVELS, Frame, Prepared, errors, frame, prepare, seconds, terms
+from endotsr.tradeoff.measure import Frame, Prepared, errors, frame, prepare, seconds, terms
 from endotsr.tradeoff.results import FORMAT
 from endotsr.tradeoff.scenes import StudyScene
-from endotsr.tradeoff.settings import CLOSE, OMITTED, Setting, dials, joint, presets
+from endotsr.tradeoff.settings import CLOSE, Setting, joint, presets
+from endotsr.tradeoff.text import LEVELS
 
 REPEATS = 7
 EXACT_PAIRS = 150e6  # Gaussians x pixels up to which the reference is the exact path itself
-SLOW_DIALS = ("support", "exponential", "tile")  # they need the path `definition`
 COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse", "visits": "pixel-Gaussian pairs"}
 
 Progress = Callable[[int], None]  # called with the number of completed steps
 
 
 class Plan:
-    """Every setting once, under a name, even if several dials contain it.
+    """Every setting once, under a name: those of the presets and of the joint sweep."""
 
-    wanted   names of the dials to measure, `joint` for the sweep; None = all. The presets always are.
-    """
-
-    def __init__(self, scene: StudyScene, wanted: frozenset[str] | None = None) -> None:
+    def __init__(self, scene: StudyScene) -> None:
         self.names: dict[Setting, str] = {}
-        small = exact_is_possible(scene)
-        chosen = [
-            d
-            for d in dials(scene.degree, scene.bases, scene.frequencies, scene.near)
-            if _in(d.name, wanted) and (small or d.name not in SLOW_DIALS)
-        ]
-        self.presets = {n: self._add(n, s) for n, s in presets(scene.degree, scene.near).items()}
-        if not small:
+        self.presets = {n: self.add(n, s) for n, s in presets(scene.degree, scene.near).items()}
+        if not exact_is_possible(scene):
             self.names.pop(presets(scene.degree, scene.near)["exact"])
             self.presets.pop("exact")
-        sweep = joint(scene.degree, scene.near) if _in("joint", wanted) else {}
-        self.joint = [self._add(label, setting) for label, setting in sweep.items()]
-        self.dials = [
-            {
-                "name": d.name,
-                "title": d.title,
-                "cost": d.cost,
-                "lossless": d.lossless,
-                "points": {label: self._add(f"{d.title} {label}", s) for label, s in d.values.items()},
-            }
-            for d in chosen
-        ]
+        self.joint = [self.add(label, setting) for label, setting in joint(scene.degree, scene.near).items()]
 
-    def _add(self, name: str, setting: Setting) -> str:
+    def add(self, name: str, setting: Setting) -> str:
+        """The name of a setting, the given one if it is new."""
         return self.names.setdefault(setting, name)
-
-
-def _in(name: str, wanted: frozenset[str] | None) -> bool:
-    return wanted is None or name in wanted
 
 
 def exact_is_possible(scene: StudyScene) -> bool:
@@ -83,7 +59,7 @@ def run_study(
     scene: StudyScene,
     *,
     repeats: int = REPEATS,
-    wanted: frozenset[str] | None = None,
+    plan: Plan | None = None,
     images: Path | None = None,
     begin: Callable[[int], None] = lambda steps: None,
     step: Progress = lambda steps: None,
@@ -91,16 +67,15 @@ def run_study(
     """Measure everything.
 
     repeats   timed frames of every setting, after one that warms up
-    wanted    dials to measure (`joint` names the sweep); None = all
+    plan      the settings; None = presets and joint sweep
     images    folder to keep the image and the gradients of every setting in, or None
     begin     is called once with the number of steps, `step` with the number of completed ones
     returns   tradeoff.json without date and machine (`described` adds them)
     """
-    plan = Plan(scene, wanted)
+    plan = plan or Plan(scene)
     begin(1 + len(plan.names) * (1 + repeats))
     aim = reference_setting(scene)
     reference, reference_visits = frame(prepare(scene, aim))
-    certificate = certify(scene, reference.colour, aim.raster)
     step(1)
     if images is not None:
         _keep(images, "reference", reference)
@@ -114,31 +89,23 @@ def run_study(
         step(1)
     for point, times in zip(points, _timed(prepared, repeats, step), strict=True):
         point["forward"], point["both"] = (_spread(column) for column in times.T)
-    return _result(scene, plan, aim, certificate, points) | {"repeats": repeats}
-
-
-def _result(
-    scene: StudyScene, plan: Plan, aim: Setting, certificate: Certificate, points: list[dict[str, Any]]
-) -> dict[str, Any]:
-    """The keys of tradeoff.json."""
     return {
         "format": FORMAT,
         "scene": _about(scene),
-        "reference": {"setting": setting_dict(aim), "certificate": certificate.as_dict()},
+        "reference": {"setting": setting_dict(aim)},
         "lines": {"eight_bit": 0.5 / LEVELS, "sensor_noise": scene.noise},
         "points": points,
-        "dials": plan.dials,
         "joint": plan.joint,
         "presets": plan.presets,
         "preset_verdicts": judge_presets(points, plan.presets),
         "fronts": {cost: _front(points, {*plan.joint, *plan.presets.values()}, cost) for cost in COSTS},
-        "omitted": _omitted(scene),
+        "repeats": repeats,
     }
 
 
 def described(result: dict[str, Any]) -> dict[str, Any]:
     """The result with the date, the machine, the versions and the threads in use."""
-    return result | {"date": now(), "machine": machine(), "versions": versions(), "threads": numba.get_num_threads()}
+    return dated(result) | {"threads": numba.get_num_threads()}
 
 
 def _point(name: str, number: int, ready: Prepared, found: Frame, reference: Frame, visits: int) -> dict[str, Any]:
@@ -154,9 +121,9 @@ def _point(name: str, number: int, ready: Prepared, found: Frame, reference: Fra
 
 
 def setting_dict(setting: Setting) -> dict[str, Any]:
-    """A setting as plain data."""
-    raster = setting.raster._asdict()
-    return setting._asdict() | {"raster": raster | {"deviations": setting.raster.deviations._asdict()}}
+    """A setting as plain data, without its kernels."""
+    raster = setting.raster._asdict() | {"deviations": setting.raster.deviations._asdict()}
+    return {name: value for name, value in setting._asdict().items() if name != "kernels"} | {"raster": raster}
 
 
 def _keep(folder: Path, name: str, found: Frame) -> None:
@@ -191,15 +158,6 @@ def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> lis
     """Names of the settings of the joint sweep and of the presets that nothing among them dominates, cheapest first."""
     ranked = [Ranked(p["name"], cost_of(p, cost), (p["error"]["max"],)) for p in points if p["name"] in candidates]
     return [p.name for p in non_dominated(ranked)]
-
-
-def _omitted(scene: StudyScene) -> dict[str, str]:
-    """Dials that are not measured, with the reason."""
-    if exact_is_possible(scene):
-        return OMITTED
-    pairs = f"{scene.gaussians.count} Gaussians on {scene.camera.width}x{scene.camera.height} pixels"
-    names = "`exact`, support rule, exponential, tile size"
-    return OMITTED | {names: f"the path `definition` is too slow for {pairs}; the reference is a cutoff of 1e-14"}
 
 
 def _about(scene: StudyScene) -> dict[str, Any]:

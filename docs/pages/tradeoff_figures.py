@@ -4,6 +4,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from tradeoff_labels import Label, place_labels
+
 from endotsr.report.style import (
     BLUE,
     FAINT,
@@ -19,10 +21,8 @@ from endotsr.report.style import (
     plain_axes,
     save,
 )
-from endotsr.tradeoff.labels import Label, place_labels
-from endotsr.tradeoff.measure import LEVELS
-from endotsr.tradeoff.page import small
 from endotsr.tradeoff.study import cost_of
+from endotsr.tradeoff.text import LEVELS, small
 
 TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
 FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn
@@ -183,7 +183,7 @@ def save_pictures(pictures: dict[str, Any], folder: Path) -> list[str]:
 def draw(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> list[str]:
     """All pictures of a study; returns the stems that were written."""
     pictures = {name: main_figure(result)} if result["joint"] else {}
-    if result["dials"]:
+    if result.get("dials"):
         pictures |= {
             f"{name}_dials": dials_figure(result, "forward"),
             f"{name}_dials_visits": dials_figure(result, "visits"),

@@ -8,7 +8,7 @@ import contextlib
 import functools
 import types
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
@@ -16,7 +16,18 @@ from numpy.polynomial import Chebyshev, Polynomial
 from endotsr.kernels.jit import jit, jit_inline
 from endotsr.splatting import compositing
 from endotsr.splatting.fast import blocks as compositing_blocks
-from endotsr.tradeoff.settings import Setting
+
+
+class Variant(NamedTuple):
+    """Kernels that differ from the package's: a value of `Setting.kernels`."""
+
+    exponential: int | None = None  # degree of the polynomial for 2^x; None = that of the path
+    tile: int | None = None  # side of the tiles of the path `definition`; None = 16
+
+    def __call__(self) -> contextlib.AbstractContextManager[None]:
+        """Render with these kernels within the block."""
+        return kernels_of(self)
+
 
 COEFFICIENTS = (1.0,)  # placeholder for the coefficients of a variant, highest power first
 
@@ -71,13 +82,13 @@ def _definition_with_tiles(side: int) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def kernels_of(setting: Setting) -> Iterator[None]:
-    """Render with the kernels of the setting within the block."""
+def kernels_of(variant: Variant) -> Iterator[None]:
+    """Render with the kernels of the variant within the block."""
     changes: list[tuple[types.ModuleType, dict[str, Any]]] = []
-    if setting.exponential is not None:
-        changes.append((compositing_blocks, _blocks_with_exponential(setting.exponential)))
-    if setting.tile not in (None, compositing.TILE_WIDTH):
-        changes.append((compositing, _definition_with_tiles(setting.tile)))
+    if variant.exponential is not None:
+        changes.append((compositing_blocks, _blocks_with_exponential(variant.exponential)))
+    if variant.tile not in (None, compositing.TILE_WIDTH):
+        changes.append((compositing, _definition_with_tiles(variant.tile)))
     kept = [(module, {name: getattr(module, name) for name in names}) for module, names in changes]
     try:
         _bind(changes)

@@ -1,21 +1,8 @@
-"""The results in `tradeoff.json` as three sentences of advice, tables, and a self-contained page."""
+"""The results in `tradeoff.json` as three sentences of advice, and as rows of a table."""
 
-from pathlib import Path
 from typing import Any
 
-from endotsr.report import parts as parts
-from endotsr.report.figures import data_uri
-from endotsr.report.tables import html_table
-from endotsr.runs.files import replace_file
-from endotsr.tradeoff.measure import LEVELS
-
-PICTURES = {
-    "": "Error of the image against time and against visited pairs. Grey: settings of the joint sweep. "
-    "Blue: those that no other dominates. Diamonds: the presets.",
-    "_dials": "Every dial varied alone: largest error of the image against the time of a frame. Grey bars: quartiles.",
-    "_dials_visits": "The same against visited pairs, which do not depend on the machine.",
-    "_dials_gradients": "The worst gradient block against the time of a frame with its reverse pass.",
-}
+LEVELS = 255.0  # steps of an 8-bit picture
 
 
 def levels(error: float) -> str:
@@ -116,23 +103,6 @@ def _row(point: dict[str, Any]) -> list[str]:
     ]
 
 
-def preset_lines(result: dict[str, Any]) -> list[str]:
-    """Status of each preset: on the front, or dominated by other settings and kept for a reason."""
-    lines = []
-    for name, verdict in result["preset_verdicts"].items():
-        better, reason = verdict["dominated_by"], verdict["reason"]
-        if not better:
-            lines.append(f"`{name}`: nothing measured dominates it.")
-        else:
-            stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
-            lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
-    return lines
-
-
-def _more(count: int) -> str:
-    return f" and {count} more" if count else ""
-
-
 def made(result: dict[str, Any]) -> str:
     """Date, machine, versions and scene of the measurement."""
     m, about = result["machine"], result["scene"]
@@ -141,59 +111,3 @@ def made(result: dict[str, Any]) -> str:
         f"endotsr {result['versions']['endotsr']}; medians of {result['repeats']} warm runs. Scene: {about['about']}, "
         f"{about['gaussians']} Gaussians at {about['width']}x{about['height']}."
     )
-
-
-def certificate_line(result: dict[str, Any]) -> str:
-    """The figures of the certificate."""
-    c = result["reference"]["certificate"]
-    return (
-        f"Reference: differs from a cutoff of 1e-14 by {c['exact_against_1e14']:.1e}, from mpmath (30 digits) at "
-        f"{c['pixels']} pixels by {c['pixels_against_mpmath']:.1e}; cutoffs 1e-12 and 1e-14 differ by "
-        f"{c['cut_1e12_against_1e14']:.1e}. {'The certificate holds.' if c['holds'] else 'THE CERTIFICATE FAILS.'}"
-    )
-
-
-def plain(text: str) -> str:
-    """Markdown of this module as HTML: code between backquotes."""
-    pieces = parts.text(text).split("`")
-    return "".join(f"<code>{piece}</code>" if i % 2 else piece for i, piece in enumerate(pieces))
-
-
-def write_page(result: dict[str, Any], folder: Path, name: str = "tradeoff") -> Path:
-    """`name`.html beside the pictures, which it embeds."""
-    body = [
-        '<p class="eyebrow">endotsr</p><h1>What accuracy costs in time</h1>',
-        f'<p class="lead">{parts.text(made(result))}</p>',
-        _pictures(folder, name, [""]),
-        "<ol>" + "".join(f"<li>{plain(sentence)}</li>" for sentence in advice(result)) + "</ol>",
-        parts.section(
-            "Settings that are not dominated", html_table(COLUMNS, [[plain(c) for c in r] for r in front_rows(result)])
-        ),
-        parts.section("Presets", "<ul>" + "".join(f"<li>{plain(x)}</li>" for x in preset_lines(result)) + "</ul>"),
-        parts.section("Every dial alone", _pictures(folder, name, [e for e in PICTURES if e])),
-        parts.section("Why the reference can be trusted", f"<p>{parts.text(certificate_line(result))}</p>"),
-        parts.section("Left out", _omitted(result)),
-        parts.section("All settings", parts.details("Table", html_table(COLUMNS, [_row(p) for p in result["points"]]))),
-    ]
-    path = folder / f"{name}.html"
-    content = parts.page("Accuracy against time", "\n".join(body))
-    replace_file(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
-    return path
-
-
-def _pictures(folder: Path, name: str, endings: list[str]) -> str:
-    found = []
-    for ending in endings:
-        file = folder / f"{name}{ending}.png"
-        if file.exists():
-            source = data_uri(file.read_bytes(), "png")
-            words = parts.text(PICTURES[ending])
-            found.append(
-                f'<figure class="panel"><img src="{source}" alt="{words}"><figcaption>{words}</figcaption></figure>'
-            )
-    return "".join(found)
-
-
-def _omitted(result: dict[str, Any]) -> str:
-    items = "".join(f"<dt>{parts.text(k)}</dt><dd>{parts.text(v)}</dd>" for k, v in result["omitted"].items())
-    return f'<div class="panel"><dl>{items}</dl></div>'
