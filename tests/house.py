@@ -14,11 +14,11 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[1]
 # From the ground up. A module imports its own room and the rooms before it, nothing else.
 ROOMS = (
-    "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene",
+    "definition", "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences", "scene",
     "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views", "stages", "gradcheck",
     "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
 )  # fmt: skip
-METHOD = ("kernels", "equations", "losses", "splatting", "scene", "fitting")
+METHOD = ("definition", "kernels", "equations", "losses", "splatting", "scene", "fitting")
 LONGEST_FUNCTION = 40  # lines
 MOST_ARGUMENTS = 12
 
@@ -90,6 +90,11 @@ def circles(root: Path = ROOT) -> list[list[str]]:
     reach = {name: reached(name) for name in below}
     groups = {tuple(sorted(b for b in reach[a] if a in reach.get(b, set()))) for a in below if a in reach[a]}
     return [list(group) for group in sorted(groups)]
+
+
+def names_of(node: ast.Import | ast.ImportFrom) -> list[str]:
+    """The modules that an import statement names."""
+    return [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
 
 
 def functions(root: Path = ROOT) -> Iterator[Function]:

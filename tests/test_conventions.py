@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from endotsr.gradcheck import all_pairs
+from endotsr.gradcheck import all_pairs, definition_pairs
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "reference" / "endotsr"
@@ -65,7 +65,7 @@ def test_every_forward_has_a_reverse_directly_below_it(file, name):
 @pytest.mark.parametrize("file, name", STAGES, ids=[name for _, name in STAGES])
 def test_every_forward_is_named_by_a_pair(file, name):
     dotted = f"{module_name(file)}.{name}"
-    functions = {pair.function for pair in all_pairs().values()}
+    functions = {pair.function for pair in (*all_pairs().values(), *definition_pairs().values())}
     assert ALIASES.get(dotted, dotted) in functions, f"{dotted} is not checked: register a stage that names it"
 
 

@@ -1,5 +1,9 @@
 """The layout is a program: imports run down, never round, and every room is on the list."""
 
+import ast
+import subprocess
+import sys
+
 import pytest
 
 import house
@@ -16,6 +20,34 @@ def test_imports_run_down_only():
 
 def test_no_modules_import_one_another():
     assert house.circles() == []
+
+
+def test_the_definition_knows_numpy_alone():
+    """The definition and the compiled functions share no line, so that one can test the other."""
+    known = {"numpy", "collections", "endotsr"}
+    for name, tree in house.modules().items():
+        if house.room(name) == "definition":
+            nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+            assert {part.split(".")[0] for node in nodes for part in house.names_of(node)} <= known, name
+    assert {house.room(b) for a, b in house.imports() if house.room(a) == "definition"} == {"definition"}
+    users = {house.room(a) for a, b in house.imports() if house.room(b) == "definition"}
+    assert users == {"definition", "stages"}, "nothing that is fitted computes with the definition"
+
+
+def test_the_definition_is_short():
+    sizes = {}
+    for file in (house.ROOT / "reference" / "endotsr" / "definition").glob("*.py"):
+        sizes[file.name] = len(file.read_text(encoding="utf-8").splitlines())
+    assert sum(sizes.values()) <= 1500
+    long = {f.name: f.lines for f in house.functions() if f.name.startswith("definition.") and f.lines > 25}
+    assert long == {}
+
+
+def test_the_definition_starts_without_a_compiler():
+    code = (
+        "import sys, endotsr.definition.train; print(sorted({'numba', 'scipy', 'cv2', 'msgspec'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_equations_know_nothing_but_kernels():

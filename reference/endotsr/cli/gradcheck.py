@@ -16,6 +16,8 @@ class GradcheckOptions:
     """stages to check (default: all)"""
     seed: int = 0
     """seed of inputs and directions"""
+    definition: bool = False
+    """check the definition in plain NumPy in place of the compiled functions"""
     json: Annotated[Path | None, Option("FILE")] = None
     """also write the table as JSON"""
 
@@ -25,4 +27,4 @@ def run(words: list[str]) -> int:
     from endotsr.gradcheck.command import run_gradcheck
 
     options = parse(GradcheckOptions, words, "gradcheck")
-    return run_gradcheck(list(options.names) or None, seed=options.seed, json_path=options.json)
+    return run_gradcheck(list(options.names) or None, options.seed, options.json, options.definition)

@@ -5,7 +5,7 @@ Checking a port takes one call: `check_function(forward, reverse, inputs)` retur
 
 from endotsr.gradcheck.checker import DOUBLE, SINGLE, PairReport, Settings, check_function, check_pair
 from endotsr.gradcheck.precision import PrecisionReport, check_precision
-from endotsr.gradcheck.registry import Pair, all_pairs, one_thread, pair_of, pair_stream
+from endotsr.gradcheck.registry import Pair, all_pairs, definition_pairs, one_thread, pair_of, pair_stream
 from endotsr.gradcheck.report import summary, table, to_json
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "check_function",
     "check_pair",
     "check_precision",
+    "definition_pairs",
     "one_thread",
     "pair_of",
     "pair_stream",

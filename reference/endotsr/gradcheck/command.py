@@ -7,21 +7,24 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 
 
-def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path | None = None) -> int:
+def run_gradcheck(
+    names: list[str] | None = None, seed: int = 0, json_path: Path | None = None, definition: bool = False
+) -> int:
     """Check the named pairs (None or empty = all), print the table, return the exit code.
 
-    names      pair names, as the table shows them
-    seed       of the inputs, cotangents and directions; every pair draws its own stream from it
-    json_path  file of the JSON report; None = no report
-    returns    0 when every check passed, else 1
-    Raises:    InputError for an unknown name, a seed below 0 or an unwritable file.
+    names       pair names, as the table shows them
+    seed        of the inputs, cotangents and directions; every pair draws its own stream from it
+    json_path   file of the JSON report; None = no report
+    definition  check the functions of `endotsr.definition` in place of the compiled ones, in float64 only
+    returns     0 when every check passed, else 1
+    Raises:     InputError for an unknown name, a seed below 0 or an unwritable file.
     """
     from endotsr.gradcheck.checker import check_pair
     from endotsr.gradcheck.precision import check_precision
-    from endotsr.gradcheck.registry import all_pairs, one_thread, pair_stream
+    from endotsr.gradcheck.registry import all_pairs, definition_pairs, one_thread, pair_stream
     from endotsr.gradcheck.report import summary, table, to_json
 
-    pairs = all_pairs()
+    pairs = definition_pairs() if definition else all_pairs()
     for name in names or ():
         if name not in pairs:
             raise InputError(f"gradcheck: {name!r} is not a registered stage; allowed: {', '.join(pairs)}")
@@ -31,7 +34,8 @@ def run_gradcheck(names: list[str] | None = None, seed: int = 0, json_path: Path
     with one_thread():
         for pair in chosen:
             reports.append(check_pair(pair, pair_stream(pair.name, seed)))
-            precisions.append(check_precision(pair, pair_stream(pair.name, seed)))
+            if not definition:
+                precisions.append(check_precision(pair, pair_stream(pair.name, seed)))
     print(table(reports, precisions, colour=sys.stdout.isatty()))
     print()
     print(summary(reports, precisions), flush=True)

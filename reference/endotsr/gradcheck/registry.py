@@ -98,6 +98,15 @@ def all_pairs() -> dict[str, Pair]:
     return {variant.name: pair_of(stage, variant) for stage in all_stages().values() for variant in stage.variants}
 
 
+def definition_pairs() -> dict[str, Pair]:
+    """The same pairs with the functions of `endotsr.definition`; one where several compiled functions have one."""
+    from endotsr.stages.definition import definition_stages
+
+    return {
+        variant.name: pair_of(stage, variant) for stage in definition_stages().values() for variant in stage.variants
+    }
+
+
 def pair_stream(name: str, seed: int) -> np.random.Generator:
     """The random stream of one pair: depends on its name and the seed only, not on which other pairs run.
 

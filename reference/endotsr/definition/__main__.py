@@ -1,0 +1,22 @@
+"""`python -m endotsr.definition`: trains the scene of `simulate` and prints loss and held-out PSNR."""
+
+import numpy as np
+
+from endotsr.definition.settings import SMALL
+from endotsr.definition.simulate import simulate
+from endotsr.definition.train import evaluate, train
+
+
+def report(state, view):
+    """One line every 20 iterations."""
+    if state.iteration % 20 == 0 or state.iteration == 1:
+        terms = "  ".join(f"{name} {value:.4f}" for name, value in view.terms.items())
+        count = state.gaussians.opacity_logit.size
+        print(f"iteration {state.iteration:4d}  loss {view.loss:.4f}  Gaussians {count}  {terms}", flush=True)
+
+
+if __name__ == "__main__":
+    sequence = simulate()
+    model = train(sequence, SMALL, np.random.default_rng(0), on_iteration=report)
+    for name, indices in (("training", sequence.train_index), ("held-out", sequence.test_index)):
+        print(f"{name} PSNR over tissue: {evaluate(*model, sequence, SMALL, indices):.2f} dB")

@@ -1,0 +1,28 @@
+"""Equation (7): the weight of the Laplacian loss whose gradient is a given fraction of the photometric one."""
+
+from collections import namedtuple
+
+import numpy as np
+
+Calibration = namedtuple("Calibration", "lambda_lap ratios")  # The weight, and the ratio of every valid view.
+
+
+def rms(gradient):
+    """Equation (7): root mean square of a gradient image, excluded pixels included."""
+    return np.sqrt((gradient**2).mean())
+
+
+def calibration_views(n_train, count):
+    """Positions within the training frames, ascending, each once; halves are rounded to even."""
+    return np.unique(np.round(np.linspace(0, n_train - 1, count)).astype(int))
+
+
+def calibrate(views, gradient_ratio):
+    """Equation (7): from (name, g_rgb, g_lap) of every view; a view without a finite ratio is left out.
+
+    Raises: ValueError where no view is left, or where the median is 0.
+    """
+    ratios = np.array([lap / rgb for _, rgb, lap in views if rgb > 0 and np.isfinite(lap / rgb)])
+    if ratios.size == 0 or np.median(ratios) == 0:
+        raise ValueError("calibration: no view has a ratio, or their median is 0")
+    return Calibration(gradient_ratio / np.median(ratios), ratios)

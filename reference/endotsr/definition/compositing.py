@@ -1,0 +1,105 @@
+"""Equation (B5): front-to-back compositing, one Gaussian at a time over whole images."""
+
+from collections import namedtuple
+
+import numpy as np
+
+Composite = namedtuple("Composite", "colour depth opacity transmittance")  # Images of one view.
+Layer = namedtuple("Layer", "index dx dy value alpha front taken")  # One Gaussian at every pixel, (H, W) each.
+CompositeSaved = namedtuple("CompositeSaved", "projected opacity_logit colour settings background layers transmittance")
+CompositeGrads = namedtuple("CompositeGrads", "d_mean2d d_covariance2d d_opacity_logit d_colour d_depth d_background")
+
+
+def opacity_of(logit):
+    """1 / (1 + exp(-logit)), complex allowed, without overflow."""
+    e = np.exp(np.where(logit.real < 0, logit, -logit))
+    return np.where(logit.real < 0, e, 1) / (1 + e)
+
+
+def reach(projected, opacity_logit, settings, size, axis):
+    """(size, N) bool: the columns (axis 0) or rows (axis 1) that the support rule gives each Gaussian."""
+    at, centre, variance = np.arange(size)[:, None], projected.mean2d[axis].real, projected.covariance2d[2 * axis].real
+    if settings.support == "everywhere":
+        return np.repeat(projected.visible[None], size, axis=0)
+    if settings.support == "ellipse":  # the cutoff implies the ellipse; this is its box, widened
+        with np.errstate(divide="ignore"):
+            squared = 2 * (-np.logaddexp(0, -opacity_logit.real) - np.log(settings.alpha_cutoff))
+        half = np.sqrt(np.maximum(squared, 0) * variance)
+        half = half + 1e-5 * (half + np.abs(centre)) + 1e-3
+        return projected.visible & (squared >= 0) & (np.abs(at + 0.5 - centre) <= half)
+    middle = (projected.covariance2d[0] + projected.covariance2d[2]).real / 2
+    radius = np.ceil(3 * np.sqrt(middle + np.sqrt(np.maximum(0.1, middle**2 - projected.determinant.real))))
+    first, last = np.trunc((centre - 0.5 - radius) / 16), np.trunc((centre - 0.5 + radius + 15) / 16)
+    return projected.visible & (at // 16 >= first) & (at // 16 < last)
+
+
+def seen(projected, opacity_logit, settings, width, height):
+    """(N,) bool: the support holds a pixel of the image."""
+    columns, rows = (reach(projected, opacity_logit, settings, n, axis) for axis, n in enumerate((width, height)))
+    return columns.any(axis=0) & rows.any(axis=0)
+
+
+def layers_of(projected, opacity_logit, settings, width, height):
+    """The layers, front to back (equal depths by index), and the transmittance (H, W) behind all of them."""
+    (u, v), (a, b, c), opacity = projected.mean2d, projected.covariance2d, opacity_of(opacity_logit)
+    columns, rows = (reach(projected, opacity_logit, settings, n, axis) for axis, n in enumerate((width, height)))
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    t, live, layers = np.ones((height, width)), np.ones((height, width), bool), []
+    for i in np.argsort(projected.depth.real, kind="stable"):
+        box = np.outer(rows[:, i], columns[:, i])
+        if not box.any():
+            continue
+        dx, dy = x - u[i], y - v[i]
+        q = (c[i] * dx * dx - 2 * b[i] * dx * dy + a[i] * dy * dy) / projected.determinant[i]
+        value = opacity[i] * np.exp(-q / 2)
+        alpha = np.where(value.real <= settings.alpha_max, value, settings.alpha_max)
+        wanted = live & box & (alpha.real >= settings.alpha_cutoff)
+        live = live & ~(wanted & ((t * (1 - alpha)).real < settings.transmittance_stop))
+        layers.append(Layer(i, dx, dy, value, alpha, t, wanted & live))
+        t = np.where(wanted & live, t * (1 - alpha), t)
+    return layers, t
+
+
+def composite_forward(projected, opacity_logit, colour, settings, background, width, height):
+    """Equation (B5): Composite of Gaussians on the screen; colour (3, N), background (3,), logits (N,).
+
+    The kernels cut the image into tiles and write q as a sum of squares, which keeps the digits of needles.
+    """
+    layers, t = layers_of(projected, opacity_logit, settings, width, height)
+    image, depth, opacity = t * background[:, None, None], 0 * t, 0 * t
+    for layer in layers:
+        weight = np.where(layer.taken, layer.alpha * layer.front, 0)
+        image = image + weight * colour[:, layer.index, None, None]
+        depth = depth + weight * projected.depth[layer.index]
+        opacity = opacity + weight
+    saved = CompositeSaved(projected, opacity_logit, colour, settings, background, layers, t)
+    return Composite(image, depth, opacity, t), saved
+
+
+def composite_reverse(d_colour, d_depth, d_opacity, saved):
+    """Reverse of (B5) from images: the recursion R_k, back to front, then d(-q/2)/dSigma = Q d d^T Q / 2."""
+    projected, logit, colour, settings, background, layers, t = saved
+    out = CompositeGrads._make(np.zeros((*n, logit.size), t.dtype) for n in ((2,), (3,), (), (3,), (), ()))
+    rest = (background[:, None, None] * d_colour).sum(axis=0)  # <g, R>: colour, depth and opacity behind the layer
+    for i, dx, dy, value, alpha, front, taken in reversed(layers):
+        own = np.einsum("c,chw->hw", colour[:, i], d_colour) + projected.depth[i] * d_depth + d_opacity
+        passes = taken & ((value <= settings.alpha_max) | settings.deviations.pass_clamped_alpha)
+        power = np.where(passes, value * front * (own - rest), 0)  # by -q/2
+        (a, b, c), det = projected.covariance2d[:, i], projected.determinant[i]
+        px, py = (c * dx - b * dy) / det, (a * dy - b * dx) / det  # Q d
+        out.d_mean2d[:, i] = (power * px).sum(), (power * py).sum()
+        out.d_covariance2d[:, i] = np.array([power * px**2 / 2, power * px * py, power * py**2 / 2]).sum((1, 2))
+        out.d_opacity_logit[i] = power.sum() * opacity_of(-logit[i])
+        weight = np.where(taken, alpha * front, 0)
+        out.d_colour[:, i], out.d_depth[i] = (weight * d_colour).sum((1, 2)), (weight * d_depth).sum()
+        rest = np.where(taken, alpha * own + (1 - alpha) * rest, rest)
+    return deviate(out._replace(d_background=(d_colour * t).sum((1, 2))), saved)
+
+
+def deviate(out, saved):
+    """Two deviations of `legacy`: no gradient from the depth image to z, and 1 / (det^2 + 1e-7) for 1 / det^2."""
+    deviations, square = saved.settings.deviations, saved.projected.determinant**2
+    if deviations.drop_depth_to_z:
+        out = out._replace(d_depth=0 * out.d_depth)
+    factor = square / (square + 1e-7) if deviations.conic_epsilon else 1
+    return out._replace(d_covariance2d=out.d_covariance2d * factor)

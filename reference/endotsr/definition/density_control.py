@@ -1,0 +1,61 @@
+"""Equation (B11): density control."""
+
+from collections import namedtuple
+
+import numpy as np
+
+from endotsr.definition.compositing import opacity_of
+from endotsr.definition.covariance import rotation_of, unit
+
+DensityStatistics = namedtuple("DensityStatistics", "gradient_sum visits")  # (N,) each
+# The column that every new Gaussian comes from; from `survivors` on they are new, with moments 0.
+GatherPlan = namedtuple("GatherPlan", "source survivors")
+Densified = namedtuple("Densified", "gaussians plan statistics cloned split pruned")
+
+
+def empty_statistics(count):
+    """Zeros for N Gaussians."""
+    return DensityStatistics(np.zeros(count), np.zeros(count))
+
+
+def gather_statistics(statistics, d_mean, visible, width, height):
+    """Equation (B11): the statistics with one more view; d_mean (2, N) per px, visible (N,)."""
+    norm = np.sqrt((width / 2 * d_mean[0]) ** 2 + (height / 2 * d_mean[1]) ** 2)
+    return DensityStatistics(statistics.gradient_sum + np.where(visible, norm, 0), statistics.visits + visible)
+
+
+def scene_extent(config, cameras):
+    """Scene units: a number, or 1.1 x the largest distance of a camera from their mean."""
+    if config.extent != "cameras":
+        return config.extent
+    centres = np.array([-camera.rotation.T @ camera.translation for camera in cameras])
+    return 1.1 * np.sqrt(((centres - centres.mean(axis=0)) ** 2).sum(axis=1)).max()
+
+
+def densify(gaussians, statistics, config, rng, extent):
+    """Equation (B11): prune, clone and split; one draw (2, 3, splits) of normal numbers."""
+    alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
+    steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
+    candidates = np.flatnonzero(alive & (steepness >= config.gradient_threshold))
+    room = max(0, config.maximum - alive.sum())
+    candidates = np.sort(candidates[np.argsort(-steepness[candidates], kind="stable")[:room]])
+    large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
+    clone, split = candidates[~large], candidates[large]
+    survivors = np.setdiff1d(np.flatnonzero(alive), split)
+    source = np.concatenate([survivors, clone, split, split])
+    made = type(gaussians)(*(None if array is None else array[..., source] for array in gaussians))
+    if split.size:
+        made = with_children(made, rng.standard_normal((2, 3, split.size)))
+    plan = GatherPlan(source, survivors.size)
+    return Densified(made, plan, empty_statistics(source.size), clone.size, split.size, (~alive).sum())
+
+
+def with_children(gaussians, noise):
+    """The last Gaussians, copies of their parents, drawn from the parents and 1.6 times smaller."""
+    noise = np.concatenate(noise, axis=1)
+    children = slice(gaussians.opacity_logit.size - noise.shape[1], None)
+    rotation = rotation_of(unit(gaussians.quaternion[:, children])[0])
+    position, log_scale = gaussians.position.copy(), gaussians.log_scale.copy()
+    position[:, children] += np.einsum("ijn,jn->in", rotation, np.exp(log_scale[:, children]) * noise)
+    log_scale[:, children] -= np.log(1.6)
+    return gaussians._replace(position=position, log_scale=log_scale)

@@ -1,0 +1,59 @@
+"""Equations (1) and (1b): the Fourier dictionary, and its atoms normalised over the training stamps."""
+
+from collections import namedtuple
+
+import numpy as np
+
+DictionarySaved = namedtuple("DictionarySaved", "t omega")
+DictionaryGrads = namedtuple("DictionaryGrads", "d_t d_omega")
+# Mean of every atom over the training stamps, RMS of the centred atom, and whether it is constant.
+AtomStatistics = namedtuple("AtomStatistics", "mean rms dead")
+
+
+def frequencies(count, low, high):
+    """Equation (1): omega (F,), cycles per sequence, log-spaced; both ends are set, not computed."""
+    omega = low * (high / low) ** (np.arange(count) / max(count - 1, 1))
+    omega[1:][-1:] = high
+    return omega
+
+
+def dictionary_forward(t, omega):
+    """Equation (1): phi (2F,), all sines, then all cosines, at normalised time t.
+
+    Whole turns are left out before they are rounded by pi. The kernel leaves out quarter turns, whose values are exact.
+    """
+    turns = omega * t
+    angle = 2 * np.pi * (turns - np.rint(turns.real))
+    return np.concatenate([np.sin(angle), np.cos(angle)]), DictionarySaved(t, omega)
+
+
+def dictionary_reverse(d_phi, saved):
+    """Reverse of (1): from d_phi (2F,)."""
+    sine, cosine = np.split(dictionary_forward(*saved)[0], 2)
+    d_sine, d_cosine = np.split(d_phi, 2)
+    d_turns = 2 * np.pi * (d_sine * cosine - d_cosine * sine)
+    return DictionaryGrads((d_turns * saved.omega).sum(), d_turns * saved.t)
+
+
+def atom_statistics(times, omega):
+    """Equation (1b): over the distinct training stamps `times` (n,); divided by n, not by n - 1."""
+    atoms = np.array([dictionary_forward(t, omega)[0] for t in np.unique(times)])
+    mean = atoms.mean(axis=0)
+    rms = np.sqrt(((atoms - mean) ** 2).mean(axis=0))
+    return AtomStatistics(mean, rms, rms < 1e-6)
+
+
+def normalise_forward(phi, statistics):
+    """Equation (1b): phi_bar (2F,); a dead atom is 0."""
+    live_rms = np.where(statistics.dead, np.inf, statistics.rms)
+    return (phi - statistics.mean) / live_rms, statistics
+
+
+def normalise_reverse(d_phi_bar, saved):
+    """Reverse of (1b): the statistics are constants."""
+    return d_phi_bar / np.where(saved.dead, np.inf, saved.rms)
+
+
+def normalised_atoms(t, omega, statistics):
+    """Equations (1) and (1b): phi_bar(t) (2F,)."""
+    return normalise_forward(dictionary_forward(t, omega)[0], statistics)[0]

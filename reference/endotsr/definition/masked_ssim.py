@@ -1,0 +1,48 @@
+"""Equation (B7): masked structural similarity, as displayed."""
+
+from collections import namedtuple
+
+import numpy as np
+
+SsimTarget = namedtuple("SsimTarget", "image mask count")  # the observed frame, 0 outside tissue; C x tissue pixels
+SsimSaved = namedtuple("SsimSaved", "x slopes target")  # slopes: of the map by mu_x, k * x^2 and k * (x y)
+
+C1, C2 = 0.01**2, 0.03**2
+
+
+def blurred(image):
+    """k * image (C, H, W): the window kappa kappa^T of 11 x 11 pixels, zeros outside the image."""
+    for axis in (1, 2):
+        n = image.shape[axis]
+        offset = np.arange(n)[:, None] - np.arange(n)
+        kappa = np.where(np.abs(offset) <= 5, np.exp(-(offset**2) / (2 * 1.5**2)), 0)
+        kappa = kappa / np.exp(-(np.arange(-5, 6) ** 2) / (2 * 1.5**2)).sum()
+        image = np.moveaxis(np.moveaxis(image, axis, -1) @ kappa, -1, axis)
+    return image
+
+
+def ssim_target(observed, mask):
+    """The part that belongs to the frame."""
+    return SsimTarget(np.where(mask, observed, 0), mask, len(observed) * mask.sum())
+
+
+def masked_ssim_forward(rendered, target):
+    """Equation (B7): mean of the map over tissue, in [-1, 1]; 1 without tissue.
+
+    The kernel forms 1 - s from the difference and the sum of the images, with variances about the centre of the window.
+    """
+    x, y = np.where(target.mask, rendered, 0), target.image
+    mu_x, mu_y = blurred(x), blurred(y)
+    a1, a2 = 2 * mu_x * mu_y + C1, 2 * (blurred(x * y) - mu_x * mu_y) + C2
+    b1, b2 = mu_x**2 + mu_y**2 + C1, blurred(x**2) - mu_x**2 + blurred(y**2) - mu_y**2 + C2
+    s = a1 * a2 / (b1 * b2)
+    by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)
+    mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0
+    return mean, SsimSaved(x, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)
+
+
+def masked_ssim_reverse(d_ssim, saved):
+    """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
+    x, slopes, (y, mask, count) = saved
+    p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
+    return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)

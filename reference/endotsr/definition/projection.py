@@ -1,0 +1,76 @@
+"""Equation (B3): perspective projection of a Gaussian, by its covariance matrix and the Jacobian."""
+
+from collections import namedtuple
+
+import numpy as np
+
+from endotsr.definition.covariance import covariance_matrix
+
+# Pinhole camera: x_camera = rotation x_world + translation; x right, y down, z forward.
+Camera = namedtuple("Camera", "rotation translation fx fy cx cy width height")
+CameraGrads = namedtuple("CameraGrads", "d_rotation d_translation")
+# Gaussians on the screen; 0 where not visible.
+Projected = namedtuple("Projected", "mean2d covariance2d determinant depth visible")
+ProjectionSaved = namedtuple("ProjectionSaved", "position shape camera settings visible")
+ProjectionGrads = namedtuple("ProjectionGrads", "d_position d_rotation d_scale d_camera")
+
+
+def jacobian(point, camera, settings):
+    """J (2, 3, N) at points (3, N) in camera axes, its slopes x'/z, y'/z (2, N), and which are free of the clamp."""
+    (x, y, z), fx, fy = point, camera.fx, camera.fy
+    kappa, sizes = settings.jacobian_clamp, np.array([[camera.width / fx], [camera.height / fy]])
+    limit = kappa * sizes / 2 if kappa > 0 else np.inf * sizes
+    slope = np.array([x / z, y / z])
+    free = np.abs(np.real(slope)) <= limit
+    slope = np.where(free, slope, np.copysign(limit, np.real(slope)))
+    j = np.array([[fx / z, 0 * z, -fx * slope[0] / z], [0 * z, fy / z, -fy * slope[1] / z]])
+    return j, slope, free
+
+
+def projection_forward(position, shape, camera, settings):
+    """Equation (B3): Projected of centres (3, N); cov = J W Sigma W^T J^T + low-pass, det = a c - b^2.
+
+    The kernel adds up the determinant from terms that are not negative, and clips axes above 1e60 px.
+    """
+    point = camera.rotation @ position + camera.translation[:, None]
+    visible = point[2].real > settings.near
+    x, y, z = point = np.where(visible, point, 1)
+    t = np.einsum("ijn,jk->ikn", jacobian(point, camera, settings)[0], camera.rotation)
+    cov = np.einsum("ikn,kln,jln->ijn", t, covariance_matrix(shape), t)
+    a, b, c = cov[0, 0] + settings.low_pass, cov[0, 1], cov[1, 1] + settings.low_pass
+    values = np.array([camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy, a, b, c, a * c - b * b, z])
+    visible = visible & np.isfinite(values).all(axis=0)
+    values = np.where(visible, values, 0)
+    saved = ProjectionSaved(position, shape, camera, settings, visible)
+    return Projected(values[:2], values[2:5], values[5], values[6], visible), saved
+
+
+def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
+    """Reverse of (B3): b stands for two entries; the kernel of the render starts from A, m, r, for needles."""
+    position, shape, camera, settings, visible = saved
+    d_mean2d, d_covariance2d, d_depth = (np.where(visible, g, 0) for g in (d_mean2d, d_covariance2d, d_depth))
+    w, point = camera.rotation, camera.rotation @ position + camera.translation[:, None]
+    point = np.where(visible, point, 1)
+    j, slope, free = jacobian(point, camera, settings)
+    sigma, t = covariance_matrix(shape), np.einsum("ijn,jk->ikn", j, w)
+    g_a, g_b, g_c = d_covariance2d
+    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])
+    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)
+    g_t = 2 * np.einsum("ijn,jkn,kln->iln", g2, t, sigma)
+    g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)
+    g_point = point_reverse(point, slope, free, np.einsum("ikn,jk->ijn", g_t, w), d_mean2d, d_depth, camera, settings)
+    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)
+    d_scale = (shape.rotation * g_m).sum(axis=0)
+    return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))
+
+
+def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera, settings):
+    """From the derivatives by J, (u, v) and depth to those by the point in camera axes, (3, N)."""
+    z, focal = point[2], np.array([[camera.fx], [camera.fy]])
+    g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z
+    g_clipped = np.where(free, g_slope, 0)
+    clamp = np.where(free | (not settings.deviations.double_clamp_term), 0, g_slope * slope)  # `legacy`: counted twice
+    g_xy = (focal * d_mean2d + g_clipped) / z
+    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * np.array([g_j[0, 2], g_j[1, 2]]))
+    g_z = d_depth + (by_scale - g_xy * point[:2] / z - clamp / z).sum(axis=0)
+    return np.concatenate([g_xy, [g_z]])

@@ -1,0 +1,51 @@
+"""Equation (B9): smooth depth on tissue, small total variation under the instruments."""
+
+from collections import namedtuple
+
+import numpy as np
+
+SmoothnessSaved = namedtuple("SmoothnessSaved", "rendered_depth rendered mask edges total_variation_factor")
+SmoothnessGrads = namedtuple("SmoothnessGrads", "d_rendered d_rendered_depth")
+
+
+def steps_reverse(d_steps, axis):
+    """Adjoint of the differences of neighbours along an axis."""
+    border = [(0, 0)] * d_steps.ndim
+    border[axis] = (1, 1)
+    return -np.diff(np.pad(d_steps, border), axis=axis)
+
+
+def squared_steps(depth, smooth):
+    """Q and its derivative (H, W): squared differences of neighbours that are both smooth, over their number."""
+    total, gradient, number = 0.0, np.zeros_like(depth), smooth.sum() + 1e-6
+    for axis in (0, 1):
+        both = np.minimum(np.roll(smooth, -1, axis), smooth).take(range(smooth.shape[axis] - 1), axis)
+        step = np.where(both, np.diff(depth, axis=axis), 0)
+        total, gradient = total + (step**2).sum() / number, gradient + steps_reverse(2 * step / number, axis)
+    return total, gradient
+
+
+def total_variation(image, mask):
+    """TV of an image (C, H, W) that is 0 on tissue, and its derivative, 0 on tissue; sign(0) = 0."""
+    outside = np.where(mask, 0, image)
+    total, gradient = 0.0, np.zeros_like(outside)
+    for axis in (1, 2):
+        step = np.diff(outside, axis=axis)
+        total, gradient = total + np.abs(step).sum(), gradient + steps_reverse(np.sign(step), axis)
+    return total / image.size, np.where(mask, 0, gradient) / image.size
+
+
+def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):
+    """Equation (B9): scene units squared; the depth (H, W) is not smoothed across `edges` (H, W)."""
+    loss = squared_steps(rendered_depth, mask & ~edges)[0]
+    if total_variation_factor:
+        variation = total_variation(rendered_depth[None], mask)[0] + total_variation(rendered, mask)[0]
+        loss = loss + total_variation_factor * variation
+    return loss, SmoothnessSaved(rendered_depth, rendered, mask, edges, total_variation_factor)
+
+
+def smoothness_reverse(d_loss, saved):
+    """Reverse of (B9)."""
+    depth, rendered, mask, edges, factor = saved
+    d_depth = squared_steps(depth, mask & ~edges)[1] + factor * total_variation(depth[None], mask)[1][0]
+    return SmoothnessGrads(d_loss * factor * total_variation(rendered, mask)[1], d_loss * d_depth)

@@ -1,0 +1,113 @@
+"""A whole training, equations (6) and (B10) to (B12), on the schedule of the paper."""
+
+from collections import namedtuple
+
+import numpy as np
+
+from endotsr.definition import schedules
+from endotsr.definition.adam import adam_state, adam_update
+from endotsr.definition.calibration import calibrate, calibration_views, rms
+from endotsr.definition.density_control import densify, empty_statistics, gather_statistics, scene_extent
+from endotsr.definition.initialisation import activate_residuals, initialise
+from endotsr.definition.laplacian import laplacian_loss_forward, laplacian_loss_reverse
+from endotsr.definition.metrics import psnr_tissue
+from endotsr.definition.objective import Frame, LossWeights, frame_targets, no_edges, photometric_loss
+from endotsr.definition.render import render_forward
+from endotsr.definition.scene import arrays, scene_at, spectral_from
+from endotsr.definition.settings import PAPER
+from endotsr.definition.view import view_gradients
+
+State = namedtuple("State", "gaussians adam statistics iteration")  # all that one iteration hands to the next
+
+
+def start(gaussians):
+    """Zero moments and empty statistics."""
+    return State(gaussians, adam_state(arrays(gaussians)), empty_statistics(gaussians.opacity_logit.size), 0)
+
+
+def frame_of(sequence, k):
+    """Frame k with its colours in [0, 1]."""
+    depth = sequence.depth[k].astype(float)
+    return Frame(sequence.images[k] / 255, sequence.masks[k], depth, sequence.times[k], sequence.cameras[k])
+
+
+def weights_at(iteration, config):
+    """The weights of the image terms in force."""
+    loss, ramp = config.loss, schedules.laplacian_ramp(iteration, config)
+    smoothness = loss.smoothness_weight if schedules.smoothness_active(iteration, config) else 0.0
+    return LossWeights(loss.ssim_weight, loss.depth_weight, smoothness, ramp * loss.lambda_lap)
+
+
+def activated(state, config):
+    """The state with A and C at zero, with moments of their own."""
+    model = config.model
+    gaussians = activate_residuals(state.gaussians, model.frequencies, model.appearance, model.spectral_motion)
+    return state._replace(gaussians=gaussians, adam=adam_state(arrays(gaussians)) | state.adam)
+
+
+def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges):
+    """One iteration: the new state, and the ViewGradients of a training frame that is drawn uniformly."""
+    i, o = state.iteration + 1, config.optimiser
+    if schedules.residuals_active(i, config) and not schedules.residuals_active(i - 1, config):
+        state = activated(state, config)
+    frame = frame_of(sequence, sequence.train_index[rng.integers(len(sequence.train_index))])
+    view = view_gradients(
+        state.gaussians, spectral, frame_targets(frame, config), weights_at(i, config), config, frame.camera,
+        frame.time, edges, raster=raster, degree=schedules.active_degree(i, config),
+    )  # fmt: skip
+    statistics, adam, gaussians = state.statistics, state.adam, state.gaussians
+    if schedules.statistics_active(i, config):
+        size = frame.camera.width, frame.camera.height
+        statistics = gather_statistics(statistics, view.d_mean2d, view.visible, *size)
+    if not (schedules.densify_now(i, config) and o.legacy_skip):
+        rates, numbers = schedules.learning_rates(i, config), (o.beta1, o.beta2, o.epsilon)
+        adam, parameters = adam_update(adam, arrays(gaussians), view.gradients, rates, *numbers)
+        gaussians = gaussians._replace(**parameters)
+    state = State(gaussians, adam, statistics, i)
+    return controlled(state, sequence, config, rng) if schedules.densify_now(i, config) else state, view
+
+
+def controlled(state, sequence, config, rng):
+    """The state after density control: new Gaussians have moments 0, all statistics are 0."""
+    cameras = [sequence.cameras[k] for k in sequence.train_index]
+    made = densify(state.gaussians, state.statistics, config.density, rng, scene_extent(config.density, cameras))
+    new = np.arange(made.plan.source.size) >= made.plan.survivors
+    adam = {
+        name: (*(np.where(new, 0, moment[..., made.plan.source]) for moment in (m, v)), k)
+        for name, (m, v, k) in state.adam.items()
+    }
+    return State(made.gaussians, adam, made.statistics, state.iteration)
+
+
+def calibrated_weight(gaussians, spectral, sequence, config, raster=PAPER):
+    """lambda_lap of equation (7): from training views that are rendered without A and S."""
+    base, views = gaussians._replace(appearance_coefficients=None, motion_coefficients=None), []
+    chosen = calibration_views(len(sequence.train_index), config.loss.calibration_views)
+    for k in sequence.train_index[chosen]:
+        frame = frame_of(sequence, k)
+        targets, (scene, _) = frame_targets(frame, config), scene_at(base, spectral, config.model, frame.time)
+        colour = render_forward(scene, frame.camera, raster, degree=config.model.harmonics_degree)[0].colour
+        _, _, d_rgb = photometric_loss(colour, targets, config.loss.ssim_weight)
+        _, saved = laplacian_loss_forward(colour, targets.image, targets.supports, config.loss.upsampling)
+        views.append((k, rms(d_rgb), rms(laplacian_loss_reverse(1.0, saved))))
+    return calibrate(views, config.loss.gradient_ratio).lambda_lap
+
+
+def train(sequence, config, rng, raster=PAPER, on_iteration=lambda state, view: None):
+    """Gaussians and Spectral after all iterations, from the depth of the training frames."""
+    state = start(initialise(sequence, config.initialisation, config.model, rng))
+    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+    while state.iteration < config.training.iterations:
+        state, view = iterate(state, sequence, spectral, config, rng, raster)
+        on_iteration(state, view)
+    return state.gaussians, spectral
+
+
+def evaluate(gaussians, spectral, sequence, config, indices, raster=PAPER):
+    """Mean PSNR (M1) over tissue of some frames, dB."""
+    found = []
+    for frame in (frame_of(sequence, k) for k in indices):
+        scene, _ = scene_at(gaussians, spectral, config.model, frame.time)
+        rendered, _ = render_forward(scene, frame.camera, raster, degree=config.model.harmonics_degree)
+        found.append(psnr_tissue(np.clip(rendered.colour, 0, 1), frame.image, frame.mask))
+    return np.mean(found)

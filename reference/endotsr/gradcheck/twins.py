@@ -1,0 +1,106 @@
+"""The comparison of every compiled function with its definition in plain NumPy (`endotsr.definition`), in float64.
+
+In: a stage, its twin and requests (arrays and settings by name, cotangents included). Out: for every output and
+gradient the largest difference in units of its scale, which for most arrays is their largest magnitude. The bounds are
+stated here; the test and the table of the book read them.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.gradcheck.registry import one_thread, pair_stream
+from endotsr.stages.definition import definition_stages
+from endotsr.stages.registry import all_stages
+from endotsr.stages.stage import Inputs, Settings, Stage
+
+SEEDS = (0, 1, 2)
+SMALL_COLUMN = 1e-3  # of the largest magnitude: the least scale of a column
+BOUND = 2e-14  # of the scale, for every output that is not in BOUNDS
+BOUNDS = {
+    "objective": (1e-13, "a gradient is a sum over Gaussians and pixels in which large terms cancel"),
+    "render": (1e-12, "a gradient is a sum over pixels in which large terms cancel; short needles"),
+    "render of a long needle": (1e-5, "the definition inverts Sigma, and loses (length / width)^2 roundings"),
+}
+LONG_NEEDLE = "golden render/long_needle"  # a row of its own
+
+
+class Request(NamedTuple):
+    """Arrays and settings by name, of a made-up input or of a golden case, and what is asked; empty = everything."""
+
+    label: str
+    inputs: Inputs
+    settings: Settings
+    asked: tuple[str, ...] = ()
+
+
+class Distance(NamedTuple):
+    """The largest difference of one output over all requests of a stage."""
+
+    stage: str
+    function: str  # of the definition
+    output: str
+    distance: float  # in units of the scale
+    bound: float
+    request: str  # where it is largest
+
+
+def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[Request]:
+    """The inputs of the gradient checks of a stage, with a random cotangent for every output."""
+    for variant in stage.variants:
+        for seed in seeds:
+            rng = pair_stream(variant.name, seed)
+            inputs = variant.inputs(rng)
+            inputs |= {} if variant.fixed is None else variant.fixed(np.dtype(np.float64))
+            outputs, _ = stage.forward(inputs, variant.settings)
+            cotangents = {f"d_{name}": rng.normal(0, 1, np.shape(value)) for name, value in outputs.items()}
+            yield Request(f"{variant.name}, seed {seed}", inputs | cotangents, variant.settings)
+
+
+def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
+    """The largest difference in units of the largest magnitude (1 where that is 0).
+
+    scale  "last": each column [..., n] has its own unit; "exact": infinite unless every entry is equal
+    """
+    got, wanted = np.asarray(got), np.asarray(wanted)
+    if got.shape != wanted.shape or scale == "exact":
+        return 0.0 if np.array_equal(got, wanted) else np.inf
+    size = np.abs(wanted)
+    largest = size.max(initial=0) or 1.0
+    if scale == "last" and wanted.ndim > 1:
+        largest = np.maximum(size.max(axis=tuple(range(size.ndim - 1)), initial=0), SMALL_COLUMN * largest)
+    with np.errstate(invalid="ignore"):
+        off = np.where(got == wanted, 0, np.abs(got - wanted) / largest)
+    return float(np.where(np.isfinite(off), off, np.inf).max(initial=0))
+
+
+def distances(stage: Stage, twin: Stage, requests: Iterable[Request]) -> list[Distance]:
+    """The worst difference of every output that the stage answers, over all requests; those of needles apart."""
+    worst: dict[tuple[str, str], tuple[float, str]] = {}
+    for request in requests:
+        name = "render of a long needle" if request.label == LONG_NEEDLE else stage.name
+        with one_thread(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            wanted = stage.compute(request.inputs, request.settings)
+            got = twin.compute(request.inputs, request.settings)
+        for output in request.asked or [output for output in stage.asked if output in wanted]:
+            missing = np.array(np.nan)
+            found = scaled(got.get(output, missing), wanted.get(output, missing), stage.asked[output].scale)
+            if found >= worst.get((name, output), (-1.0, ""))[0]:
+                worst[name, output] = (found, request.label)
+    return [
+        Distance(name, twin.function, output, size, BOUNDS.get(name, (BOUND, ""))[0], label)
+        for (name, output), (size, label) in worst.items()
+    ]
+
+
+def all_distances(stored: Iterable[tuple[str, Request]] = ()) -> list[Distance]:
+    """Every stage on its made-up inputs and on further requests, given as (stage name, request)."""
+    more: dict[str, list[Request]] = {}
+    for name, request in stored:
+        more.setdefault(name, []).append(request)
+    stages, found = all_stages(), []
+    for name, twin in definition_stages().items():
+        found += distances(stages[name], twin, [*made_up(stages[name]), *more.get(name, ())])
+    return found

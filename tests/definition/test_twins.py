@@ -1,0 +1,55 @@
+"""Every compiled function against its definition in plain NumPy: made-up inputs, and the hard ones of golden/."""
+
+import numpy as np
+import pytest
+
+from endotsr.golden.judge.store import golden_folder, read_golden
+from endotsr.gradcheck.twins import BOUNDS, Request, distances, made_up, scaled
+from endotsr.stages.definition import definition_stages
+from endotsr.stages.registry import all_stages
+
+STAGES, TWINS = all_stages(), definition_stages()
+GOLDEN = read_golden(golden_folder())
+REFERENCE_ALONE = {"determinism"}  # asks for the same bits twice, of one program
+
+
+def stored(name):
+    for case in GOLDEN.cases:
+        if case.operation == name:
+            inputs = {key: GOLDEN.array(case, array.file) for key, array in case.inputs.items()}
+            yield Request(f"golden {case.name}", inputs, case.settings, tuple(case.outputs))
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_the_compiled_function_computes_its_definition(name):
+    found = distances(STAGES[name], TWINS[name], [*made_up(STAGES[name]), *stored(name)])
+    assert {d.output for d in found} <= STAGES[name].asked.keys() and found
+    assert [d for d in found if not d.distance <= d.bound] == []
+
+
+def test_every_stage_has_a_twin():
+    assert STAGES.keys() - TWINS.keys() == REFERENCE_ALONE
+    for name, twin in TWINS.items():
+        assert (twin.reverse is None) == (STAGES[name].reverse is None), name
+        assert twin.function.startswith("endotsr.definition."), name
+
+
+def test_a_wrong_function_is_seen():
+    """A gradient that is off by 1e-12 in one entry, a missing one and another integer."""
+    stage, twin = STAGES["motion"], TWINS["motion"]
+
+    def wrong(cotangents, saved):
+        found = twin.reverse(cotangents, saved)
+        found["d_phi"] = found["d_phi"] * (1 + 1e-12 * (np.arange(6) == 2))
+        return {name: found[name] for name in ("d_phi",)}
+
+    found = {d.output: d for d in distances(stage, twin._replace(reverse=wrong), made_up(stage))}
+    assert found["d_phi"].distance > found["d_phi"].bound
+    assert found["d_motion_coefficients"].distance == np.inf
+    assert found["translation"].distance <= found["translation"].bound
+    assert scaled(np.array([1, 2]), np.array([1, 3]), "exact") == np.inf
+    assert scaled(np.array([np.nan, 1.0]), np.array([0.0, 1.0]), "max") == np.inf
+
+
+def test_a_larger_bound_has_a_reason():
+    assert all(reason for _, reason in BOUNDS.values())
