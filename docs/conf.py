@@ -53,8 +53,7 @@ html_theme_options |= {"navbar_persistent": []}  # one search, in the sidebar
 html_sidebars = {"_modules/**": [], "search": ["navbar-logo.html", "sbt-sidebar-nav.html"]}  # one search a page
 html_show_sphinx = False
 
-MATHJAX = "tex-chtml-full.js"  # with every extension of TeX: a smaller bundle loads \boldsymbol from a file of its own
-MATHJAX_CDN = f"https://cdn.jsdelivr.net/npm/mathjax@3/es5/{MATHJAX}"
+MATHJAX_CDN = "https://cdn.jsdelivr.net/npm/mathjax@3/es5/tex-chtml.js"
 
 
 def _copy_mathjax() -> str:
@@ -63,15 +62,14 @@ def _copy_mathjax() -> str:
     if spec is None or not spec.submodule_search_locations:
         return MATHJAX_CDN
     source = Path(spec.submodule_search_locations[0]) / "static" / "mathjax" / "es5"
-    if not (source / MATHJAX).is_file():
+    if not (source / "tex-chtml.js").is_file():
         return MATHJAX_CDN
     target = HERE / "_static" / "mathjax"
-    fonts = Path("output") / "chtml" / "fonts" / "woff-v2"
-    (target / fonts).mkdir(parents=True, exist_ok=True)
-    shutil.copy2(source / MATHJAX, target / MATHJAX)
-    for font in (source / fonts).glob("*.woff"):
-        shutil.copy2(font, target / fonts / font.name)
-    return f"mathjax/{MATHJAX}"
+    # MathJax loads fonts and the extensions of less common commands, such as boldsymbol, when a page needs them.
+    for folder in (Path("output") / "chtml" / "fonts" / "woff-v2", Path("input") / "tex" / "extensions"):
+        shutil.copytree(source / folder, target / folder, dirs_exist_ok=True)
+    shutil.copy2(source / "tex-chtml.js", target / "tex-chtml.js")
+    return "mathjax/tex-chtml.js"
 
 
 mathjax_path = _copy_mathjax()

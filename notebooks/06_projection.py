@@ -352,9 +352,11 @@ for name in ("position", "rotation", "scale"):
 # ## The correction of the pose
 #
 # $$
-# E=I+\alpha\,[\boldsymbol\omega]_\times+\beta\,[\boldsymbol\omega]_\times^2,\qquad
-# \alpha=\frac{\sin r}{r},\quad\beta=\frac{1-\cos r}{r^2},\qquad
-# W'=E\,W,\qquad\mathbf d'=E\,\mathbf d+\boldsymbol\tau .
+# \begin{aligned}
+# E&=I+\alpha\,[\boldsymbol\omega]_\times+\beta\,[\boldsymbol\omega]_\times^2,\qquad
+# \alpha=\frac{\sin r}{r},\quad\beta=\frac{1-\cos r}{r^2},\\
+# W'&=E\,W,\qquad\mathbf d'=E\,\mathbf d+\boldsymbol\tau .
+# \end{aligned}
 # $$
 #
 # The gradients by $W'$ and $\mathbf d'$ are those that the projection returned above. Every entry of $E$ depends on

@@ -10,17 +10,19 @@ from page_visits import found_browser
 mathjax = pytest.importorskip("mathjax")
 pytestmark = pytest.mark.skipif(found_browser() is None, reason="no browser found")
 BUNDLES = Path(mathjax.__path__[0]) / "static" / "mathjax" / "es5"
-FONTS = Path("output") / "chtml" / "fonts" / "woff-v2"
+BUNDLE, FONTS = "tex-chtml.js", Path("output") / "chtml" / "fonts" / "woff-v2"
+EXTENSIONS = Path("input") / "tex" / "extensions"
 PAGE = '<!doctype html><script defer src="{}"></script><body><p>{}</p></body>'
 BOLD = r"\(\boldsymbol\omega\)"
 
 
-def page(folder: Path, name: str, *tex: str, bundle: str = "tex-chtml-full.js") -> None:
+def page(folder: Path, name: str, *tex: str) -> None:
     """A page with formulas as Sphinx writes them, and MathJax beside it."""
-    shutil.copytree(BUNDLES / FONTS, folder / "mathjax" / FONTS, dirs_exist_ok=True)
-    shutil.copy2(BUNDLES / bundle, folder / "mathjax")
+    for part in (FONTS, EXTENSIONS):
+        shutil.copytree(BUNDLES / part, folder / "mathjax" / part, dirs_exist_ok=True)
+    shutil.copy2(BUNDLES / BUNDLE, folder / "mathjax")
     body = " ".join(f'<span class="math">{formula}</span>' for formula in tex)
-    (folder / name).write_text(PAGE.format(f"mathjax/{bundle}", body), encoding="utf-8")
+    (folder / name).write_text(PAGE.format(f"mathjax/{BUNDLE}", body), encoding="utf-8")
 
 
 def test_good_formulas_are_counted(tmp_path, capsys):
@@ -32,8 +34,9 @@ def test_good_formulas_are_counted(tmp_path, capsys):
 
 
 def test_an_extension_that_is_not_there_is_found(tmp_path, capsys):
-    """The smallest bundle loads boldsymbol from a file; without it, the whole page stays TeX."""
-    page(tmp_path, "a.html", r"\(x\)", BOLD, bundle="tex-chtml.js")
+    """MathJax loads boldsymbol from a file; without it, the whole page stays TeX."""
+    page(tmp_path, "a.html", r"\(x\)", BOLD)
+    (tmp_path / "mathjax" / EXTENSIONS / "boldsymbol.js").unlink()
     assert main([str(tmp_path)]) == 1
     said = capsys.readouterr().out
     assert "boldsymbol.js: no such file" in said and f"a.html: left as TeX: {BOLD}" in said
@@ -53,7 +56,7 @@ def test_a_formula_that_is_wrong_is_found(tmp_path, tex, said):
 
 def test_a_page_without_mathjax_is_found(tmp_path):
     page(tmp_path, "a.html", r"\(x\)")
-    (tmp_path / "mathjax" / "tex-chtml-full.js").unlink()
+    (tmp_path / "mathjax" / BUNDLE).unlink()
     problems, unrendered, _ = formulas(tmp_path, ["a.html"])
-    assert unrendered == 1 and "tex-chtml-full.js: no such file" in problems[0]
+    assert unrendered == 1 and f"{BUNDLE}: no such file" in problems[0]
     assert "MathJax did not start" in problems[1]
