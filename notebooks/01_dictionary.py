@@ -292,7 +292,7 @@ assert all(report.passed for report in reports)
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead,
 # so at most 15 remain: that is why the rank is reported, and why a clip whose frames lie on
-# the grid of the highest frequency is a special one.
+# the grid of the highest frequency is a special one. All other clips from 20 frames on have 16.
 assert report_atoms(stamps, omega).rank == 16
 # How much worse the faintest combination is seen than the clearest.
 singular = np.linalg.svd(bars, compute_uv=False)
@@ -300,4 +300,7 @@ np.testing.assert_allclose(
     report_atoms(stamps, omega).condition, singular[0] / singular[-1], rtol=1e-9
 )
 assert report_atoms(stamps_32, omega).rank == 15
-print(report_atoms(stamps, omega).rank, report_atoms(stamps_32, omega).rank)
+held_out = lambda n: np.delete(np.arange(n), np.arange(1, n, 8)) / n
+ranks = {n: report_atoms(held_out(n), omega).rank for n in range(14, 81)}
+print({n: rank for n, rank in ranks.items() if rank < 16})
+assert [n for n in ranks if n >= 20 and ranks[n] < 16] == [32]

@@ -70,8 +70,8 @@ for t in (0.0, 0.37, 0.9):
 # ## The weights: from a covariance to a spectrum
 #
 # A Gaussian process with Matérn-5/2 covariance $k(\tau)=\bigl(1+\sqrt5\,r+\tfrac53r^2\bigr)e^{-\sqrt5\,r}$,
-# $r=|\tau|/\ell$, gives smooth paths whose values are almost uncorrelated after about $\ell$. By Bochner's theorem such
-# a covariance is the Fourier transform of a non-negative spectral density, here
+# $r=|\tau|/\ell$, gives smooth paths. Two values of a path have the correlation 0.52 at the distance $\ell$ and 0.03 at
+# $3\ell$. By Bochner's theorem such a covariance is the Fourier transform of a non-negative spectral density, here
 # $S(\omega)\propto\bigl(5/\ell^2+(2\pi\omega)^2\bigr)^{-3}$. The next cell checks this with a plain sum.
 
 # %%
@@ -82,11 +82,14 @@ from_spectrum = np.array([np.sum(S * np.cos(2 * np.pi * grid * tau)) for tau in 
 r = lag / length
 matern = (1 + np.sqrt(5) * r + 5 / 3 * r**2) * np.exp(-np.sqrt(5) * r)
 np.testing.assert_allclose(from_spectrum / from_spectrum[0], matern, atol=1e-9)
+at_distance = dict(zip(np.round(r), matern))
+print(", ".join(f"{at_distance[k]:.2f} at {k:.0f} l" for k in (1, 2, 3)))
+assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 
 # %% [markdown]
-# A coefficient at frequency $\omega_f$ therefore has prior variance proportional to $S(\omega_f)$. Up to constants, the
-# negative logarithm of the prior is a sum of squares weighted by $1/S$. Scaled so that the weights have mean 1, this is
-# the equation:
+# The penalty takes the spectral density as the prior variance of a coefficient at frequency $\omega_f$. Up to constants,
+# the negative logarithm of that prior is a sum of squares weighted by $1/S$. Scaled so that the weights have mean 1, this
+# is the equation:
 #
 # $$
 # \begin{aligned}
@@ -122,6 +125,18 @@ penalty, saved_penalty = matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, penalty_text(C, rho), rtol=1e-13)
 
 # %% [markdown]
+# **What does not follow.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are no uniform
+# grid of frequencies. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
+# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is no Matérn covariance: its correlation at $\ell$ is 0.02 and not 0.52, and
+# it does not decay. What the penalty states is which of two frequencies is dearer, and by how much.
+
+# %%
+implied = lambda tau: np.sum(np.cos(2 * np.pi * omega * tau) / rho) / np.sum(1 / rho)
+print(f"correlation at l: {implied(length):.2f} implied, {at_distance[1]:.2f} Matérn")
+assert round(implied(length), 2) == 0.02
+assert max(abs(implied(tau)) for tau in np.linspace(0.6, 1.0, 81)) > 0.3, "three to five l"
+
+# %% [markdown]
 # **The Student-t identity.** The same $S$ is the density of a Student-t variable with 5 degrees of freedom and scale
 # $1/\ell$, evaluated at $2\pi\omega$. The Student-t density of an independent library gives the same weights:
 
@@ -130,17 +145,32 @@ density = stats.t(df=5, scale=1 / length).pdf(2 * np.pi * omega)
 np.testing.assert_allclose(rho, (1 / density) / np.mean(1 / density), rtol=1e-13)
 
 # %% [markdown]
-# **Invariance to phase.** Rotating a (sine, cosine) pair of coefficients by any angle shifts the path in time and
-# leaves the penalty unchanged.
+# **Invariance to phase.** Rotating the (sine, cosine) pair of a frequency by an angle $\theta$ shifts this component of
+# the path in time, by $\theta/(2\pi\omega_f)$. The path as a whole is shifted only if all pairs are shifted by the same
+# time. The penalty is unchanged in both cases.
+
 
 # %%
+def turned(C, turn):
+    """Every pair of C rotated by its angle."""
+    sine, cosine = C[:, :F], C[:, F:]
+    first = np.cos(turn) * sine - np.sin(turn) * cosine
+    return np.concatenate([first, np.sin(turn) * sine + np.cos(turn) * cosine], axis=1)
+
+
 turn = rng.uniform(0, 2 * np.pi, (3, F, N))
-sine, cosine = C[:, :F], C[:, F:]
-turned = np.concatenate(
-    [np.cos(turn) * sine - np.sin(turn) * cosine, np.sin(turn) * sine + np.cos(turn) * cosine],
-    axis=1,
-)
-np.testing.assert_allclose(matern_penalty_forward(turned, rho)[0], penalty, rtol=1e-13)
+np.testing.assert_allclose(matern_penalty_forward(turned(C, turn), rho)[0], penalty, rtol=1e-13)
+
+path_at = lambda C, t: motion_forward(C, dictionary_forward(t, omega)[0])[0]
+shift, t, f = 0.07, 0.31, 3
+theta = (2 * np.pi * omega * shift)[None, :, None]
+np.testing.assert_allclose(path_at(turned(C, theta), t), path_at(C, t + shift), atol=1e-12)
+alone = np.zeros_like(C)
+alone[:, [f, F + f]] = C[:, [f, F + f]]
+same = np.broadcast_to(1.2, (1, F, 1))  # one angle for all pairs is not one time for all
+at = t + 1.2 / (2 * np.pi * omega[f])
+np.testing.assert_allclose(path_at(turned(alone, same), t), path_at(alone, at), atol=1e-12)
+assert np.abs(path_at(turned(C, same), t) - path_at(C, at)).max() > 0.1
 
 # %% [markdown]
 # ## Figure: the effect of the penalty on a trajectory

@@ -14,7 +14,8 @@
 # # 10. The base losses: L1, SSIM, depth and smoothness
 #
 # The base model has four loss terms: the colour of each pixel, the structure of the colours, the depth against the
-# prior depth, and smoothness where nothing is observed. All except the last read no value under the instrument.
+# prior depth, and smoothness where nothing is observed. The colour terms read no value under the instrument. The depth
+# term reads two maxima there, and smoothness the render.
 #
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
@@ -162,7 +163,7 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 # %% tags=["transcription"]
 def depth_text(D_hat, D, M):
     V = M & (D > 0) & np.isfinite(D)
-    m, m_D = D_hat.max(), D[D > 0].max()
+    m, m_D = D_hat.max(), D[(D > 0) & np.isfinite(D)].max()
     return np.abs(D_hat / m - D / m_D)[V].sum() / V.sum()
 
 
@@ -191,6 +192,17 @@ np.testing.assert_allclose(L_D, depth_text(D_hat, D_prior, M), rtol=1e-12)
 np.testing.assert_allclose(
     normalised_depth_forward(D_hat, depth_target(7 * D_prior, M))[0], L_D, rtol=1e-12
 )
+
+# The maximum m_D runs over the instrument too: one finite prior there moves the loss, if it is
+# the largest. A value that is not finite is no depth.
+tool = tuple(np.argwhere(~M)[0])
+for depth in (90.0, 0.9 * D_prior.max(), np.nan):
+    on_tool = D_prior.copy()
+    on_tool[tool] = depth
+    moved = normalised_depth_forward(D_hat, depth_target(on_tool, M))[0]
+    print(f"prior {depth:.0f} on the instrument: loss {L_D:.3f} -> {moved:.3f}")
+    assert (moved == L_D) == (not depth > D_prior.max())
+    np.testing.assert_allclose(moved, depth_text(D_hat, on_tool, M), rtol=1e-12)
 
 step = D_hat + 80 * (np.arange(W) > 20)  # a fold, so that there is an edge
 E = canny_edges(step)

@@ -128,8 +128,9 @@ for alpha_cut, T_stop in ((1e-9, 0.0), (1 / 255, 1e-2)) if SMALL else ((1 / 255,
 # $\alpha_{\mathrm{cut}}$; on a surface the factor is five. Where hundreds of faint Gaussians overlap, it is larger.
 #
 # $\alpha\ge\alpha_{\mathrm{cut}}$ is the ellipse $q\le2\ln(o/\alpha_{\mathrm{cut}})$. Its area is
-# $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow with the **logarithm** of the
-# accuracy. Each factor of a thousand in accuracy adds the same number of visits.
+# $\pi\sqrt{\det}\,\cdot2\ln(o/\alpha_{\mathrm{cut}})$ pixels, so the visits grow at most with the **logarithm** of the
+# accuracy. Each factor of ten adds the same area. In this small picture it adds fewer visits each time, because the
+# ellipses grow beyond the border, where there are no pixels.
 
 # %%
 cutoffs = 10.0 ** -np.arange(2, 11)
@@ -145,6 +146,9 @@ inside = saved.visible
 predicted = [
     2 * np.pi * (np.sqrt(saved.projected.determinant) * np.log(o / cut))[inside].sum()
     for cut in cutoffs
+]
+assert (np.diff(visits) <= np.diff(predicted)).all() and np.diff(visits)[-1] < np.diff(visits)[
+    0
 ]
 
 # %% tags=["hide-input"]
@@ -162,7 +166,7 @@ words, place = (
     (cutoffs[6], predicted[6]),
 )
 axes[1].annotate(words, place, xytext=(8, 0), va="bottom", fontsize=8, **label)
-axes[1].set(xlabel="cutoff", ylabel="visits", title="The work follows its logarithm")
+axes[1].set(xlabel="cutoff", ylabel="visits", title="The work grows at most with its logarithm")
 plt.show()
 
 # %% [markdown]
@@ -223,12 +227,12 @@ plt.show()
 # ## Exercise
 #
 # The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you expect at $10^{-7}$, and why is this
-# estimate slightly too large?
+# estimate too large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. The visits are a straight line in ln(1 / cutoff): as many more as between the first
-# two. It is a little too large because an ellipse that reaches the border of the picture
-# grows outside of it, where there are no pixels.
+# Answer. If the visits were a straight line in ln(1 / cutoff): as many more as between the
+# first two. That is too large because an ellipse that reaches the border of the picture grows
+# outside of it, where there are no pixels.
 at = {int(-np.log10(cut)): count for cut, count in zip(cutoffs, visits, strict=True)}
 expected = 2 * at[5] - at[3]
 assert at[7] <= expected

@@ -158,6 +158,20 @@ def test_hard_W3_rank_of_the_published_sequence_lengths(n, rank):
         assert 8 < report.condition < 12
 
 
+def test_hard_W3_the_rank_is_full_from_20_frames_on_except_for_32():
+    ranks = {n: report_atoms(training_stamps(n), frequencies(8, 1.0, 16.0)).rank for n in range(14, 201)}
+    assert [n for n in ranks if ranks[n] < 16] == [14, 15, 16, 17, 18, 19, 32]
+
+
+def test_hard_W3_more_cycles_than_half_the_frames_are_no_equal_atoms():
+    """24 frames, 16 cycles: no two atoms agree at the stamps, and the rank is full."""
+    times, omega = np.arange(24) / 24, frequencies(8, 1.0, 16.0)
+    report, statistics = report_atoms(times, omega), atom_statistics(times, omega)
+    atoms = np.array([normalised_atoms(t, omega, statistics) for t in times])
+    agreement = np.abs(atoms.T @ atoms / len(times) - np.eye(16)).max()  # 1 = equal, or opposite
+    assert omega[-1] > len(times) / 2 and report.rank == 16 and agreement < 0.9
+
+
 @pytest.mark.parametrize("n", [9, 63, 156])
 def test_hard_W4_float32_atoms_are_the_rounded_float64_ones(n):
     times, omega = training_stamps(n), frequencies(8, 1.0, 16.0, np.float32)

@@ -140,6 +140,29 @@ def test_hard_L6_bad_values_under_the_mask_are_not_the_maximum():
         assert not other_gradient[~mask].any()
 
 
+@pytest.mark.parametrize("prior_of_tool", [np.nan, np.inf, -np.inf, -3.0, 0.0, 1e-300, 39.0])
+def test_hard_L6_a_prior_under_the_mask_that_is_not_the_maximum_changes_nothing(prior_of_tool):
+    rendered, prior = depths()
+    loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
+    prior[0, 3] = prior[tool_mask()].max()
+    other, other_gradient = loss_and_gradient(rendered, np.where(tool_mask(), prior, prior_of_tool), tool_mask())
+    here, here_gradient = loss_and_gradient(rendered, np.where(tool_mask(), prior, 0.0), tool_mask())
+    assert other == here and np.array_equal(other_gradient, here_gradient)
+    assert loss > 0 and gradient.any()
+
+
+@pytest.mark.parametrize("prior_of_tool", [90.0, 1e4, 1e300])
+def test_hard_L6_the_largest_prior_may_lie_under_the_mask(prior_of_tool):
+    """The exception of (B8): one finite value there scales the prior of every pixel of the tissue."""
+    rendered, prior = depths()
+    mask = tool_mask()
+    loss, _ = loss_and_gradient(rendered, prior, mask)
+    prior[5, 12] = prior_of_tool  # on the tool
+    other, _ = loss_and_gradient(rendered, prior, mask)
+    by_hand = np.abs(rendered / rendered.max() - prior / prior_of_tool)[mask].mean()
+    assert not mask[5, 12] and other == pytest.approx(by_hand, rel=1e-13) and other > 1.4 * loss
+
+
 def test_float32():
     rendered, prior = (a.astype(np.float32) for a in depths())
     loss, gradient = loss_and_gradient(rendered, prior, tool_mask())
