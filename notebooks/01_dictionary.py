@@ -123,8 +123,8 @@ assert phi[F - 1] == 0.0 and phi_text(5 / 32, omega)[F - 1] != 0.0
 # ## Centred and scaled over the training stamps
 #
 # The base colour of a Gaussian represents its mean colour, and the colour residual should not change it. The atoms of
-# the residual therefore have mean 0 over the training stamps $\mathcal T$. They have RMS 1, so that a coefficient means
-# the same at every frequency:
+# the residual therefore have mean 0 over the training stamps $\mathcal T$. They have RMS 1, so that equal coefficients
+# have equal RMS effect at every frequency:
 #
 # $$
 # \begin{aligned}
@@ -232,7 +232,7 @@ plt.show()
 # g_t = \sum_{f=1}^{F} 2\pi\omega_f\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr).
 # $$
 #
-# The statistics are constants of the derivative, so normalisation only scales the gradient:
+# The statistics are held fixed, so normalisation only scales the gradient:
 #
 # $$
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}

@@ -68,7 +68,8 @@ assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta
 
 # %% [markdown]
 # **Identity at the start.** $A=0$ gives a residual of exactly 0. A model in which the component has just been activated
-# renders the same image, bit by bit. The gradient by $A$ is not 0 there (see below), so $A$ can be trained.
+# renders the same image, bit by bit. The gradient with respect to $A$ is not 0 there (see below), so $A$ can be
+# trained.
 
 # %%
 zero = np.zeros_like(A)

@@ -87,8 +87,8 @@ for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
 # ## Figure: which times do the bases cover?
 #
 # At the start all weights are 0, the centres are evenly spaced and all widths are `model.initial_width`. The gradient
-# by a weight at a frame is proportional to $e$, the value of its basis there. With the published width of 0.01 there
-# are times at which no basis exceeds 0.001. A frame at such a time changes almost nothing at first. This is not an
+# with respect to a weight at a frame is proportional to $e$, the value of its basis there. With the published width of
+# 0.01 there are times at which no basis exceeds 0.001. Such frames initially barely update the weights. This is not an
 # error, but it slows training down. The preset `sharp` starts at 0.05.
 
 # %% tags=["hide-input"]
@@ -134,9 +134,9 @@ plt.show()
 #
 # $\psi$ is linear in $w$, so $g_w=e\,g_\psi$. For `quartic`, $e=\exp(-u^2)$ gives $\mathrm de=-2ue\,\mathrm du$, and
 # $u=\Delta^2/\Sigma$ gives $\mathrm du=\frac{2\Delta}{\Sigma}\mathrm d\Delta-\frac{u}{\Sigma}\mathrm d\Sigma$ with
-# $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. Multiplied out: two minus signs
-# meet in each case, and both gradients begin with $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$.
-# The time enters every $\Delta$ with the opposite sign of $\theta$:
+# $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. In each product the signs cancel,
+# leaving $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$. The time enters every $\Delta$ with the
+# opposite sign of $\theta$:
 #
 # $$
 # \begin{aligned}
@@ -174,8 +174,8 @@ for basis in ("quartic", "gaussian"):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
 
 # %% [markdown]
-# There are two consequences. While all weights are 0, the gradients by centre and width are exactly 0, so only the
-# weights change at first. A width of exactly 0 has gradient 0 and never changes.
+# There are two consequences. While all weights are 0, the gradients with respect to centre and width are exactly 0, so
+# only the weights change at first. A width of exactly 0 has gradient 0 and never changes.
 
 # %%
 _, saved = deformation_forward(np.zeros_like(w), theta, sigma, 0.4)

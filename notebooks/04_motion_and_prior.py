@@ -14,7 +14,7 @@
 # # 4. The translation residual and its Matérn prior (component S)
 #
 # Component S adds a Fourier series to the path of each Gaussian. Sixteen free coefficients per axis can also produce
-# implausible motion between the frames. The Matérn-5/2 penalty states which motion is unlikely: fast motion.
+# implausible motion between the frames. The Matérn-5/2 prior penalises fast motion.
 #
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 

@@ -188,7 +188,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# The derivation goes backwards through the display. The screen covariance is $MM^\top+\varepsilon I$ with
+# We differentiate from the last line upward. The screen covariance is $MM^\top+\varepsilon I$ with
 # $M=T\,\mathrm{diag}(S)$, so this step is the same as for $\Sigma$. $b$ stands for two entries of the matrix, and half
 # of its gradient goes to each. This gives $G_2$.
 #
@@ -226,8 +226,8 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The gradient by the pose is a sum over all Gaussians. (The terms with $g_{\mathbf o}$ come from the viewing directions
-# and are not part of this stage.)
+# The gradient with respect to the pose is a sum over all Gaussians. (The terms with $g_{\mathbf o}$ come from the
+# viewing directions and are not part of this stage.)
 #
 # $$
 # \begin{aligned}
@@ -359,9 +359,9 @@ for name in ("position", "rotation", "scale"):
 # \end{aligned}
 # $$
 #
-# The gradients by $W'$ and $\mathbf d'$ are those that the projection returned above. Every entry of $E$ depends on
-# $\boldsymbol\omega$ through $[\boldsymbol\omega]_\times$ and through both factors, whose derivatives by $\omega_i$ are
-# $\omega_i\alpha'$ and $\omega_i\beta'$.
+# The gradients with respect to $W'$ and $\mathbf d'$ are those that the projection returned above. Every entry of $E$
+# depends on $\boldsymbol\omega$ through $[\boldsymbol\omega]_\times$ and through both factors, whose derivatives with
+# respect to $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$.
 
 
 # %% tags=["transcription"]
@@ -424,8 +424,8 @@ assert all(report.passed for report in reports)
 # ## Exercise
 #
 # Make everything twice as large: positions, semi-axes, the translation of the camera, the near plane. What happens to
-# $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the gradient by the position? Write down your answer before you open
-# the cell.
+# $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the gradient with respect to the position? Write down your answer
+# before you open the cell.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles.

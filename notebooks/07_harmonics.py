@@ -185,7 +185,7 @@ plt.show()
 
 # %% tags=["transcription"]
 def dY_text(x, y, z):
-    """The right column of the table: derivatives by x, y, z, taken as independent. (16, 3)"""
+    """The right column of the table: d/dx, d/dy, d/dz, taken as independent. (16, 3)"""
     return np.array(
         [
             [0, 0, 0],

@@ -225,8 +225,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass, line by line
 #
-# A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. The gradients by every $\alpha_k$, colour and depth are
-# wanted.
+# A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. We need gradients with respect to every $\alpha_k$,
+# colour and depth.
 #
 # **Line 1. The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
 # $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it:

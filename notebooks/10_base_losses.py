@@ -250,9 +250,9 @@ plt.show()
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
 # $$
 #
-# **SSIM.** $s$ depends on $x$ through three windowed images, $k*x$, $k*x^2$ and $k*(xy)$; call the derivatives by them
-# $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric, so the reverse
-# of $k*$ is $k*$ itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
+# **SSIM.** $s$ depends on $x$ through three windowed images, $k*x$, $k*x^2$ and $k*(xy)$; call the derivatives with
+# respect to them $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric,
+# so the reverse of $k*$ is $k*$ itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
 #
 # $$
 # \begin{aligned}

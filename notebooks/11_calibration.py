@@ -14,8 +14,8 @@
 # # 11. Calibration of the Laplacian weight
 #
 # The best weight of the Laplacian loss depends on the sequence. The paper therefore derives $\lambda_{\mathrm{lap}}$
-# from gradients: at full weight and in the median over the views, the gradient of the Laplacian loss by the rendered
-# image has a fixed ratio $r$ to the gradient of the photometric loss.
+# from gradients: at full weight and in the median over the views, the gradient of the Laplacian loss with respect to
+# the rendered image has a fixed ratio $r$ to the gradient of the photometric loss.
 #
 # The equation is {eq}`eq-7` of {doc}`/specification/07_calibration`.
 

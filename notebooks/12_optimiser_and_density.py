@@ -141,9 +141,9 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # %% [markdown]
 # ## Density control
 #
-# A large gradient by the screen centre of a Gaussian indicates that one Gaussian covers a region that needs two. The
-# statistic is the mean norm of this gradient, in units of normalised device coordinates, over the views in which the
-# Gaussian is visible:
+# A large gradient with respect to the screen centre of a Gaussian indicates that one Gaussian covers a region that
+# needs two. The statistic is the mean norm of this gradient, in units of normalised device coordinates, over the views
+# in which the Gaussian is visible:
 #
 # $$
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}
@@ -321,8 +321,8 @@ assert report.passed
 # of a child added at $k=600$, in units of $\eta$? How large is it when the count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and the
-# corrections no longer make up for it.
+# Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and bias
+# correction no longer compensates.
 for k, factor in ((600, 2.13), (10**6, 3.162)):
     p = np.zeros(1)
     adam_step(p, np.ones(1), np.zeros(1), np.zeros(1), k, 1.0, beta_1, beta_2, epsilon)

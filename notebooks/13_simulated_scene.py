@@ -44,7 +44,7 @@ camera = sequence.cameras[0]
 # A material point has two coordinates $(a,b)$ in millimetres. At time $t$ it is at
 # $X(a,b,t)=\bigl(a,\ b,\ \mathrm{distance}+h(a,b)\bigr)+\sum_k s_k(t)\,w_k(a,b)\,\mathbf v_k$, with $h$ a sum of plane
 # waves and, for each motion $k$, a time course $s_k$ with $s_k(0)=0$, a spatial weight $w_k$ and a direction
-# $\mathbf v_k$. Which point a pixel shows is found by Newton's method, to $10^{-10}$ mm.
+# $\mathbf v_k$. Newton's method finds each pixel's point, to $10^{-10}$ mm.
 
 
 # %% tags=["transcription"]
@@ -234,7 +234,7 @@ assert colour.min() >= 0 and colour.max() <= 1 and not np.any(start.fdm_weight)
 # ## The reverse pass
 #
 # Initialisation is not differentiated. The initial points are accurate because back-projection and projection use the
-# same rule for pixel centres. The pair that depends on this rule is the projection.
+# same rule for pixel centres. The projection check exercises this rule.
 
 # %%
 with one_thread():

@@ -425,8 +425,8 @@ plt.show()
 # %% [markdown]
 # ## From Python, in ten lines
 #
-# The stages above are the inside. From the outside, `import endotsr` is enough: the same training with a callback, a picture at
-# a time between two frames, the metrics of the held-out frames, and a run folder that the command line reads as well.
+# Users need none of these internals. `import endotsr` is enough: the same training with a callback, a picture at a time
+# between two frames, the metrics of the held-out frames, and a run folder that the command line reads as well.
 
 # %%
 import tempfile
@@ -454,10 +454,10 @@ np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
 # %% [markdown]
 # ## The reverse pass
 #
-# The objective is a weighted sum, so its gradient by the render is the weighted sum of the gradients of the terms. It
-# continues through the reverse passes of compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection {eq}`eq-b3`,
-# covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and {eq}`eq-3`, in that order. The
-# gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
+# The objective is a weighted sum, so its gradient with respect to the render is the weighted sum of the gradients of
+# the terms. It continues through the reverse passes of compositing {eq}`eq-b5`, harmonics {eq}`eq-b4`, projection
+# {eq}`eq-b3`, covariance {eq}`eq-b2`, deformation {eq}`eq-b1` and the residuals {eq}`eq-2` and {eq}`eq-3`, in that
+# order. The gradient of $\mathcal L_{\mathrm{msp}}$ is added to $g_C$ directly.
 #
 # ## The gradient check
 #
@@ -487,8 +487,8 @@ assert report.passed
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The one trained without A: its other parameters have learned to do without (wrongly,
-# by moving things). The difference between "taken out" and "never there" is what the rest of
-# the model would abuse.
+# by moving things). The difference between "taken out" and "never there" shows how other
+# parameters compensate.
 with_all = score(state, shop, sequence.train_index)
 taken_out = score(state, shop, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 15. Hard cases
 #
-# A program that is correct on random input can still be wrong. Each section below has an input that breaks plausible
-# programs, is named after the mistake, and states the required result. The last section asks whether the gradient check
-# can fail. {doc}`/hard_cases` has the full list with a bound and a test for each case, and the naive formulas evaluated
-# in both precisions.
+# A program that is correct on random input can still be wrong. Each section below has input that breaks plausible code,
+# names the mistake, and states the required result. The last section asks whether the gradient check can fail.
+# {doc}`/hard_cases` has the full list with a bound and a test for each case, and the naive formulas evaluated in both
+# precisions.
 #
 # Equation {eq}`eq-b5` of {doc}`/specification/b05_compositing` appears again, because its **form** is what makes the
 # first case accurate.

@@ -173,7 +173,7 @@ plt.show()
 # ## The front of settings
 #
 # Cutoff, stop and precision vary together. A setting is **dominated** if another setting takes no more time, has no
-# larger error, and is not equal to it in both. The settings that are not dominated form the front. The best setting for
+# larger error, and is strictly better in one. The settings that are not dominated form the front. The best setting for
 # a given budget is on the front.
 
 # %%

@@ -230,9 +230,9 @@ plt.show()
 # %% [markdown]
 # ## The plan, and what it saves
 #
-# A Gaussian has 11 numbers whatever is on, three harmonic coefficients for each of the $(d+1)^2$ functions up to degree
-# $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier component. The
-# optimiser holds two more of each.
+# A Gaussian always stores 11 base parameters. There are also three harmonic coefficients for each of the $(d+1)^2$
+# functions up to degree $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier
+# component. The optimiser holds two more numbers for each.
 
 
 # %% tags=["transcription"]
