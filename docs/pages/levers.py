@@ -45,7 +45,6 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     PAPER: {},
     "no tracked motion": {"initialisation": {"motion": "none"}},
     "no targets between the frames": {"training": {"bridge_fraction": 0.0}},
-    "these targets at rest": {"training": {"bridge_target": "neighbour"}},
     "rates not annealed": {"optimiser": {"annealed_factor": 1.0}},
     "position rate of `paper`": {"optimiser": {"deformation_position_factor": 1.0}},
     "`ssim_weight` of `paper`": {"loss": {"ssim_weight": 0.1}},

@@ -9,6 +9,7 @@ import numpy as np
 
 from endotsr.config import InitialisationConfig, ModelConfig
 from makers.making import Made, Seeds, Spec, changed, given
+from makers.settings import written_initialisation
 from makers.views import pose
 from makers.wrong import edit, port
 
@@ -48,7 +49,7 @@ def cases() -> list[Spec]:
 
     def spec(case: str, title: str, flags: tuple[str, ...], inputs: dict[str, Made]) -> Spec:
         drawn = InitialisationConfig(first_frame_points=1000, other_frame_points=10_000, motion_threshold=5.0)
-        settings = {"camera": LENS, "initialisation": msgspec.to_builtins(drawn), "model": model}
+        settings = {"camera": LENS, "initialisation": written_initialisation(drawn), "model": model}
         return Spec("initialisation", case, "initialisation", title, flags, settings, inputs)
 
     one = _frames(Seeds("initialisation", "one_point"), 1, [0])

@@ -4,11 +4,11 @@ A configuration and a list of iterations come in. The cases are the milestones o
 before and after them, and a short run with the opposite choices.
 """
 
-import msgspec
 import numpy as np
 
 from endotsr.config import Config, DensityConfig, LossConfig, ModelConfig, OptimiserConfig, TrainingConfig
 from makers.making import Spec, given
+from makers.settings import written
 from makers.wrong import edit, port
 
 OPERATIONS = ("schedule",)
@@ -28,7 +28,7 @@ def _short_run() -> Config:
 
 def _spec(case: str, config: Config, iterations: tuple[int, ...], title: str, flags: tuple[str, ...]) -> Spec:
     inputs = {"iteration": given(np.array(iterations), ", ".join(map(str, iterations)), "iteration")}
-    return Spec("schedule", case, "schedule", title, flags, {"config": msgspec.to_builtins(config)}, inputs)
+    return Spec("schedule", case, "schedule", title, flags, {"config": written(config)}, inputs)
 
 
 def cases() -> list[Spec]:

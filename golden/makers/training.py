@@ -21,6 +21,7 @@ from makers.clock import stamps, train_index
 from makers.images import tissue
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.moving import BASES, FRAMES, FREQUENCIES, LENS
+from makers.settings import written
 from makers.views import pose, scene_inputs
 from makers.wrong import edit, port
 
@@ -106,12 +107,12 @@ def _out_of_view() -> Spec:
     flags = ("visible_if_in_front", "density_over_all_views", "statistics_not_reset")
     title = "Gaussians leave the view and come back: only views in which one is visible count for its densification"
     return Spec("training", "out_of_view", "training", title, flags,
-                {"camera": LENS, "config": msgspec.to_builtins(config)}, inputs)  # fmt: skip
+                {"camera": LENS, "config": written(config)}, inputs)  # fmt: skip
 
 
 def cases() -> list[Spec]:
     """The trajectory, and a shorter one whose Gaussians leave the view."""
-    settings = {"camera": LENS, "config": msgspec.to_builtins(_settings())}
+    settings = {"camera": LENS, "config": written(_settings())}
     flags = ("skipped_step_when_densifying", "residuals_activated_late", "rates_not_decaying",
              "laplacian_weight_not_ramped", "penalty_dropped_in_training", "calibration_of_half_ratio",
              "densify_threshold_in_pixels", "children_inherit_moments", "statistics_not_reset", "degree_late",

@@ -209,8 +209,6 @@ class InitialisationConfig(Section, frozen=True, kw_only=True):
     """a pixel of another frame counts as moved when its depth differs by more, scene units"""
     motion: Literal["none", "flow"] = "none"
     """motion at the start: none, or coefficients of S that are fitted to the points' tracks along optical flow"""
-    motion_flow: Literal["dis", "farneback", "deepflow", "tvl1", "rlof"] = "dis"
-    """method of the optical flow of the tracks"""
 
 
 class TrainingConfig(Section, frozen=True, kw_only=True):
@@ -224,14 +222,8 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
     """iterations between raises of the active harmonic degree"""
-    time_jitter: NonNegative = 0.0
-    """training frames are rendered at t + jitter x U(-0.5, 0.5) / n"""
     bridge_fraction: Fraction = 0.0
-    """fraction of iterations that render a time between two training frames"""
-    bridge_target: Literal["neighbour", "flow"] = "neighbour"
-    """target of such a render: one of the two frames, or both moved along optical flow to that time"""
-    bridge_flow: Literal["dis", "farneback", "deepflow", "tvl1", "rlof"] = "dis"
-    """method of the optical flow"""
+    """fraction of iterations that render a time between two training frames, made of both along optical flow"""
     seed: Count = 0
     """seed of every random draw"""
     threads: Count = 0
@@ -264,8 +256,14 @@ SHARP = Config(
     loss=LossConfig(ssim_weight=0.2, lambda_lap=1.2),
     optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),
     initialisation=InitialisationConfig(motion="flow"),
-    training=TrainingConfig(bridge_fraction=0.7, bridge_target="flow", visits_per_frame=128),
+    training=TrainingConfig(bridge_fraction=0.7, visits_per_frame=128),
 )
+
+# Keys of earlier versions, and the values that mean what the settings mean without them.
+FORMER = {
+    "initialisation": {"motion_flow": ("dis",)},
+    "training": {"time_jitter": (0,), "bridge_target": ("flow",), "bridge_flow": ("dis",)},
+}
 
 # Milestones of the schedule, by section: they stretch with the length of the run.
 MILESTONES = {
@@ -322,6 +320,7 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
     preset = data.get("preset", "paper")
     if not isinstance(preset, str) or preset not in PRESETS:
         raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
+    data = without_former_keys(data, where, PRESETS[preset].training.bridge_fraction)
     refuse_unknown_keys(data, Config, where)
     config = checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
     _refuse_contradictions(config, where)
@@ -365,6 +364,33 @@ def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
         key: merged(base[key], value) if isinstance(value, dict) and isinstance(base.get(key), dict) else value
         for key, value in changes.items()
     }
+
+
+def without_former_keys(data: dict[str, Any], where: str, bridge_fraction: float = 0.0) -> dict[str, Any]:
+    """The settings without the keys of `FORMER`, which a stored run of an earlier version has.
+
+    bridge_fraction   in force where the data does not name it: without bridged times, their target has no meaning
+
+    A stored run of an earlier version holds its length beside the visits of its preset; the length is that of the run.
+    Raises:  InputError for a former key with another value.
+    """
+    out, found = dict(data), 0
+    for section, keys in FORMER.items():
+        values = data.get(section)
+        if not isinstance(values, dict):
+            continue
+        out[section] = {key: value for key, value in values.items() if key not in keys}
+        for key, allowed in ((key, allowed) for key, allowed in keys.items() if key in values):
+            unused = key == "bridge_target" and values.get("bridge_fraction", bridge_fraction) == 0
+            if values[key] not in allowed and not (unused and values[key] == "neighbour"):
+                raise InputError(
+                    f"{where}: {section}.{key} = {values[key]!r} is not allowed: the key left with an earlier version; "
+                    f"allowed: {allowed[0]!r}, or no such key (what was trained otherwise opens in that version alone)"
+                )
+            found += 1
+    if found == sum(map(len, FORMER.values())) and "iterations" in data["training"]:
+        out["training"] = out["training"] | {"visits_per_frame": 0}
+    return out
 
 
 def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") -> None:

@@ -209,3 +209,49 @@ def test_missing_words(capsys):
     assert_refused(capsys, ["render", "run"], "--out DIR or --film FILE is missing")
     assert_refused(capsys, ["demo"], "demo: --out RUN is missing")
     assert_refused(capsys, ["demo", "--ou", "x"], "--ou: no such option; did you mean --out?")
+
+
+# --- keys of earlier versions ---
+
+FORMER = """
+[initialisation]
+motion_flow = "dis"
+[training]
+time_jitter = 0.0
+bridge_target = "{}"
+bridge_flow = "dis"
+"""
+
+
+def test_keys_of_earlier_versions_are_read_at_the_value_that_remains(tmp_path):
+    file = tmp_path / "old.toml"
+    file.write_text(FORMER.format("neighbour"))  # the former default: no time is bridged in `paper`
+    assert load_config(file) == PAPER
+    file.write_text('preset = "sharp"' + FORMER.format("flow"))
+    assert load_config(file) == SHARP
+    assert settings("--config", str(file)) == SHARP
+
+
+def test_the_stored_length_of_an_earlier_version_is_kept_on_any_number_of_frames(tmp_path):
+    from endotsr.config import lengthened
+
+    file = tmp_path / "old.toml"
+    file.write_text('preset = "sharp"' + FORMER.format("flow") + "iterations = 300\nvisits_per_frame = 128\n")
+    assert lengthened(load_config(file), 55).training.iterations == 300
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "allowed"),
+    [
+        ("training", "time_jitter", 1.0, "allowed: 0"),
+        ("training", "bridge_flow", "tvl1", "allowed: 'dis'"),
+        ("training", "bridge_target", "neighbour", "allowed: 'flow'"),
+        ("initialisation", "motion_flow", "farneback", "allowed: 'dis'"),
+    ],
+)
+def test_a_key_of_an_earlier_version_with_another_value_is_refused(section, key, value, allowed):
+    with pytest.raises(InputError) as refused:
+        config_from_dict({"preset": "sharp", section: {key: value}}, "old.toml")
+    said = str(refused.value)
+    assert said.startswith(f"old.toml: {section}.{key} = {value!r} is not allowed") and allowed in said
+    assert "or no such key" in said

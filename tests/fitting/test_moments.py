@@ -17,7 +17,7 @@ from endotsr.sequences.between import flows_between, frame_between
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
-FLOW = TrainingConfig(bridge_fraction=1.0, bridge_target="flow")
+FLOW = TrainingConfig(bridge_fraction=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_every_moment_of_every_gap_is_drawn_alike(sequence):
 
 
 def test_the_frame_of_a_moment_is_that_of_the_equation(sequence):
-    kept = Moments(sequence, "dis")
+    kept = Moments(sequence)
     moment = Moment(0, 2, 0.75)
     wanted = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
     found = kept.frame(moment)
@@ -55,16 +55,16 @@ def test_the_flows_of_a_gap_are_computed_once(sequence, monkeypatch):
     asked = []
     real = module.flows_between
     monkeypatch.setattr(module, "flows_between", lambda *rest: asked.append(rest[1:]) or real(*rest))
-    kept = Moments(sequence, "farneback")
+    kept = Moments(sequence)
     for fraction in (0.25, 0.5, 0.75, 0.5):
         kept.frame(Moment(0, 2, fraction))
-    assert asked == [(0, 2, "farneback")]
+    assert asked == [(0, 2)]
 
 
 def test_a_training_compares_with_the_moments(sequence):
     config = msgspec.structs.replace(
         DEMO,
-        training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0, bridge_target="flow", iterations=6),
+        training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0, iterations=6),
         initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=300, other_frame_points=60),
     )
     shop, state = workshop(sequence, config), new_training(sequence, config)
@@ -74,7 +74,7 @@ def test_a_training_compares_with_the_moments(sequence):
 
 
 def test_without_bridges_no_moment_is_made(sequence):
-    training = msgspec.structs.replace(DEMO.training, bridge_fraction=0.0, bridge_target="flow")
+    training = msgspec.structs.replace(DEMO.training, bridge_fraction=0.0)
     config = msgspec.structs.replace(DEMO, training=training)
     shop, state = workshop(sequence, config), new_training(sequence, config)
     for _ in range(4):

@@ -18,7 +18,7 @@ from endotsr.config import (
 )
 from endotsr.fitting.adam import adam_update
 from endotsr.fitting.objective import LossWeights
-from endotsr.fitting.sampling import next_view
+from endotsr.fitting.sampling import drawn_view
 from endotsr.fitting.schedules import learning_rates
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
@@ -67,7 +67,7 @@ def warm(sequence, config, iterations):
 def plain_step(state, shop):
     """The documented gradients of the next view, then Adam; the state is changed in place."""
     config, iteration = shop.config, state.iteration + 1
-    index, t, _ = next_view(state.rng, shop.sequence, config.training)
+    index, t, _ = (state.drawn or drawn_view(copy.deepcopy(state.rng), shop.sequence, config.training)).view
     column = int(np.flatnonzero(shop.sequence.train_index == index)[0])
     loss, o = config.loss, config.optimiser
     weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)

@@ -212,5 +212,4 @@ def test_settings_of_the_paper():
         "other_frame_points": 5_000,
         "motion_threshold": 40.0,
         "motion": "none",
-        "motion_flow": "dis",
     }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.opencv import area_resize, canny_edges, dis_flow, read_png, warp_bilinear, write_png
+from endotsr.opencv import area_resize, canny_edges, dense_flow, read_png, warp_bilinear, write_png
 from endotsr.opencv.pictures import read_picture
 from endotsr.opencv.video import video_facts
 
@@ -76,10 +76,10 @@ def test_flow_finds_a_shift_in_both_axes_with_its_sign():
     scene = lambda dx, dy: (
         (127 + 60 * np.sin((x - dx) / 5) + 60 * np.cos((y - dy) / 6 + (x - dx) / 20)).clip(0, 255).astype(np.uint8)
     )
-    flow = dis_flow(scene(0, 0), scene(3, -2))
+    flow = dense_flow(scene(0, 0), scene(3, -2))
     assert flow.shape == (2, 64, 80)
     assert np.median(flow[0]) == pytest.approx(3, abs=0.3) and np.median(flow[1]) == pytest.approx(-2, abs=0.3)
-    np.testing.assert_array_equal(dis_flow(scene(0, 0)[:8], scene(3, 0)[:8]), 0)
+    np.testing.assert_array_equal(dense_flow(scene(0, 0)[:8], scene(3, 0)[:8]), 0)
 
 
 def test_area_resize_is_the_mean_of_what_is_covered():

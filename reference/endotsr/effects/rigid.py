@@ -83,7 +83,7 @@ def return_error(clip: Clip, tracks: Tracks, noise: Noise) -> FloatArray:
             continue
         common, there = mask & clip.masks[k], tracks.flow[k] / np.float32(clip.shrink)
         start, end = normalised(grey[k], common, sigma), normalised(grey[clip.reference], common, sigma)
-        back = warp_bilinear(dense_flow(start, end, "dis"), there)
+        back = warp_bilinear(dense_flow(start, end), there)
         squares.append(tile_means(np.hypot(*(there + back)), tracks.valid[k])[0] ** 2)
     known = np.isfinite(squares)
     total = np.where(known, squares, 0.0).sum(axis=0)

@@ -47,7 +47,7 @@ def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) ->
     """The flow between two training frames by number. grey: the luminance of the clip (m, h, w)."""
     common = clip.masks[start] & clip.masks[end]
     before, after = (normalised(grey[k], common, sigma) for k in (start, end))
-    flow = np.zeros((2, *common.shape), np.float32) if start == end else dense_flow(before, after, "dis")
+    flow = np.zeros((2, *common.shape), np.float32) if start == end else dense_flow(before, after)
     seen = common & inside(flow) & (warp_bilinear(clip.masks[end].astype(np.float32), flow) > 0.999)
     return Match(before, after, flow, seen)
 
@@ -105,7 +105,7 @@ def noise_flow(grey: FloatArray, mask: BoolArray, sigma: float, copies: int) -> 
     start, squares = normalised(grey, mask, sigma), []
     for _ in range(copies):
         copy = grey + (2**0.5 * sigma * rng.standard_normal(grey.shape)).astype(np.float32)
-        means, _ = tile_means(dense_flow(start, normalised(copy, mask, sigma), "dis"), mask)
+        means, _ = tile_means(dense_flow(start, normalised(copy, mask, sigma)), mask)
         squares.append((means**2).sum(axis=0))
     return np.sqrt(np.mean(squares, axis=0))
 

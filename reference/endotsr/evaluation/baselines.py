@@ -105,15 +105,15 @@ def flow_interpolation(sequence: Sequence, index: int) -> FloatArray:
     returns   (3, H, W) float32, display units [0, 1]
     Edges     one neighbour only: its copy; an image side below 16 px: the plain blend, without flow
     """
-    from endotsr.opencv import dis_flow, warp_bilinear
+    from endotsr.opencv import dense_flow, warp_bilinear
 
     near = neighbours(sequence, index)
     before, after = unit_image(sequence, near.before), unit_image(sequence, near.after)
     if near.before == near.after:
         return before
     a, b = sequence.images[near.before], sequence.images[near.after]
-    moved_before = warp_bilinear(before, dis_flow(a, b) * np.float32(-near.fraction))
-    moved_after = warp_bilinear(after, dis_flow(b, a) * np.float32(near.fraction - 1.0))
+    moved_before = warp_bilinear(before, dense_flow(a, b) * np.float32(-near.fraction))
+    moved_after = warp_bilinear(after, dense_flow(b, a) * np.float32(near.fraction - 1.0))
     return _blend(moved_before, moved_after, near.fraction)
 
 

@@ -57,9 +57,9 @@ def _row(label: str, sequence: Sequence, resting: BoolArray, frame: Callable[[in
 
 def resting_pixels(sequence: Sequence) -> BoolArray:
     """(H, W) bool: tissue in every frame, with small optical flow between successive recorded frames."""
-    from endotsr.opencv import dis_flow
+    from endotsr.opencv import dense_flow
 
-    flows = [dis_flow(sequence.images[i], sequence.images[i + 1]) for i in range(sequence.count - 1)]
+    flows = [dense_flow(sequence.images[i], sequence.images[i + 1]) for i in range(sequence.count - 1)]
     lengths = np.stack([np.hypot(*flow) for flow in flows])
     middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)
     return sequence.masks.all(axis=0) & (middle <= RESTING) & (high <= RESTING_HIGH)

@@ -34,7 +34,6 @@ class Moments:
     """The frames between the training frames of a sequence, by moment."""
 
     sequence: Sequence
-    method: str  # of the optical flow, see `opencv.dense_flow`
     stored: Kept[tuple[int, int], dict[Moment, Stored]] = field(default_factory=Kept)  # by gap
 
     def frame(self, moment: Moment, dtype: np.dtype | str = "float32") -> Frame:
@@ -47,7 +46,7 @@ class Moments:
         """All moments of the gap in which `wanted` lies."""
         earlier, later, _ = wanted
         found = {}
-        flows, count = flows_between(self.sequence, earlier, later, self.method), 2 * (later - earlier)
+        flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
         for place in range(1, count):
             made = frame_between(self.sequence, earlier, later, place / count, flows)
             image = np.rint(made.image * STEPS).astype(np.uint16)

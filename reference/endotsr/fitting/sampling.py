@@ -1,12 +1,10 @@
-"""Choice of the training frame and of the time of an iteration: uniform, jittered or bridged (specification,
-equation 6).
+"""Choice of the training frame and of the time of an iteration: uniform or bridged (specification, equation 6).
 
 In: the random generator, the sequence and the training settings. Out: one `View`. This module is independent of the
 Gaussians; it changes the generator only.
 """
 
-import copy
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,36 +28,28 @@ class View(NamedTuple):
     moment: Moment | None = None  # compared with the target at this moment; None = with the frame
 
 
-def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
-    """A training frame, uniform with replacement, and its time (jittered or bridged if the settings say so).
+class Drawn(NamedTuple):
+    """A view, and the state that the generator had before it was drawn."""
 
-    Draws: `rng.random()` if views are bridged, then `rng.integers` and, with jitter, `rng.uniform`; a bridged view
-           draws as `_draw_bridge` or `_draw_moment` does.
+    view: View
+    rng_state: dict[str, Any]
+
+
+def drawn_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> Drawn:
+    """The view of `draw_view`, with the state of the generator from which it is drawn again."""
+    before = dict(rng.bit_generator.state)
+    return Drawn(draw_view(rng, sequence, training), before)
+
+
+def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
+    """A training frame, uniform with replacement; with the probability `bridge_fraction` a moment between two (B14).
+
+    Draws: `rng.random()` if views are bridged, then one `rng.integers`.
     """
     if training.bridge_fraction > 0 and rng.random() < training.bridge_fraction:
-        return _draw_moment(rng, sequence) if training.bridge_target == "flow" else _draw_bridge(rng, sequence)
+        return _draw_moment(rng, sequence)
     index = int(sequence.train_index[rng.integers(len(sequence.train_index))])
-    t, jitter = float(sequence.times[index]), training.time_jitter
-    return View(index, t + jitter * rng.uniform(-0.5, 0.5) / sequence.count if jitter > 0 else t)
-
-
-def next_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
-    """The view that `draw_view` will return, from a copy of the generator; anything drawn before it changes that."""
-    return draw_view(copy.deepcopy(rng), sequence, training)
-
-
-def _draw_bridge(rng: np.random.Generator, sequence: Sequence) -> View:
-    """A time uniform between the first and the last training frame, and one of its two training neighbours.
-
-    The neighbour is drawn with the weight that linear interpolation would give it. The expected target at every time
-    is therefore the blend of its neighbours, which constrains the scene between two frames.
-    """
-    index = sequence.train_index
-    times = sequence.times[index]
-    t = float(rng.uniform(times[0], times[-1]))
-    right = min(max(int(np.searchsorted(times, t, side="right")), 1), len(times) - 1)
-    nearness = (t - times[right - 1]) / (times[right] - times[right - 1])
-    return View(int(index[right if rng.random() < nearness else right - 1]), t)
+    return View(index, float(sequence.times[index]))
 
 
 def _draw_moment(rng: np.random.Generator, sequence: Sequence) -> View:

@@ -1,13 +1,14 @@
 """The state of a training, and the workshop: its constants.
 
 `TrainingState` holds everything that a run carries from one iteration to the next. A checkpoint holds the same, except
-for `ahead`, which is then recomputed. Everything else (targets, atoms, rates) is a function of the state, the sequence
-and the configuration, so a resumed run equals an uninterrupted one bit by bit. This module computes no gradient.
+for `ahead` and `drawn`, which are then computed again. Everything else (targets, atoms, rates) is a function of the
+state, the sequence and the configuration, so a resumed run equals an uninterrupted one bit by bit. This module
+computes no gradient.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -19,7 +20,7 @@ from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.fitting.moments import Moments
 from endotsr.fitting.objective import Targets, frame_targets
-from endotsr.fitting.sampling import View
+from endotsr.fitting.sampling import Drawn, View
 from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -43,6 +44,12 @@ class TrainingState:
     lambda_lap: float | None  # full Laplacian weight; None until an `auto` weight is calibrated
     frames: FrameParameters | None = None  # parameters that are not per Gaussian; None if the model has none
     ahead: OffsetsAhead | None = None  # computed while the FDM was updated; not part of a checkpoint
+    drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint holds the generator before it
+
+    @property
+    def rng_state(self) -> dict[str, Any]:
+        """The state of the generator before the next view is drawn."""
+        return dict(self.rng.bit_generator.state) if self.drawn is None else self.drawn.rng_state
 
 
 @dataclass
@@ -68,10 +75,6 @@ class Workshop:
         """The place of the compared frame among the training frames."""
         return int(np.searchsorted(self.sequence.train_index, view.index))
 
-    def camera_time(self, view: View) -> float:
-        """The time whose pose is corrected: that of the compared frame, or of the moment between two frames."""
-        return view.t if view.moment is not None else float(self.sequence.times[view.index])
-
     def in_scene_units(self, rates: dict[str, Rate]) -> dict[str, Rate]:
         """The rates of `learning_rates`, with that of the translations of poses in scene units."""
         given = rates.get("pose_translation")
@@ -92,7 +95,7 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     limit = memory_limit(config.sequence.memory) / 4
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    moments = Moments(sequence, config.training.bridge_flow, Kept(limit))
+    moments = Moments(sequence, Kept(limit))
     depth = _depth_of_tissue(sequence) if config.model.pose_correction else 1.0
     return Workshop(sequence, config, spectral, extent, Kept(limit), moments, depth)
 
@@ -164,9 +167,8 @@ def save_state(path: Path, state: TrainingState, config: Config, sequence: str |
     except ValueError as error:
         raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
     header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "sequence": sequence}
-    generator = dict(state.rng.bit_generator.state)
     save_checkpoint(
-        path, state.gaussians, state.adam, state.iteration, generator, state.statistics, header, state.frames
+        path, state.gaussians, state.adam, state.iteration, state.rng_state, state.statistics, header, state.frames
     )
 
 

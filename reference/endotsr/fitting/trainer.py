@@ -29,7 +29,7 @@ from endotsr.fitting.model import (
     scene_reverse,
 )
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
-from endotsr.fitting.sampling import View, draw_view, next_view
+from endotsr.fitting.sampling import View, drawn_view
 from endotsr.fitting.schedules import (
     active_degree,
     densify_now,
@@ -104,14 +104,15 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
 
 def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
     """One iteration; returns its log entry."""
-    config, iteration, rng_state = shop.config, state.iteration + 1, dict(state.rng.bit_generator.state)
+    config, iteration = shop.config, state.iteration + 1
     if residuals_activate(iteration, config):
         _activate_residuals(state, config)
-    view = draw_view(state.rng, shop.sequence, config.training)
+    state.drawn = state.drawn or drawn_view(state.rng, shop.sequence, config.training)
+    view, rng_state = state.drawn
     targets, camera = shop.observed(view)
     scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, view.t, state.ahead, timer)
     degree = active_degree(iteration, config)
-    camera, pose_saved = corrected(camera, pose_at(state.frames, shop.camera_time(view)))
+    camera, pose_saved = corrected(camera, pose_at(state.frames, view.t))
     rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
     rendered, exposure_saved = exposed(rendered, exposure_of(state.frames, shop.column(view)))
     loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
@@ -128,6 +129,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
     entry = _log_entry(iteration, view, loss, penalty, rendered, targets, state, config)
     dense, state.ahead = densify_now(iteration, config), None
+    state.drawn = None
     if not (dense and config.optimiser.legacy_skip):
         _optimise(state, shop, scene_saved, d_scene, back, iteration, timer)
         _optimise_frames(state, shop, view, d_exposure, d_pose, iteration)
@@ -176,13 +178,14 @@ def _optimise(
     iteration: int,
     timer: Timer,
 ) -> None:
-    """One Adam step of the Gaussians, which also computes the offsets of the next view if its time is known.
+    """One Adam step of the Gaussians, which also draws the next view and computes the offsets at its time.
 
-    The time is unknown before density control, which draws random numbers first, and after the last iteration.
+    It is not drawn before density control, which draws random numbers first, and after the last iteration.
     """
     config, later = shop.config, None
     if iteration < config.training.iterations and not densify_now(iteration, config):
-        later = next_view(state.rng, shop.sequence, config.training).t
+        state.drawn = drawn_view(state.rng, shop.sequence, config.training)
+        later = state.drawn.view.t
     rates = learning_rates(iteration, config)
     gaussians, adam, spectral = state.gaussians, state.adam, shop.spectral
     state.ahead = optimise(gaussians, adam, spectral, config, saved, d_scene, back, rates, later, timer)
@@ -198,7 +201,7 @@ def _optimise_frames(
     if d_exposure is not None:
         gradients |= exposure_gradients(state.frames, shop.column(view), d_exposure)
     if d_pose is not None:
-        gradients |= pose_gradients(state.frames, shop.camera_time(view), d_pose)
+        gradients |= pose_gradients(state.frames, view.t, d_pose)
     rates = shop.in_scene_units(learning_rates(iteration, shop.config))
     adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
 

@@ -119,28 +119,15 @@ def canny_edges(depth: Array) -> NDArray[np.bool_]:
     return _cv2().Canny(np.ascontiguousarray(eight_bit), CANNY_LOW, CANNY_HIGH) > 0
 
 
-FLOW_METHODS = {
-    "dis": lambda cv2: cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM),
-    "farneback": lambda cv2: cv2.FarnebackOpticalFlow_create(),
-    "deepflow": lambda cv2: cv2.optflow.createOptFlow_DeepFlow(),
-    "tvl1": lambda cv2: cv2.optflow.DualTVL1OpticalFlow_create(),
-    "rlof": lambda cv2: cv2.optflow.createOptFlow_DenseRLOF(),
-}
-"""Dense optical flow by name -> maker of the method, given the module `cv2`. `rlof` reads colour, the others grey."""
-
-
-def dense_flow(source: Array, target: Array, method: str = "dis") -> NDArray[np.float32]:
-    """Dense optical flow from one picture to another.
+def dense_flow(source: Array, target: Array) -> NDArray[np.float32]:
+    """Dense optical flow from one picture to another, by dense inverse search (medium preset).
 
     source, target  (H, W) uint8, or (3, H, W) uint8 planar RGB, reduced to grey by their mean
-    method          a key of `FLOW_METHODS`; `dis` is dense inverse search, medium preset
     returns         (2, H, W) float32 pixels: source[y, x] is found at target[y + flow[1], x + flow[0]]
 
-    Edges:   pictures too small for the coarsest level of the methods (a side under 16 pixels) give zero flow.
-    Raises:  ValueError for an unknown method, or for arrays that are not two uint8 pictures of one size.
+    Edges:   pictures too small for the coarsest level of the method (a side under 16 pixels) give zero flow.
+    Raises:  ValueError for arrays that are not two uint8 pictures of one size.
     """
-    if method not in FLOW_METHODS:
-        raise ValueError(f"dense_flow: method {method!r} is not allowed; allowed: {', '.join(FLOW_METHODS)}")
     cv2 = _cv2()
     if source.shape != target.shape or source.dtype != np.uint8 or target.dtype != np.uint8:
         raise ValueError(f"dense_flow: two uint8 pictures of one size expected, got {source.shape} and {target.shape}")
@@ -148,19 +135,12 @@ def dense_flow(source: Array, target: Array, method: str = "dis") -> NDArray[np.
         return np.zeros((2, *source.shape[-2:]), np.float32)
 
     def prepared(picture: Array) -> Array:
-        if method == "rlof":
-            colour = np.broadcast_to(picture, (3, *picture.shape[-2:]))
-            return np.ascontiguousarray(colour[::-1].transpose(1, 2, 0))
         grey = picture if picture.ndim == 2 else picture.mean(axis=0).round().astype(np.uint8)
         return np.ascontiguousarray(grey)
 
-    flow = FLOW_METHODS[method](cv2).calc(prepared(source), prepared(target), None)
+    search = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    flow = search.calc(prepared(source), prepared(target), None)
     return np.ascontiguousarray(flow.transpose(2, 0, 1), np.float32)
-
-
-def dis_flow(source: Array, target: Array) -> NDArray[np.float32]:
-    """`dense_flow` by dense inverse search: the flow of the interpolation baseline."""
-    return dense_flow(source, target, "dis")
 
 
 def warp_cubic(image: Array, flow: Array) -> NDArray[np.float32]:

@@ -53,7 +53,7 @@ def initialise(
     gaussians = gaussians_at(points.position, points.colour, model, dtype)
     if config.motion == "none" or not model.spectral_motion:
         return gaussians
-    tracks = follow(sequence, points.start, points.position, config.motion_flow)
+    tracks = follow(sequence, points.start, points.position)
     times = sequence.times[sequence.train_index].astype(np.float64)
     omega = frequencies(model.frequencies, model.frequency_min, model.frequency_max)
     rho = matern_weights(omega, model.correlation_length)

@@ -34,12 +34,12 @@ class Flows(NamedTuple):
     backward: FloatArray  # (2, H, W) px: later -> earlier
 
 
-def flows_between(sequence: Sequence, earlier: int, later: int, method: str = "dis") -> Flows:
-    """Dense flow between two frames of a sequence. See `opencv.dense_flow` for the methods."""
+def flows_between(sequence: Sequence, earlier: int, later: int) -> Flows:
+    """Dense flow between two frames of a sequence, both ways."""
     from endotsr.opencv import dense_flow
 
     a, b = sequence.images[earlier], sequence.images[later]
-    return Flows(dense_flow(a, b, method), dense_flow(b, a, method))
+    return Flows(dense_flow(a, b), dense_flow(b, a))
 
 
 def motion_between(flows: Flows, fraction: float) -> FloatArray:

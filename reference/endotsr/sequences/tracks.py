@@ -43,12 +43,11 @@ class _Points(NamedTuple):
     followed: BoolArray  # (P,)
 
 
-def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, method: str = "dis") -> Tracks:
+def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray) -> Tracks:
     """The points at every training frame.
 
     start     (P,) place of each point's training frame in `train_index`
     position  (3, P) scene units: where the point is at that frame, which shows it
-    method    of the optical flow, see `opencv.dense_flow`
 
     Edges:   one training frame: the positions are those given. A sequence that does not move: likewise, to rounding
              and to the noise of the prior depth.
@@ -59,7 +58,7 @@ def follow(sequence: Sequence, start: NDArray[np.intp], position: FloatArray, me
     for place in range(last + 1):
         begins = start == place
         out.position[place][:, begins], out.followed[place, begins] = position[:, begins], True
-    flows = lru_cache(KEPT_PAIRS)(lambda place: flows_between(sequence, train[place], train[place + 1], method))
+    flows = lru_cache(KEPT_PAIRS)(lambda place: flows_between(sequence, train[place], train[place + 1]))
     for way in (1, -1):
         for place in range(last) if way > 0 else range(last, 0, -1):
             there_and_back = flows(min(place, place + way))

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Config, DensityConfig, InitialisationConfig
+from endotsr.config import Config, DensityConfig
 from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
 from endotsr.fitting.objective import calibrate_on
 from endotsr.fitting.schedules import (
@@ -27,7 +27,7 @@ from endotsr.scene.density_control import densify, empty_statistics, gather_stat
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
 from endotsr.splatting.camera import Camera
-from endotsr.stages.requests import Tape, config_of, gaussians_of, model_of, sequence_of
+from endotsr.stages.requests import Tape, config_of, gaussians_of, initialisation_of, model_of, sequence_of
 from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, real_of
 
 RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
@@ -103,7 +103,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     """Every candidate is taken, so that no random number is drawn."""
-    config = msgspec.convert(settings["initialisation"], InitialisationConfig)
+    config = initialisation_of(settings)
     sequence, no_draw = sequence_of(inputs, settings["camera"]), None
     found = initialise(sequence, config, model_of(settings), no_draw, real_of(inputs))  # type: ignore[arg-type]
     return {"count": np.array(found.count), **arrays(found)}, None

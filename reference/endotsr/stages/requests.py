@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Config, ModelConfig, config_from_dict
+from endotsr.config import Config, InitialisationConfig, ModelConfig, config_from_dict, without_former_keys
 from endotsr.equations.dictionary import AtomStatistics, atom_statistics
 from endotsr.fitting.model import Spectral, spectral_from
 from endotsr.scene.gaussians import Gaussians
@@ -83,6 +83,12 @@ def config_of(settings: Settings, dtype: np.dtype) -> Config:
     data: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(settings["config"]))
     data["training"]["precision"] = np.dtype(dtype).name
     return config_from_dict(data, "golden case")
+
+
+def initialisation_of(settings: Settings) -> InitialisationConfig:
+    """The settings of the initialisation written out in a case."""
+    name = "initialisation"
+    return msgspec.convert(without_former_keys({name: settings[name]}, "golden case")[name], InitialisationConfig)
 
 
 def sequence_of(inputs: Inputs, lens: dict[str, float]) -> Sequence:

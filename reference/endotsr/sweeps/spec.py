@@ -31,6 +31,7 @@ from endotsr.config import (
     read_toml,
     refuse_unknown_keys,
     with_iterations,
+    without_former_keys,
 )
 from endotsr.errors import InputError
 from endotsr.evaluation.measures import check_measures
@@ -165,6 +166,7 @@ def _configuration(name: str, values: Any, data: dict[str, Any], where: str) -> 
 
 
 def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
+    changes = without_former_keys(changes, where, config.training.bridge_fraction)
     refuse_unknown_keys(changes, Config, where)
     for section, values in changes.items():
         if section == "preset":

@@ -27,7 +27,7 @@ def estimated_cost(
     """The cost of `iterations` on `count` frames of this size, read at `scale`.
 
     memory   `sequence.memory`, GB; 0 = half of this machine's
-    between  whether moments between the frames are targets too (`training.bridge_target = "flow"`)
+    between  whether moments between the frames are targets too (`training.bridge_fraction`)
     """
     limit, read = memory_limit(memory), count * width * height * PIXEL_BYTES
     part = width * height * scale**2 / PIXELS
