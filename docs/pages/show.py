@@ -26,7 +26,7 @@ from endotsr.runs.machine import dated
 DOCS = Path(__file__).parents[1]
 PAGE, FILE = DOCS / "guides" / "show.md", DOCS / "results" / "show.json"
 COMMANDS = {
-    "page": ("view", "--out", "page.html"),
+    "page": ("export", "--out", "page.html"),
     "film of all frames": ("render", "--film", "frames.mp4", "--frames", "all"),
     "film with four panels": (
         "render", "--film", "panels.webm", "--frames", "all", "--panels", "render", "truth", "error", "depth"),

@@ -14,11 +14,13 @@ RULES = ("co_sited", "half_pixel")
 
 
 def cell(run: Path, weight: float, rule: str) -> dict:
-    """What `endotsr calibrate` finds with this weight and rule."""
+    """What `endotsr train --calibrate-only` finds with this weight and rule."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "found.json"
         words = [
-            "calibrate",
+            "train",
+            "--calibrate-only",
+            "--out",
             str(run),
             "--loss.ssim-weight",
             str(weight),

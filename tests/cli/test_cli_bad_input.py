@@ -107,11 +107,11 @@ def test_existing_output(kind, tmp_path, capsys):
     assert (out / "notes.txt" if kind == "folder" else out).read_text() == "mine"
 
 
-@pytest.mark.parametrize("command", ["evaluate", "calibrate", "render"])
+@pytest.mark.parametrize("command", ["evaluate", "train --calibrate-only --out", "render"])
 def test_commands_on_no_run(command, tmp_path, capsys):
     more = ["--out", str(tmp_path / "out")] if command == "render" else []
-    assert_refused(capsys, [command, str(tmp_path / "none"), *more], "none", "run folder not found")
-    assert_refused(capsys, [command, str(tmp_path), *more], "not a run folder")
+    assert_refused(capsys, [*command.split(), str(tmp_path / "none"), *more], "none", "run folder not found")
+    assert_refused(capsys, [*command.split(), str(tmp_path), *more], "not a run folder")
     assert list(tmp_path.iterdir()) == []
 
 

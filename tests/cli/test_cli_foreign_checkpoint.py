@@ -28,7 +28,7 @@ def commands(run):
     return (
         ["render", str(run), "--out", str(run.parent / "pictures")],
         ["evaluate", str(run)],
-        ["calibrate", str(run)],
+        ["train", "--calibrate-only", "--out", str(run)],
         ["train", "--out", str(run), "--resume", "--no-evaluate"],
     )
 

@@ -10,7 +10,6 @@ from endotsr.cli.main import COMMANDS, main
 
 NOT_ALONE = {"golden"}  # only with a second word
 WITHOUT = {
-    "completion": "prints a script, not a result",
     "sweep": "the folder it writes holds results.json",
     "tradeoff train": "the folder it writes holds training.json",
 }
@@ -33,9 +32,9 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(command, tmp_p
     needed = {
         "demo": ["--out", out], "train": ["simulated", "--out", out], "prepare": [run, "--out", out],
         "depth": [run], "masks": [run], "ablate": ["simulated", "--out", out],
-        "check": [run], "simulate": ["still", "--out", out], "inspect": [run], "calibrate": [run],
-        "render": [run, "--out", out], "view": [run, "--out", f"{out}.html"], "export": [run, "--out", f"{out}.ply"],
-        "evaluate": [run], "compare": [run, run], "tradeoff": ["--out", out, "--budget", "10 ms"],
+        "check": [run], "simulate": ["still", "--out", out], "inspect": [run],
+        "render": [run, "--out", out], "export": [run, "--out", f"{out}.ply"],
+        "evaluate": [run], "tradeoff": ["--out", out, "--budget", "10 ms"],
         "golden judge": [run], "golden run": ["--port", "true {requests} {outputs}"], "golden reference": [out],
     }  # fmt: skip
     words = [*command.split(), *needed.get(command, []), "--json", str(tmp_path / "no" / "a.json")]
@@ -54,7 +53,7 @@ def test_results_of_pictures_pages_and_files(finished_run, tmp_path):
     found = result(tmp_path, "render", run, "--out", str(tmp_path / "pictures"), "--times", "0.1", "0.6")
     assert found["times"] == [0.1, 0.6] and found["folder"].endswith("pictures") and found["film"] is None
     page = tmp_path / "page.html"
-    assert result(tmp_path, "view", run, "--out", str(page)) == {
+    assert result(tmp_path, "export", run, "--out", str(page)) == {
         "page": str(page), "bytes": page.stat().st_size, "held_out": True
     }  # fmt: skip
     found = result(tmp_path, "export", run, "--out", str(tmp_path / "files"), "--count", "2")
@@ -71,3 +70,18 @@ def test_results_of_sequences(tmp_path):
     small = ["--width", "48", "--height", "32", "--frames", "3"]
     found = result(tmp_path, "simulate", "breathing", "--out", str(tmp_path / "simulated"), *small)
     assert found["settings"]["frames"] == 3 and "breathing" in found["effects"]
+
+
+@pytest.mark.parametrize("words", [["--times", "0.5"], ["--content", "mesh"], ["--keys", "1"]])
+def test_a_page_refuses_a_choice_of_times_or_content(words, finished_run, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert_refused(capsys, ["export", str(finished_run), "--out", str(page), *words], "allowed: ")
+    assert not page.exists()
+
+
+@pytest.mark.parametrize("words", [["--keys", "9"], ["--title", "mine"], ["--sequence", "elsewhere"]])
+def test_options_of_a_page_are_refused_elsewhere(words, finished_run, tmp_path, capsys):
+    file = tmp_path / "scene.ply"
+    said = f"{words[0]} belongs to a page; allowed: with --out PAGE.html"
+    assert_refused(capsys, ["export", str(finished_run), "--out", str(file), *words], said)
+    assert not file.exists()

@@ -63,14 +63,14 @@ def test_every_command_has_words_of_its_own():
 
 @pytest.mark.parametrize("shell", SCRIPTS)
 def test_a_script_names_every_command_and_its_options(shell, capsys):
-    assert main(["completion", shell]) == 0
+    assert main(["--completion", shell]) == 0
     script = capsys.readouterr().out
     for name in COMMANDS:
         assert name in script
         for word in words_of(name):
             assert word.removeprefix("--") in script
     assert "model.bases" in script and "--film" in words_of("render")
-    assert_refused(capsys, ["completion", "tcsh"], "'tcsh' is not allowed; allowed: bash, zsh, fish")
+    assert_refused(capsys, ["--completion", "tcsh"], "'tcsh' is not allowed; allowed: bash, zsh, fish")
 
 
 @pytest.mark.parametrize(

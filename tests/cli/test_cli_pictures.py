@@ -70,7 +70,7 @@ def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tm
 
 
 def test_compare_runs_and_pictures(finished_run, flow_pictures, tmp_path, capsys):
-    words = ["compare", f"ours={finished_run}", str(flow_pictures), "--json", str(tmp_path / "c.json")]
+    words = ["evaluate", f"ours={finished_run}", str(flow_pictures), "--json", str(tmp_path / "c.json")]
     assert main([*words, "--csv", str(tmp_path / "c.csv")]) == 0
     said = capsys.readouterr().out
     assert "differences to ours, frame by frame" in said
@@ -83,12 +83,19 @@ def test_compare_runs_and_pictures(finished_run, flow_pictures, tmp_path, capsys
     assert "Optical-flow" not in capsys.readouterr().out
 
 
+def test_a_single_run_is_compared_with_its_baselines(finished_run, capsys):
+    assert main(["evaluate", "--compare", f"ours={finished_run}"]) == 0
+    said = capsys.readouterr().out
+    assert "differences to ours, frame by frame" in said and "Optical-flow" in said
+
+
 def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp_path, capsys):
     run, pictures = str(finished_run), str(flow_pictures)
-    assert_refused(capsys, ["compare"], "missing: METHOD")
-    assert_refused(capsys, ["compare", pictures], "--sequence is missing")
-    assert_refused(capsys, ["compare", run, run], "two methods are called 'run'")
-    assert_refused(capsys, ["compare", run, str(tmp_path / "none.json")], "none.json: cannot be read")
-    assert_refused(capsys, ["compare", run, "--seed", "-1"], "--seed -1 is not allowed")
+    assert_refused(capsys, ["evaluate", "--compare"], "METHOD is missing")
+    assert_refused(capsys, ["evaluate", "--compare", pictures], "--sequence is missing")
+    assert_refused(capsys, ["evaluate", run, run], "two methods are called 'run'")
+    assert_refused(capsys, ["evaluate", run, str(tmp_path / "none.json")], "none.json: cannot be read")
+    assert_refused(capsys, ["evaluate", "--compare", run, "--seed", "-1"], "--seed -1 is not allowed")
+    assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label beside several methods")
     (tmp_path / "m.json").write_text("{}")
-    assert_refused(capsys, ["compare", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")
+    assert_refused(capsys, ["evaluate", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")

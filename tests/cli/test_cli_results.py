@@ -16,6 +16,8 @@ from endotsr.report.pictures import depth_bytes, depth_step
 from endotsr.report.run_text import held_out_table
 from endotsr.runs.files import os_error_line, write_json
 
+CALIBRATE = ("train", "--calibrate-only", "--out")
+
 
 def render(run, out, *words):
     assert main(["render", str(run), "--out", str(out), *words]) == 0
@@ -111,7 +113,7 @@ def test_table_writes_a_dash_for_no_value():
     assert "without a finite value there: covered" in table
 
 
-@pytest.mark.parametrize("command", ["evaluate", "render", "calibrate"])
+@pytest.mark.parametrize("command", ["evaluate", "render"])
 def test_threads_below_zero_are_refused(command, finished_run, tmp_path, capsys):
     more = ["--out", str(tmp_path / "out")] if command == "render" else []
     words = [command, str(finished_run), *more, "--threads", "-1"]
@@ -124,7 +126,7 @@ def test_files_are_refused_before_the_work(name, finished_run, tmp_path, capsys)
     (tmp_path / "file").touch()
     file = str(tmp_path / name)
     for words in (
-        ["calibrate", str(finished_run), "--json", file],
+        [*CALIBRATE, str(finished_run), "--json", file],
         ["gradcheck", "--json", file],
         ["golden", "judge", str(tmp_path), "--level", "0", "--json", file],
         ["golden", "judge", str(tmp_path), "--level", "0", "--html", file],
@@ -149,7 +151,16 @@ def test_more_threads_than_cores_are_all_cores():
 
 def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_path, capsys):
     before = {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
-    words = ["calibrate", str(finished_run), "--json", str(tmp_path / "found.json"), "--loss.ssim-weight", "0.2"]
+    words = [
+        "train",
+        "--calibrate-only",
+        "--out",
+        str(finished_run),
+        "--json",
+        str(tmp_path / "found.json"),
+        "--loss.ssim-weight",
+        "0.2",
+    ]
     assert main(words) == 0
     said = capsys.readouterr().out
     found = json.loads((tmp_path / "found.json").read_text())
@@ -172,7 +183,12 @@ def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_p
     ],
 )
 def test_calibrate_refuses_settings_that_it_would_not_use(words, named, finished_run, capsys):
-    assert_refused(capsys, ["calibrate", str(finished_run), *words], f"calibrate: {named}: fixed by the run", "allowed")
+    assert_refused(
+        capsys,
+        [*CALIBRATE, str(finished_run), *words],
+        f"--calibrate-only: {named}: fixed by the run",
+        "allowed",
+    )
 
 
 @pytest.mark.parametrize(
@@ -185,10 +201,18 @@ def test_calibrate_refuses_settings_that_it_would_not_use(words, named, finished
     ],
 )
 def test_every_setting_that_calibrate_takes_changes_the_answer(words, finished_run, tmp_path):
-    main(["calibrate", str(finished_run), "--json", str(tmp_path / "as_it_is.json")])
-    assert main(["calibrate", str(finished_run), *words, "--json", str(tmp_path / "replaced.json")]) == 0
+    main([*CALIBRATE, str(finished_run), "--json", str(tmp_path / "as_it_is.json")])
+    assert main([*CALIBRATE, str(finished_run), *words, "--json", str(tmp_path / "replaced.json")]) == 0
     before, after = (json.loads((tmp_path / name).read_text()) for name in ("as_it_is.json", "replaced.json"))
     assert before["lambda_lap"] != after["lambda_lap"]
+
+
+@pytest.mark.parametrize("words", [["--iterations", "40"], ["--resume"], ["--config", "mine.toml"]])
+def test_calibrate_refuses_options_of_a_training(words, finished_run, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").touch()
+    said = f"{words[0]} beside --calibrate-only is not allowed"
+    assert_refused(capsys, [*CALIBRATE, str(finished_run), *words], said)
 
 
 def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeypatch):
@@ -199,7 +223,7 @@ def test_calibration_without_an_answer_is_one_line(finished_run, capsys, monkeyp
         raise CalibrationError("calibration: none of the 2 views is valid\nview a\nview b")
 
     monkeypatch.setattr(objective, "calibrate_on", no_answer)
-    assert main(["calibrate", str(finished_run)]) == 2
+    assert main([*CALIBRATE, str(finished_run)]) == 2
     said = capsys.readouterr()
     assert said.err == "endotsr: error: calibration: none of the 2 views is valid\n"
     assert "view a\nview b" in said.out

@@ -171,7 +171,11 @@ def damaged_copy(run, out, name, text):
 )
 def test_run_json_without_its_keys_is_one_line(text, said, finished_run, tmp_path, capsys):
     run = damaged_copy(finished_run, tmp_path / "run", "run.json", text)
-    for words in (["evaluate", str(run)], ["calibrate", str(run)], ["train", "--out", str(run), "--resume"]):
+    for words in (
+        ["evaluate", str(run)],
+        ["train", "--calibrate-only", "--out", str(run)],
+        ["train", "--out", str(run), "--resume"],
+    ):
         assert_refused(capsys, words, f"{run / 'run.json'}: ", said)
 
 

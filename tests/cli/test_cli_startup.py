@@ -5,9 +5,10 @@ import sys
 import time
 
 import pytest
+from tiny import assert_refused
 
 from endotsr import __version__
-from endotsr.cli.main import COMMANDS, main
+from endotsr.cli.main import COMMANDS, FORMER, main
 
 HEAVY = ("numpy", "numba", "cv2", "scipy", "matplotlib", "skimage", "tyro")
 
@@ -45,3 +46,24 @@ def test_unknown_command(capsys):
     assert main(["tarin"]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "'tarin'" in said and "train" in said
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_a_command_that_has_moved_names_its_new_place(former, capsys):
+    assert_refused(capsys, [former, "run", "--out", "x"], f"the command {former!r} has moved: `{FORMER[former]}`")
+    words = FORMER[former].split()[1:]
+    assert words[0] in COMMANDS or words[0] == "--completion"
+
+
+@pytest.mark.parametrize("typed, meant", [("trian", "train"), ("evalute", "evaluate"), ("exprot", "export")])
+def test_an_unknown_command_is_answered_with_the_similar_one(typed, meant, capsys):
+    assert_refused(capsys, [typed], f"unknown command {typed!r}; did you mean {meant}? allowed: demo, prepare")
+
+
+def test_an_unknown_command_like_no_other_lists_them_all(capsys):
+    assert_refused(capsys, ["xyz"], "unknown command 'xyz'; allowed: demo, prepare")
+
+
+def test_a_positional_argument_with_a_dot_is_no_section(capsys):
+    assert main(["sweep", "--help"]) == 0
+    assert "SPEC:" not in capsys.readouterr().out

@@ -119,7 +119,11 @@ def test_a_checkpoint_of_another_sequence_is_refused(run, tmp_path, capsys):
         words = [word if word != "9" else "10" for word in train_words(other, "--no-evaluate")]
         assert main(words) == 0
     shutil.copy(other / "checkpoint.npz", run)
-    for words in (["train", "--out", str(run), *RESUME], ["evaluate", str(run)], ["calibrate", str(run)]):
+    for words in (
+        ["train", "--out", str(run), *RESUME],
+        ["evaluate", str(run)],
+        ["train", "--calibrate-only", "--out", str(run)],
+    ):
         assert_refused(capsys, words, "checkpoint.npz: trained on another sequence")
 
 

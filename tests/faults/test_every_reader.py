@@ -35,7 +35,7 @@ READERS = {
     "run/config.toml": ["render", "{run}", "--out", "{out}"],
     "run/run.json": ["evaluate", "{run}"],
     "run/sequence.json": ["render", "{run}", "--out", "{out}"],
-    "run/checkpoint.npz": ["calibrate", "{run}"],
+    "run/checkpoint.npz": ["train", "--calibrate-only", "--out", "{run}"],
 }
 
 SAME_READER = ("masks/000000.png", "depth/000008.png")  # as that of images/

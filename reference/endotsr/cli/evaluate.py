@@ -1,4 +1,4 @@
-"""`endotsr evaluate`: the held-out metrics of a run, or of any folder of pictures, beside baselines."""
+"""`endotsr evaluate`: the held-out metrics of a run or of any pictures beside baselines, and of several methods."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,19 +24,23 @@ if TYPE_CHECKING:
 class EvaluateOptions:
     """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
 
+    Several METHODs are compared on the same held-out frames: means, and differences to the first one frame by frame.
+    Each is a run folder that was evaluated, a JSON file of --json, or a folder of pictures; NAME=PATH gives it another
+    name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
+
     With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
-    of RUN or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display units),
-    paired by the names of the frames, by their numbers, or in order. The run, if one is named, is not changed.
+    of the run or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display
+    units), paired by the names of the frames, by their numbers, or in order. The run, if one is named, is not changed.
     """
 
-    run: Annotated[Path | None, Option("RUN", positional=True)] = None
-    """run folder; with --pictures it may be left out"""
+    methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
+    """run folder, or several methods to compare; with --pictures it may be left out"""
     pictures: Annotated[Path | None, Option("FOLDER")] = None
     """measure the pictures of this folder, not the run"""
     label: Annotated[str, Option("TEXT")] = ""
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """sequence folder, or `simulated`; with RUN: its current location (default: the recorded one)"""
+    """sequence folder, or `simulated`; of a run: its current location (default: the recorded one)"""
     json: JsonFile = None
     """also write the metrics as JSON"""
     csv: Annotated[Path | None, Option("FILE")] = None
@@ -49,9 +53,20 @@ class EvaluateOptions:
     """also show the published figures of this clip"""
     view: bool = True
     """write the viewer page that the report links to, view.html"""
+    compare: bool = False
+    """compare a single METHOD with its baselines as several are compared"""
+    baselines: bool = True
+    """compare the baselines of the first METHOD too"""
+    seed: int = 0
+    """seed of the resampling of a comparison"""
     threads: int = 0
     """threads, 0 = all cores"""
     settings: Annotated[ShownSettings, Option(flat=True)] = SHOWN
+
+    @property
+    def run(self) -> Path | None:
+        """The one run folder."""
+        return Path(self.methods[0]) if self.methods else None
 
 
 def run(words: list[str]) -> int:
@@ -63,6 +78,8 @@ def run(words: list[str]) -> int:
     options = parse(EvaluateOptions, words, "evaluate")
     refuse_unwritable(options.json, options.csv)
     use_threads(options.threads)
+    if len(options.methods) > 1 or options.compare:
+        return _compare(options)
     if options.pictures and options.measures:
         raise InputError("evaluate: --measures beside --pictures is not allowed: they render views of a run")
     published = (PUBLISHED[options.paper_row],) if options.paper_row else ()
@@ -72,6 +89,25 @@ def run(words: list[str]) -> int:
     if options.csv:
         text = frames_csv(metrics, metrics.get("label", "this model"))
         replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return 0
+
+
+def _compare(options: EvaluateOptions) -> int:
+    """The table of several methods."""
+    from endotsr.cli.parts.comparison import Comparison, compare_methods
+
+    if not options.methods:
+        raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
+    for name in ("pictures", "label", "measures", "paper_row"):
+        if getattr(options, name):
+            option = name.replace("_", "-")
+            raise InputError(f"evaluate: --{option} beside several methods is not allowed; allowed: evaluate one first")
+    compare_methods(
+        Comparison(
+            options.methods, options.baselines, options.seed, options.sequence, options.settings, options.lpips,
+            options.json, options.csv,
+        )
+    )  # fmt: skip
     return 0
 
 

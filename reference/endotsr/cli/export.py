@@ -1,4 +1,4 @@
-"""`endotsr export`: a trained scene as .ply files, a point cloud, or one small file."""
+"""`endotsr export`: a trained scene as .ply files, a point cloud, one small file, or a page that plays it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,21 +7,25 @@ from typing import Annotated, Literal
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
+from endotsr.errors import InputError
 
 
 @dataclass
 class ExportOptions:
-    """Write a scene for other programs, or as a slim model that `render`, `view` and `export` read.
+    """Write a scene for other programs, as a page that plays it, or as a slim model that `render` and `export` read.
 
     SCENE is a run folder, a slim model, or a 3DGS .ply file. The ending of --out chooses what is written: `.npz` is a
-    slim model of the whole scene, `.ply` is one time of it, and a name without an ending is a folder with one .ply
-    file for every time.
+    slim model of the whole scene, `.html` is a page with the moving scene, `.ply` is one time of it, and a name without
+    an ending is a folder with one .ply file for every time.
+
+    The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
+    kept at key times, between which the page interpolates; the colours are those that the observed camera sees.
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
     """run folder, slim model (.npz) or 3DGS file (.ply)"""
     out: Annotated[Path, Option("FILE|DIR")]
-    """FILE.ply, FILE.npz, or a folder to create"""
+    """FILE.ply, FILE.npz, PAGE.html, or a folder to create"""
     content: Literal["gaussians", "points", "mesh"] = "gaussians"
     """content of a .ply file: Gaussians as 3DGS viewers read them, centres with colours, or the visible surface"""
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
@@ -36,6 +40,14 @@ class ExportOptions:
     """side of a voxel of a mesh, in scene units (default: 1.5 pixels at the median depth)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
     """components to leave out"""
+    keys: Annotated[int | None, Option("N")] = None
+    """of a page: largest number of key times, default 32; more are smoother and make the page larger"""
+    title: str = ""
+    """of a page: its heading (default: the name of the scene)"""
+    held_out: bool = True
+    """of a page: show the held-out frames and the error, if the sequence of the run is found"""
+    sequence: Annotated[str | None, Option("SEQUENCE")] = None
+    """of a page: current location of the sequence of the run (default: the recorded one)"""
     json: JsonFile = None
     """also write what was written as JSON"""
     threads: int = 0
@@ -44,7 +56,7 @@ class ExportOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.export.files import Content, export
+    from endotsr.export.files import GAUSSIANS, Content, export
     from endotsr.export.scene import open_scene
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
@@ -55,9 +67,35 @@ def run(words: list[str]) -> int:
     use_threads(options.threads)
     times = Times(options.times, options.frames, options.count)
     content = Content(options.content, options.opacity, options.without, options.voxel)
+    if options.out.suffix.lower() in (".html", ".htm"):
+        if times.chosen or content != GAUSSIANS:
+            raise InputError(f"{options.out}: a page holds every time and the whole scene; allowed: --out alone")
+        _write_page(options)
+        return 0
+    for name, given in (("keys", options.keys), ("title", options.title), ("sequence", options.sequence)):
+        if given:
+            raise InputError(f"export: --{name} belongs to a page; allowed: with --out PAGE.html")
     said = export(open_scene(options.scene), options.out, times, content)
     print(said)
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]
     sizes = {file.name: file.stat().st_size for file in files}
     write_result(options.json, out=options.out, content=options.content, bytes=sizes, said=said)
     return 0
+
+
+def _write_page(options: ExportOptions) -> None:
+    """The page with the moving scene."""
+    from endotsr.export.scene import open_scene
+    from endotsr.runs.files import refuse_unwritable
+    from endotsr.runs.sources import load_run_sequence
+    from endotsr.views.page import KEYS, check_page, write_page
+
+    keys = KEYS if options.keys is None else options.keys
+    check_page(options.out, keys)
+    refuse_unwritable(options.out)
+    scene = open_scene(options.scene)
+    wanted = options.held_out and scene.folder is not None
+    sequence = load_run_sequence(scene.folder, options.sequence) if wanted and scene.folder else None
+    size = write_page(options.out, scene, options.title or options.scene.absolute().name, keys, sequence)
+    print(f"{options.out}: {size / 1e6:.1f} MB, open it in a browser")
+    write_result(options.json, page=options.out, bytes=size, held_out=sequence is not None)

@@ -25,19 +25,22 @@ COMMANDS = {
     "train": "train on a sequence folder, or on a simulated sequence",
     "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",
     "inspect": "test a clip for motion, light, instruments and more, and plan the components that it calls for",
-    "calibrate": "compute the Laplacian weight of equation (7) on the checkpoint of a run",
     "render": "render pictures and films at any time in [0, 1], from any camera",
-    "view": "write a page with the moving scene, which opens in any browser without a network",
-    "export": "write .ply files, a point cloud, or a slim model",
-    "evaluate": "measure held-out frames of a run, or any pictures, beside baselines, with renders and a report",
-    "compare": "compare runs and folders of pictures frame by frame, with intervals",
+    "export": "write .ply files, a point cloud, a slim model, or a page that plays the moving scene in any browser",
+    "evaluate": "measure held-out frames of a run or any pictures beside baselines, and compare methods frame by frame",
     "sweep": "make many runs from one file, on this machine or on a cluster, with a table of their results",
     "ablate": "test the paper's claims: components on and off, over seeds, with paired differences",
     "gradcheck": "check every reverse pass against finite differences",
     "bench": "measure the time of each stage of an iteration and its lower limit",
     "tradeoff": "measure error against time, and find the best setting within a budget",
-    "completion": "print a script that completes commands and options in bash, zsh or fish",
     "golden": "golden vectors for ports: judge outputs, run a port, answer as the reference",
+}
+
+FORMER = {  # commands of earlier versions, and what does their work
+    "calibrate": "endotsr train --out RUN --calibrate-only",
+    "compare": "endotsr evaluate METHOD METHOD ...",
+    "completion": "endotsr --completion bash|zsh|fish",
+    "view": "endotsr export SCENE --out PAGE.html",
 }
 
 OTHER_PROGRAMS = "end other programs that hold memory"
@@ -69,6 +72,8 @@ def _main(words: list[str]) -> int:
     if words[0] == "--version":
         print(f"endotsr {__version__}")
         return 0
+    if words[0].partition("=")[0] == "--completion":
+        return _completion(words)
     try:
         with signals_stop():
             return _command(words[0])(words[1:])
@@ -98,9 +103,25 @@ def _main(words: list[str]) -> int:
 
 
 def _command(name: str):
+    if name in FORMER:
+        raise InputError(f"the command {name!r} has moved: `{FORMER[name]}`")
     if name not in COMMANDS:
-        raise InputError(f"unknown command {name!r}; allowed: {', '.join(COMMANDS)}")
+        import difflib
+
+        meant = "".join(f"did you mean {word}? " for word in difflib.get_close_matches(name, COMMANDS, n=1))
+        raise InputError(f"unknown command {name!r}; {meant}allowed: {', '.join(COMMANDS)}")
     return importlib.import_module(f"endotsr.cli.{name}").run
+
+
+def _completion(words: list[str]) -> int:
+    """Print the script that completes commands and options in a shell."""
+    from endotsr.cli.parts.completion import SCRIPTS
+
+    shell = "".join([words[0].partition("=")[2], *words[1:]])
+    if shell not in SCRIPTS:
+        raise InputError(f"--completion {shell!r} is not allowed; allowed: {', '.join(SCRIPTS)}")
+    print(SCRIPTS[shell](), end="")
+    return 0
 
 
 def _fail(message: str) -> int:
@@ -122,6 +143,7 @@ def _overview() -> str:
             "options:",
             "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
             "  --version    the version",
+            "  --completion {bash,zsh,fish}   a script that completes commands and options in this shell",
             "  -q, --quiet; --log-file FILE   print nothing but errors; also write what is printed (any command)",
         ]
     )

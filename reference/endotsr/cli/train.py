@@ -34,6 +34,10 @@ class TrainOptions:
 
     Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
     from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
+
+    `--calibrate-only` leaves the run in --out as it is and computes the Laplacian weight of equation (7) on its
+    checkpoint. The settings that equation (7) reads can be replaced: --loss.ssim-weight, --loss.upsampling,
+    --loss.gradient-ratio, --loss.calibration-views and the settings of --raster.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
@@ -60,12 +64,14 @@ class TrainOptions:
     """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
     resume: bool = False
     """continue the run in --out"""
+    calibrate_only: bool = False
+    """train nothing: print the Laplacian weight of equation (7) on the run in --out, with a table of its views"""
     evaluate: bool = True
     """measure, render and report when training is done"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights for the evaluation"""
     json: JsonFile = None
-    """also write the metrics of the evaluation as JSON"""
+    """also write the metrics of the evaluation, or the calibration, as JSON"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
     simulator: SimulatorSettings = DEMONSTRATION
     """contents of the `simulated` sequence"""
@@ -77,6 +83,8 @@ def run(words: list[str]) -> int:
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
         raise InputError("train: --out RUN is missing: the run folder to create")
+    if options.calibrate_only:
+        return _calibrate(options, words)
     if options.json and not options.evaluate:
         raise InputError("train: --json holds the metrics, which --no-evaluate leaves out; allowed: one of them")
     refuse_unwritable(options.json)
@@ -91,6 +99,21 @@ def run(words: list[str]) -> int:
 
         found = evaluate_run(folder, sequence, lpips=options.lpips, source=options.sequence or None)
         write_result(options.json, **found)
+    return 0
+
+
+def _calibrate(options: TrainOptions, words: list[str]) -> int:
+    """Equation (7) on the run in --out, with its settings where the words name no other."""
+    from endotsr.cli.parts.calibration import calibrate_run
+
+    assert options.out is not None
+    for name in ("config", "iterations", "resume"):
+        if getattr(options, name):
+            raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
+    folder = open_run(options.out)
+    config = _settings(parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())))
+    refuse_unwritable(options.json)
+    calibrate_run(folder, config, options.sequence or None, options.json)
     return 0
 
 

@@ -36,7 +36,7 @@ def check_page(file: Path, keys: int) -> None:
     if file.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{file}: not a page; allowed: a name that ends in .html")
     if not 2 <= keys <= MOST_KEYS:
-        raise InputError(f"view: --keys {keys} is not allowed; allowed: an integer from 2 to {MOST_KEYS}")
+        raise InputError(f"export: --keys {keys} is not allowed; allowed: an integer from 2 to {MOST_KEYS}")
 
 
 def write_page(file: Path, scene: MovingScene, title: str, keys: int, sequence: Sequence | None = None) -> int:

@@ -1,7 +1,12 @@
 """Scripts that complete commands and options in a shell, made from the options of every command.
 
 In: nothing. Out: the text of a script. The words are those of this version: the script is printed again after an
-update. Where an option takes a file, or where nothing is known, the shell completes file names.
+update. Where an option takes a file, or where nothing is known, the shell completes file names. Where a shell looks for
+the script of `endotsr --completion SHELL`:
+
+    bash   ~/.local/share/bash-completion/completions/endotsr
+    zsh    a folder of $fpath, as _endotsr
+    fish   ~/.config/fish/completions/endotsr.fish
 """
 
 import importlib
@@ -20,7 +25,6 @@ FIRST_WORDS = {
     "train": ("simulated",),
     "inspect": ("simulated",),
     "simulate": tuple(SCENES),
-    "completion": ("bash", "zsh", "fish"),
 }
 
 
@@ -42,7 +46,7 @@ def bash() -> str:
 _endotsr() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" words
     if [ "$COMP_CWORD" -eq 1 ]; then
-        COMPREPLY=($(compgen -W "{" ".join(COMMANDS)} --help --version" -- "$word"))
+        COMPREPLY=($(compgen -W "{" ".join(COMMANDS)} --help --version --completion" -- "$word"))
         return
     fi
     case "${{COMP_WORDS[1]}}" in

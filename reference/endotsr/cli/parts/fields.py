@@ -47,6 +47,11 @@ class Field:
     may_be_empty: bool = False
 
     @property
+    def in_section(self) -> bool:
+        """Whether it is a setting of a section, named with it: `--model.bases`."""
+        return not self.positional and "." in self.name
+
+    @property
     def switch(self) -> bool:
         """Whether the option is true or false and takes no value."""
         return self.kind is bool

@@ -42,10 +42,10 @@ def terminal_width() -> int:
 
 def short_fields(fields: list[Field]) -> list[Field]:
     """The options that people set: all of a command with few settings, else those outside of sections and OFTEN_SET."""
-    settings = [field for field in fields if "." in field.name]
+    settings = [field for field in fields if field.in_section]
     if len(settings) <= FEW_SETTINGS:
         return fields
-    return [field for field in fields if "." not in field.name or field.key in OFTEN_SET]
+    return [field for field in fields if not field.in_section or field.key in OFTEN_SET]
 
 
 def help_page(options: type, fields: list[Field], command: str, width: int, hidden: int = 0) -> str:
@@ -71,10 +71,10 @@ def help_page(options: type, fields: list[Field], command: str, width: int, hidd
 def _groups(fields: list[Field], width: int) -> list[tuple[str, list[Field]]]:
     """Title and members: positional arguments, options outside of sections, then one group for each section."""
     arguments = [field for field in fields if field.positional]
-    options = [field for field in fields if not field.positional and "." not in field.name]
+    options = [field for field in fields if not field.positional and not field.in_section]
     groups = [("arguments:", arguments)] if arguments else []
     groups.append((OPTIONS, options))
-    inside = [field for field in fields if "." in field.name]
+    inside = [field for field in fields if field.in_section]
     for (name, section), members in groupby(inside, key=lambda field: (field.key.rpartition(".")[0], field.section)):
         about = (inspect.getdoc(section) or "").split("\n\n")[0]
         title = textwrap.fill(f"{name}: {' '.join(about.split())}", width, subsequent_indent=" " * GAP)

@@ -1,0 +1,56 @@
+"""`endotsr train --calibrate-only`: equation (7) on the checkpoint of a run, which is not changed."""
+
+from pathlib import Path
+
+from endotsr.cli.parts.options import differences
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.runs.files import write_json
+from endotsr.runs.folder import RunFolder
+
+# Settings that equation (7) reads; no other setting would change the result.
+REPLACEABLE = (
+    "loss.ssim_weight",
+    "loss.upsampling",
+    "loss.gradient_ratio",
+    "loss.calibration_views",
+    "raster",
+    "training.threads",
+)
+
+
+def calibrate_run(folder: RunFolder, config: Config, source: str | None, json: Path | None) -> None:
+    """Print the table of the calibration views and the weight, and write both to `json` if it is named.
+
+    config   settings of the run with those replaced that equation (7) reads
+    source   current location of the sequence; None = the recorded one
+
+    Raises:  InputError for a replaced setting that the run has fixed; CalibrationError if no view gives a ratio.
+    """
+    from endotsr.fitting.objective import calibrate_on
+    from endotsr.kernels.threads import use_threads
+    from endotsr.runs.model import load_model
+    from endotsr.runs.sources import load_run_sequence
+
+    replaced = differences(config, folder.config(), "run")
+    _refuse_fixed(replaced, folder.path)
+    model = load_model(folder)
+    use_threads(config.training.threads)
+    sequence = load_run_sequence(folder, source)
+    found = calibrate_on(model.gaussians, model.spectral, sequence, config, model.frames)
+    for line in replaced:
+        print(f"setting replaced: {line}")
+    print(f"equation (7) at iteration {model.iteration}, r = {config.loss.gradient_ratio:g}")
+    print(found.table)
+    print(f"lambda_lap = {found.lambda_lap:.6g} ({len(found.ratios)} views)")
+    if json:
+        write_json(json, {"iteration": model.iteration, **found._asdict()})
+
+
+def _refuse_fixed(replaced: list[str], run_path: Path) -> None:
+    """Raises InputError for settings that the trained run has fixed: they would be named and then not used."""
+    fixed = [line for line in replaced if not line.split(" = ")[0].startswith(REPLACEABLE)]
+    if fixed:
+        raise InputError(
+            f"--calibrate-only: {', '.join(fixed)}: fixed by the run {run_path}; allowed: {', '.join(REPLACEABLE)}"
+        )

@@ -1,0 +1,78 @@
+"""`endotsr evaluate` with several methods: runs and folders of pictures in one table, with paired differences."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from endotsr.cli.parts.shown import ShownSettings, shown_sequence
+from endotsr.errors import InputError
+from endotsr.runs.files import read_json, replace_file, write_json
+
+if TYPE_CHECKING:
+    from endotsr.sequences.sequence import Sequence
+
+
+class Comparison(NamedTuple):
+    """What is compared, and where the table goes."""
+
+    methods: tuple[str, ...]  # run folders, JSON files and folders of pictures, each PATH or NAME=PATH
+    baselines: bool  # of the first method
+    seed: int  # of the resampling
+    sequence: str | None  # that folders of pictures show; None = that of the first run
+    settings: ShownSettings  # of that sequence
+    lpips: Path | None
+    json: Path | None
+    csv: Path | None
+
+
+def compare_methods(asked: Comparison) -> None:
+    """Print the means of every method and their differences to the first one frame by frame, with intervals."""
+    from endotsr.evaluation.compare import compare, methods_of
+    from endotsr.report.comparison_text import METRICS, comparison_table
+    from endotsr.report.spreadsheet import comparison_csv
+
+    if asked.seed < 0:
+        raise InputError(f"evaluate: --seed {asked.seed} is not allowed; allowed: an integer >= 0")
+    named = [_named(word) for word in asked.methods]
+    methods, sequence = [], None
+    for label, path in named:
+        metrics, sequence = _metrics(label, path, asked, [p for _, p in named], sequence)
+        methods += methods_of(metrics, label, path, baselines=asked.baselines and not methods)
+    methods[1:] = sorted(methods[1:], key=lambda method: method.label not in dict(named))  # baselines at the end
+    rows = compare(methods, tuple(METRICS), asked.seed)
+    print(comparison_table(rows))
+    if asked.json:
+        write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
+    if asked.csv:
+        text = comparison_csv(rows)
+        replace_file(asked.csv, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _named(word: str) -> tuple[str, Path]:
+    """Label and path of an argument: NAME=PATH, or the name of the file or folder."""
+    name, equals, path = word.partition("=")
+    if equals and not Path(word).exists():
+        return name, Path(path)
+    return Path(word).absolute().name, Path(word)
+
+
+def _metrics(
+    label: str, path: Path, asked: Comparison, paths: list[Path], sequence: "Sequence | None"
+) -> tuple[dict[str, Any], "Sequence | None"]:
+    """The metrics of one argument, and the sequence if it had to be read."""
+    if (path / "run.json").exists():
+        if not (path / "metrics.json").exists():
+            raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
+        return read_json(path / "metrics.json"), sequence
+    if not path.is_dir():
+        return read_json(path), sequence
+    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.evaluation.pictures import find_pictures, measure_pictures
+
+    if sequence is None:
+        run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
+        sequence = shown_sequence("evaluate", run, asked.sequence, asked.settings)
+    return measure_pictures(find_pictures(path, sequence), sequence, label, load_lpips_weights(asked.lpips)), sequence
+
+
+def _as_dict(row: Any) -> dict[str, Any]:
+    return row._asdict() | {"difference": row.difference and row.difference._asdict()}
