@@ -127,8 +127,9 @@ def test_no_pickle_through_numpy():
                 assert isinstance(node.value, ast.Constant) and node.value.value is False, f"{file}:{node.value.lineno}"
 
 
-def test_opencv_is_imported_in_one_file():
-    assert [f.relative_to(PACKAGE).as_posix() for f in SOURCES if "cv2" in imported(f)] == ["opencv/library.py"]
+@pytest.mark.parametrize(("library", "file"), [("cv2", "opencv/library.py"), ("av", "sequences/video_file.py")])
+def test_a_decoder_is_imported_in_one_file(library, file):
+    assert [f.relative_to(PACKAGE).as_posix() for f in SOURCES if library in imported(f)] == [file]
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ def video_seeds() -> list[bytes]:
 
 def read_video(path: Path) -> object:
     """As `prepare` does, of at most three pictures."""
-    from endotsr.opencv.video import video_facts, video_pictures
+    from endotsr.sequences.video_file import video_facts, video_pictures
 
     return list(video_pictures(path, list(range(min(video_facts(path).count, 3)))))
 

@@ -111,6 +111,10 @@ WRONG = {
     "duplicated frame": (lambda p: copied(p, 3, 4), "duplicated-frame", "warning", 4),
     "black frame": (lambda p: each(p, "images", lambda x: x * 0, [3]), "black-frame", "warning", 3),
     "white frame": (lambda p: each(p, "images", lambda x: x * 0 + 255, [3]), "white-frame", "warning", 3),
+    "black clip": (lambda p: each(p, "images", lambda x: x * 0), "no-picture", "refusal", 0),
+    "mostly white": (lambda p: each(p, "images", lambda x: x * 0 + 255, range(2, 8)), "no-picture", "refusal", 2),
+    "one colour": (lambda p: each(p, "images", lambda x: x * 0 + np.uint8(90)), "no-picture", "refusal", 0),
+    "frozen": (lambda p: [copied(p, 0, i) for i in range(1, FRAMES)], "constant-clip", "refusal", 0),
     "overexposed": (lambda p: each(p, "images", half_white, [3]), "clipped-frame", "warning", 3),
     "exposure jump": (lambda p: each(p, "images", exposure, range(4, FRAMES)), "exposure-jump", "warning", 4),
     "metres cut to 8 bits": (lambda p: each(p, "depth", metres), "metres-cut", "refusal", None),
@@ -213,10 +217,10 @@ def test_train_and_check_judge_alike(case, sequence, tmp_path):
 
 def test_many_findings_of_one_kind_are_counted(sequence, tmp_path):
     write_endonerf(sequence, tmp_path / "clip")
-    each(tmp_path / "clip", "images", lambda x: x * 0, range(7))
+    each(tmp_path / "clip", "images", half_white, range(7))
     notes = read_sequence(tmp_path / "clip", PAPER.sequence, 0.2).notes
-    black = [note for note in notes if "black-frame" in note]
-    assert len(black) == MOST and black[-1].endswith("(2 more of this kind)")
+    clipped = [note for note in notes if "clipped-frame" in note]
+    assert len(clipped) == MOST and clipped[-1].endswith("(2 more of this kind)")
 
 
 def test_a_right_sequence_has_no_finding(sequence, tmp_path):

@@ -67,12 +67,15 @@ def test_masks_may_be_left_out(tmp_path):
 def test_jpeg_pictures(tmp_path):
     written(tmp_path)
     before = read_common(tmp_path, WHOLE, 0.2).images.astype(int)
-    for file in sorted((tmp_path / "images").iterdir()):
-        smooth = np.full((HEIGHT, WIDTH, 3), (180, 70, 60), np.uint8)
+    smooth = np.full((HEIGHT, WIDTH, 3), (180, 70, 60), np.uint8)
+    for i, file in enumerate(sorted((tmp_path / "images").iterdir())):
+        smooth[..., 0] = 180 - 2 * i + np.arange(WIDTH)  # a frame of one colour shows nothing
         write_jpeg(file.with_suffix(".jpg"), smooth)
         file.unlink()
     after = read_common(tmp_path, SequenceConfig(masks="none"), 0.2).images.astype(int)
-    assert after.shape == before.shape and np.abs(after - [[[180]], [[70]], [[60]]]).max() <= 2
+    expected = np.broadcast_to(smooth.transpose(2, 0, 1), after.shape).copy()
+    expected[:, 0] += 2 * (len(after) - 1 - np.arange(len(after), dtype=np.uint8))[:, None, None]
+    assert after.shape == before.shape and np.abs(after - expected).max() <= 3
 
 
 @pytest.mark.parametrize("ending", [".npy", ".tiff", ".pfm"])

@@ -9,7 +9,7 @@ import pytest
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, canny_edges, dense_flow, read_png, warp_bilinear, write_png
 from endotsr.opencv.pictures import read_picture
-from endotsr.opencv.video import video_facts
+from endotsr.sequences.video_file import video_facts
 
 RNG = np.random.default_rng(1)
 

@@ -65,6 +65,8 @@ class PrepareOptions:
     """frames a second to keep"""
     source_rate: float | None = None
     """frames a second of the source, where its files do not say"""
+    orientation: Literal["turned", "stored"] | None = None
+    """of a video that states a rotation: pictures (and intrinsics, masks, depth) as players turn them, or as stored"""
     scale: float = 1.0
     """image scale, area-averaged; the intrinsics follow"""
     gaps: Literal["refuse", "drop", "fill"] = "refuse"
@@ -120,7 +122,7 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
 
     same = (
         "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
-        "excluded_value", "depth", "depth_unit", "depth_scale",
+        "excluded_value", "depth", "depth_unit", "depth_scale", "orientation",
     )  # fmt: skip
     return SourceOptions(
         **{name: getattr(options, name) for name in same},

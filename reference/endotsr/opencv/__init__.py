@@ -1,4 +1,4 @@
-"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; `video`, `stereo`, `pictures`.
+"""The only room that calls OpenCV: PNG files, Canny edges, flow, resizing; films, `stereo`, `pictures`.
 
 Inputs and outputs are NumPy arrays in this project's conventions (RGB order, planar flow). OpenCV's own conventions
 (BGR, interleaved flow, one-dimensional arrays that differ between versions 4 and 5) stay inside this room. `library`

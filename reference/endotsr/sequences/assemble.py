@@ -21,7 +21,7 @@ from endotsr.sequences.files import shortened
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, sparse_step
 from endotsr.sequences.sequence import Sequence
-from endotsr.sequences.splits import split_frames, time_stamps
+from endotsr.sequences.splits import frame_times, split_frames
 from endotsr.sequences.world import fitting_world, moved_cameras, world_note
 from endotsr.splatting.camera import Camera, camera_centre, scale_camera
 
@@ -55,6 +55,7 @@ class Frames(NamedTuple):
     unit: str
     mask_source: MaskSource | None  # None: there are no masks
     arbitrary: bool = False  # the unit is unknown: the scale of the world is free
+    seconds: NDArray[np.float64] | None = None  # (n,) of the frames, ascending; None: evenly spaced
 
 
 def assemble(frames: Frames, config: SequenceConfig, near: float, folder: Path, notes: list[str]) -> Sequence:
@@ -94,7 +95,7 @@ def assemble(frames: Frames, config: SequenceConfig, near: float, folder: Path, 
         images=images,
         masks=masks,
         depth=depth,
-        times=time_stamps(len(images)),
+        times=frame_times(frames.seconds, len(images)),
         cameras=cameras,
         names=[file.stem for file in frames.image_files],
         unit=frames.unit,
@@ -110,7 +111,7 @@ def _guarded(frames: Frames, near: float) -> list[str]:
     pictures, depth = frames.facts
     facts = pictures, with_coverage(depth, frames.depth, frames.masks)
     where = frames.depth_files[0].parent
-    return guarded(frames.image_files, facts, frames.cameras, where, frames.arbitrary, near)
+    return guarded(frames.image_files, facts, frames.cameras, where, frames.arbitrary, near, frames.seconds)
 
 
 def check_percentiles(config: SequenceConfig) -> None:

@@ -98,7 +98,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     Raises:  InputError naming the file, the frame or the key.
     """
     check_percentiles(config)
-    contents, _ = select_contents(folder, config)
+    contents, frames_read = select_contents(folder, config)
     notes = [f"source: {contents.file.source}"] if contents.file.source else []
     if contents.file.masks and contents.file.masks.proposed and contents.masks:
         notes.append("masks: proposed by a program, checked by nobody")
@@ -107,6 +107,8 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     excluded = contents.file.masks.excluded_value if contents.file.masks else "white"
     names = [str(file) for file in contents.masks]
     unit = "arbitrary unit" if contents.file.arbitrary else "mm"
+    times = contents.file.times
+    seconds = None if times is None else np.array([times[i] for i in frames_read], np.float64)
     frames = Frames(
         images=read.images,
         masks=read.masks,
@@ -120,6 +122,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         unit=unit,
         mask_source=MaskSource(str(contents.masks[0].parent), names, excluded) if names else None,
         arbitrary=contents.file.arbitrary,
+        seconds=seconds,
     )
     return assemble(frames, config, near, Path(folder), notes)
 
@@ -211,5 +214,6 @@ def open_common(folder: Path) -> Recording:
         baseline=found.camera.baseline * found.to_scene(found.unit) or None,
         poses=list(contents.poses) if contents.poses else None,
         rate=found.frame_rate or None,
+        times=None if found.times is None else np.array(found.times, np.float64),
         notes=[f"source: {found.source}"] if found.source else [],
     )

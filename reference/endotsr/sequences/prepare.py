@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.opencv.pictures import write_jpeg
+from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
+from endotsr.sequences.checks.guard import notes_of
 from endotsr.sequences.files import shortened
 from endotsr.sequences.points import depth_from_points
 from endotsr.sequences.recording import ARBITRARY, Lens, Pair, Pose, Recording
@@ -32,7 +34,7 @@ from endotsr.sequences.sequence_file import (
     SequenceFile,
     write_sequence_file,
 )
-from endotsr.sequences.splits import parse_frame_range
+from endotsr.sequences.splits import evenly_spaced, parse_frame_range
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
 from endotsr.sequences.writing import new_folder
@@ -82,10 +84,42 @@ def select_frames(recording: Recording, settings: PrepareSettings, notes: list[s
         raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ beside --rate")
     if settings.rate > recording.rate:
         raise InputError(f"rate {settings.rate:g}: the source has {recording.rate:g} frames a second; allowed: no more")
-    step = recording.rate / settings.rate
-    kept = sorted({round(k * step) for k in range(int(len(frames) / step) + 1)} & set(range(len(frames))))
-    notes.append(f"{len(kept)} of {len(frames)} frames kept for {settings.rate:g} a second")
+    seconds = _seconds(recording, frames)
+    wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * settings.rate + 1e-6) + 1) / settings.rate
+    kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))
+    notes.append(f"{len(kept)} of {len(frames)} frames kept for {settings.rate:g} a second, by their times")
     return [frames[k] for k in kept]
+
+
+def _seconds(recording: Recording, frames: list[int]) -> NDArray[np.float64]:
+    """Seconds of these frames; their numbers where neither times nor a rate are known."""
+    numbers = np.array(frames, np.float64)
+    return numbers / (recording.rate or 1.0) if recording.times is None else recording.times[frames]
+
+
+def written_times(
+    recording: Recording, frames: list[int], rate: float | None, notes: list[str]
+) -> tuple[list[float] | None, float]:
+    """The times that `sequence.toml` states, None where the frames are evenly spaced, and the mean frame rate.
+
+    rate     that was asked for
+    """
+    seconds = _seconds(recording, frames)
+    if len(frames) < 2:
+        return None, float(recording.rate or 0.0)
+    mean = (len(frames) - 1) / float(seconds[-1] - seconds[0])
+    whole = recording.rate and frames == list(range(frames[0], frames[-1] + 1))
+    known = recording.rate or recording.times is not None
+    even = evenly_spaced(seconds)
+    stated = float(rate if rate and even else recording.rate if whole and even and recording.rate else mean)
+    if even:
+        return None, stated if known else 0.0
+    steps, unit = np.diff(seconds), "s" if known else "frames"
+    notes.append(
+        f"the frames are not evenly spaced ({steps.min():.3g} to {steps.max():.3g} {unit} apart): sequence.toml states"
+        " their times, and a training uses them"
+    )
+    return [round(float(s), 6) for s in seconds - seconds[0]], stated if known else 0.0
 
 
 def _poses_and_masks(
@@ -128,13 +162,16 @@ def _write_frames(
     straight: Straightener | None = None
     depth_scale, saturated = 0.0, 0
     without_depth: list[int] = []
+    facts: list[FrameFacts] = []
     (folder / IMAGES).mkdir()
     for k, (i, pair) in enumerate(zip(chosen, recording.pictures(chosen))):
         if straight is None:
             height, width = pair.left.shape[:2]
             straight = straightener(recording, width, height, settings.scale)
             notes += straight.notes
-        _write_pictures(folder, k, _checked(recording, i, pair, straight), settings.pictures)
+        new = _checked(recording, i, pair, straight)
+        facts.append(frame_facts(recording.names[i], new.left))
+        _write_pictures(folder, k, new, settings.pictures)
         if recording.masks is not None:
             _write_mask(folder, k, straight.mask(_mask_or_nearest(recording, i, chosen)))
         depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points)
@@ -146,6 +183,7 @@ def _write_frames(
             _write_depth(folder, k, np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
         on_frame(k + 1, len(chosen))
     assert straight is not None
+    notes += notes_of(frame_findings(facts, str(recording.where)))
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:
@@ -153,7 +191,7 @@ def _write_frames(
             f"{saturated} pixels lie beyond {65535 * depth_scale:g}, eight times the usual depth: cut off there"
         )
     turned = [straight.pose(pose) for pose in poses] if poses else None
-    return _file_of(recording, straight, turned, len(chosen), depth_scale, settings, notes)
+    return _file_of(recording, straight, turned, chosen, depth_scale, settings, notes)
 
 
 def _checked(recording: Recording, i: int, pair: Pair, straight: Straightener) -> Pair:
@@ -226,7 +264,7 @@ def _file_of(
     recording: Recording,
     straight: Straightener,
     poses: list[Pose] | None,
-    count: int,
+    chosen: list[int],
     depth_scale: float,
     settings: PrepareSettings,
     notes: list[str],
@@ -235,13 +273,15 @@ def _file_of(
     if (recording.depth or recording.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
     method = "given" if recording.depth else f"points, {settings.points}"
+    times, rate = written_times(recording, chosen, settings.rate, notes)
     return SequenceFile(
         format=FORMAT,
-        frames=count,
+        frames=len(chosen),
         camera=camera_entry(straight.lens, straight.baseline),
         source=f"{recording.where.name} ({recording.layout})",
         unit=unit,
-        frame_rate=float(settings.rate or recording.rate or 0.0),
+        frame_rate=rate,
+        times=times,
         masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
         depth=DepthEntry(unit=unit, scale=depth_scale, method=method) if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,

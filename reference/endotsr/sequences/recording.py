@@ -81,6 +81,7 @@ class Recording:
     baseline: float | None = None  # of a rectified pair, in `unit`
     poses: list[Pose | None] | None = None
     rate: float | None = None  # frames a second
+    times: NDArray[np.float64] | None = None  # seconds of every frame, ascending; None: evenly spaced
     notes: list[str] = field(default_factory=list)
 
     @property

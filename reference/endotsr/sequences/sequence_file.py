@@ -4,7 +4,8 @@
     source = "P2_8 (stereomis)"        # where the frames come from, in words
     frames = 120
     unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
-    frame_rate = 25.0                  # frames a second; 0 = unknown
+    frame_rate = 25.0                  # frames a second, on average; 0 = unknown
+    times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: the frames are evenly spaced
 
     [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
     width = 640 ... height, fx, fy, cx, cy
@@ -105,6 +106,7 @@ class SequenceFile(Section, frozen=True, kw_only=True):
     source: str = ""
     unit: Unit = "mm"
     frame_rate: NonNegative = 0.0
+    times: list[float] | None = None
     masks: MaskEntry | None = None
     depth: DepthEntry | None = None
     poses: PoseEntry | None = None
@@ -147,7 +149,20 @@ def read_sequence_file(folder: Path) -> SequenceFile:
                 f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder beside the file"
             )
     found.camera.lens(path)
+    _check_times(found, path)
     return found
+
+
+def _check_times(found: SequenceFile, path: Path) -> None:
+    """Raises InputError unless there is one time a frame, and each lies after the one before."""
+    if found.times is None:
+        return
+    if len(found.times) != found.frames:
+        raise InputError(f"{path}: times: {len(found.times)} numbers for {found.frames} frames; allowed: one a frame")
+    steps = np.diff(found.times)
+    if not np.isfinite(found.times).all() or (steps <= 0).any():
+        wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
+        raise InputError(f"{path}: times: frame {wrong}: {found.times[wrong]:g}; allowed: finite, ascending seconds")
 
 
 def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> None:

@@ -24,5 +24,6 @@ class SourceOptions:
     depth: Path | None = None
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     depth_scale: float = 1.0
-    rate: float | None = None  # frames a second of the source
+    rate: float | None = None  # frames a second of the source; its pictures then count as evenly spaced
+    orientation: Literal["turned", "stored"] | None = None  # of a video that states a rotation
     points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction

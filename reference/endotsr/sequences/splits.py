@@ -1,7 +1,8 @@
 """The split into training and held-out frames, and the normalised time of a frame.
 
-In: the number of frames that were selected (a frame range is applied before the split). Out: two sorted index
-arrays. The split does not depend on the pictures.
+In: the number of frames that were selected (a frame range is applied before the split), and their seconds where they
+are not evenly spaced. Out: two sorted index arrays, and times. The split counts frames and does not depend on the
+pictures or the times.
 """
 
 import numpy as np
@@ -13,11 +14,34 @@ from endotsr.kernels.arrays import IndexArray
 LEAST_FRAMES = 3
 LEAST_TRAINING_FRAMES = 2
 LEAST_BLOCK_PERIOD = 24
+UNEVEN, ROUNDING = 0.1, 1.1e-3  # of the mean step, and seconds by which containers round: more is not evenly spaced
 
 
 def time_stamps(count: int) -> NDArray[np.float64]:
     """t_i = i / n for i = 0 .. n-1 (ruling: 1 is never reached). Shape (n,)."""
     return np.arange(count) / count
+
+
+def frame_times(seconds: NDArray[np.float64] | None, count: int) -> NDArray[np.float64]:
+    """Normalised times of frames that may be unevenly spaced: t_i = (s_i - s_0) / (s_{n-1} - s_0) (n - 1) / n.
+
+    seconds  (n,) strictly ascending, in any unit; None: evenly spaced
+    returns  (n,) from 0 to (n - 1) / n
+
+    Edges:   evenly spaced seconds give i / n to rounding; None gives it exactly (`time_stamps`).
+    """
+    if seconds is None or count < 2:
+        return time_stamps(count)
+    return (seconds - seconds[0]) / (seconds[-1] - seconds[0]) * ((count - 1) / count)
+
+
+def evenly_spaced(seconds: NDArray[np.float64]) -> bool:
+    """Whether no frame lies off an even grid by a tenth of its step, or by what a container rounds to."""
+    if len(seconds) < 3:
+        return True
+    step = (seconds[-1] - seconds[0]) / (len(seconds) - 1)
+    off = np.abs(seconds - seconds[0] - step * np.arange(len(seconds))).max()
+    return bool(off <= max(UNEVEN * step, ROUNDING))
 
 
 def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:

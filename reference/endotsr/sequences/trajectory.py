@@ -86,8 +86,12 @@ def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> Pose:
     return Pose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else Pose(rotation, translation)
 
 
-def poses_of_frames(trajectory: Trajectory, count: int, rate: float | None) -> tuple[list[Pose | None], str]:
+def poses_of_frames(
+    trajectory: Trajectory, count: int, rate: float | None, times: FloatArray | None = None
+) -> tuple[list[Pose | None], str]:
     """One pose a frame, None where there is none, and a sentence on how stamps became frames.
+
+    times   seconds of the frames from the first one; None: evenly spaced at `rate`
 
     Whole stamps below the number of frames are frame numbers. As many poses as frames belong to them in order. Other
     stamps are seconds from the first one, and a frame without a pose of its own lies between two.
@@ -107,7 +111,7 @@ def poses_of_frames(trajectory: Trajectory, count: int, rate: float | None) -> t
             f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose a frame, frame"
             " numbers as stamps, or a known frame rate"
         )
-    moments = stamps[0] + np.arange(count) / rate
+    moments = stamps[0] + (np.arange(count) / rate if times is None else times)
     return poses_at(trajectory, moments, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
 
 

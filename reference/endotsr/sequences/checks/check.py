@@ -19,7 +19,7 @@ from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.cost import Cost, estimated_cost
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts, depth_findings, inverted_finding
 from endotsr.sequences.checks.findings import Finding, finding, worst_first
-from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings
+from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings, time_findings
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.files import check_pairing
@@ -77,7 +77,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if not parts.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
     _pairing(parts, run)
-    run.findings += gap_findings(parts.images)
+    run.findings += gap_findings(parts.images) + time_findings(parts.seconds, str(parts.folder))
     size = _read_frames(parts, run)
     facts: dict[str, Any] = {"frames": len(parts.images)}
     if run.frames:

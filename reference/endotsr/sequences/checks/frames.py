@@ -3,6 +3,7 @@
 Comes in: one small `FrameFacts` a frame, so that a clip of any length fits; goes out: findings.
 """
 
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.sequences.checks.findings import Finding, finding
-from endotsr.sequences.files import frame_numbers
+from endotsr.sequences.files import frame_numbers, shortened
 
 SMALL = 8  # pixels between the sampled rows and columns
 BLACK, WHITE = 6.0, 249.0  # mean grey level
 SAME = 0.05  # mean difference in grey levels: two recorded frames differ by sensor noise of 0.5 and more
+FROZEN = 0.5  # as SAME, from the first frame of a clip to any other: an encoder improves a still picture a little
 JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published clips stay within 1.15
+FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
+NOTHING = 0.5  # of the frames: a clip of more black, white or one-coloured frames shows nothing
 CLIPPED = 0.3  # of the pixels of a frame at 255 in all channels
 
 
@@ -42,9 +46,27 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     for i in range(1, len(facts)):
         if readable[i - 1] and readable[i] and facts[i].small.shape == facts[i - 1].small.shape:
             found += _of_neighbours(facts[i - 1], facts[i], float(means[i] / means[i - 1]), where, i)
+    found += _of_clip(facts, means, where)
     if facts and all((fact.small == fact.small[:, :, :1]).all() for fact in facts):
         found.append(finding("grey-pictures", where, "every picture is grey"))
     return found
+
+
+def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -> list[Finding]:
+    """A clip that shows nothing, or one picture for ever."""
+    flat = [float(np.ptp(fact.small, axis=(0, 1)).max()) <= FLAT for fact in facts]
+    empty = [k for k, mean in enumerate(means) if flat[k] or not BLACK <= mean <= WHITE]
+    if len(empty) > NOTHING * len(facts):
+        named = shortened([facts[k].name for k in empty])
+        what = f"{len(empty)} of {len(facts)} frames are black, white or of one colour: {named}"
+        return [finding("no-picture", where, what, empty[0])]
+    names, frames = [fact.name for fact in facts], [fact.small for fact in facts]
+    if len({frame.shape for frame in frames}) != 1 or len(frames) < 2:
+        return []
+    repeated = all(np.abs(b - a).mean() < SAME for a, b in pairwise(frames))
+    if repeated and all(np.abs(frame - frames[0]).mean() < FROZEN for frame in frames):
+        return [finding("constant-clip", where, f"all {len(facts)} frames are one picture: {shortened(names)}", 0)]
+    return []
 
 
 def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:
@@ -66,6 +88,14 @@ def _of_neighbours(before: FrameFacts, fact: FrameFacts, ratio: float, where: st
     if not 1 / JUMP < ratio < JUMP:
         found.append(finding("exposure-jump", where, f"brightness changes by {ratio:.2f} times", i))
     return found
+
+
+def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Finding]:
+    """A note on frames whose times are stated because they are not evenly spaced."""
+    if seconds is None or len(seconds) < 2:
+        return []
+    steps = np.diff(seconds)
+    return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:

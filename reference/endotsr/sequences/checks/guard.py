@@ -14,7 +14,7 @@ from endotsr.errors import InputError
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.depth import DepthFacts, depth_findings
 from endotsr.sequences.checks.findings import Finding, worst_first
-from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings
+from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.splatting.camera import Camera
 
 SAID_ALREADY = ("far-from-origin", "frame-without-depth")  # in the notes on the world and on the depth
@@ -28,28 +28,31 @@ def guarded(
     depth_folder: Path,
     arbitrary: bool,
     near: float,
+    seconds: NDArray[np.float64] | None = None,
 ) -> list[str]:
     """Notes on what the checks of pictures, depth and cameras find.
 
     images   the files of the frames, in time order
     facts    of pictures and of depth, one a frame
+    seconds  of the frames, where they are not evenly spaced
 
     Raises:  InputError for the first refusal.
     """
     pictures, depth = facts
-    found = gap_findings(images) + frame_findings(pictures, str(images[0].parent))
+    found = gap_findings(images) + time_findings(seconds, str(images[0].parents[1]))
+    found += frame_findings(pictures, str(images[0].parent))
     found += depth_findings(depth, str(depth_folder), arbitrary, near)
     usual = float(np.median([fact.median for fact in depth if fact.median] or [0.0]))
     found += camera_findings(cameras, usual, str(images[0].parents[1]))
-    found = worst_first(found)
-    for finding in found:
+    return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])
+
+
+def notes_of(findings: list[Finding]) -> list[str]:
+    """One sentence a finding, the worst first, at most `MOST` of a kind. Raises InputError for a refusal."""
+    findings = worst_first(findings)
+    for finding in findings:
         if finding.level == "refusal":
             raise InputError(finding.line)
-    return _notes([finding for finding in found if finding.code not in SAID_ALREADY])
-
-
-def _notes(findings: list[Finding]) -> list[str]:
-    """One sentence a finding, at most `MOST` of a kind."""
     totals, said, notes = Counter(finding.code for finding in findings), Counter[str](), []
     for finding in findings:
         said[finding.code] += 1

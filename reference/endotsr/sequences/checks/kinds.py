@@ -31,8 +31,13 @@ KINDS: dict[str, Kind] = {
     "frames": Kind("refusal", REFUSED, "more frames, or another split"),
     "number-gap": Kind("warning", "frames count as evenly spaced in time",
                        "supply the missing frames, or cut the clip there"),
+    "uneven-times": Kind("note", "the times of the training are those of sequence.toml", "none needed"),
     # pictures
     "picture": Kind("refusal", REFUSED, "copy or export the file again"),
+    "no-picture": Kind("refusal", "there is nothing to reconstruct",
+                       "look at the pictures, and decode or export them again"),
+    "constant-clip": Kind("refusal", "nothing moves, and every held-out frame is a copy of a training frame",
+                          "look at the pictures: a frozen video, or one picture under many names"),
     "black-frame": Kind("warning", "a black frame teaches the model a black scene at its time", LEAVE_OUT),
     "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),

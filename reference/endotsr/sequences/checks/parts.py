@@ -4,6 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS
@@ -31,6 +34,7 @@ class Parts(NamedTuple):
     arbitrary: bool
     camera_file: Path
     cameras: Callable[[int, int], list[Camera]]  # of pictures of this width and height
+    seconds: NDArray[np.float64] | None = None  # of the frames, where they are not evenly spaced
 
 
 def parts_of(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
@@ -92,7 +96,8 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
 
     scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
     excluded = file.masks.excluded_value if file.masks else "white"
-    return Parts(folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras)
+    seconds = None if file.times is None else np.array(file.times, np.float64)
+    return Parts(folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds)
 
 
 def _stated(file: SequenceFile, where: Path) -> list[Finding]:

@@ -11,13 +11,13 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS
-from endotsr.opencv.video import VIDEO_ENDINGS
 from endotsr.sequences.files import list_pictures
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.layouts.video import open_video
 from endotsr.sequences.recording import Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import mask_reader, numbered
+from endotsr.sequences.video_file import VIDEO_ENDINGS
 
 CALIBRATION = "StereoCalibration.ini"
 TRAJECTORY = "groundtruth.txt"

@@ -81,6 +81,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
         lens=lens,
         poses=poses,
         rate=float(1 / np.median(steps)) if steps.size and np.median(steps) > 0 else None,
+        times=times if steps.size and (steps > 0).all() else None,
         notes=notes,
     )
 

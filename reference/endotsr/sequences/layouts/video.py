@@ -3,12 +3,15 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from endotsr.opencv.video import VIDEO_ENDINGS, video_facts, video_pictures
+import numpy as np
+
+from endotsr.errors import InputError
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import Pair, Pose, Recording
+from endotsr.sequences.recording import Pair, Picture, Pose, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import halves, split_pair, stated_camera, stated_depth, stated_masks, unit_of
 from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
+from endotsr.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
 
 
 def recognises(path: Path) -> bool:
@@ -19,21 +22,28 @@ def recognises(path: Path) -> bool:
 def open_video(path: Path, options: SourceOptions) -> Recording:
     """The video as a recording. Raises InputError."""
     facts = video_facts(path)
+    quarters = _quarter_turns(facts, options, path)
+    across, down = (facts.width, facts.height) if quarters % 2 == 0 else (facts.height, facts.width)
     stereo = "none" if options.stereo == "auto" else options.stereo
-    width, height = halves(facts.width, facts.height, stereo)
+    width, height = halves(across, down, stereo)
     rate = options.rate or facts.rate
+    times = None if options.rate else facts.times
     lens, rig = stated_camera(options, width, height, path)
     poses: list[Pose | None] | None = None
-    notes = [f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {rate or 0:g} a second"]
+    notes = _notes(facts, rate, path)
+    if facts.turn:
+        done = f"turned by {facts.turn} degrees counter-clockwise" if quarters else "taken as stored"
+        notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth are of these")
     if options.trajectory is not None:
         unit = options.trajectory_unit or "m"
         trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
-        poses, how = poses_of_frames(trajectory, facts.count, rate)
+        poses, how = poses_of_frames(trajectory, facts.count, rate, times)
         notes.append(f"{options.trajectory.name}: {how}; positions in {unit}")
 
     def pictures(wanted: list[int]) -> Iterator[Pair]:
         for i, picture in zip(wanted, video_pictures(path, wanted)):
-            yield split_pair(picture, stereo, f"{path}: picture {i}")
+            turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
+            yield split_pair(turned, stereo, f"{path}: picture {i}")
 
     return Recording(
         layout="video",
@@ -48,8 +58,33 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
         baseline=options.baseline,
         poses=poses,
         rate=rate,
+        times=times,
         notes=notes,
     )
+
+
+def _quarter_turns(facts: VideoFacts, options: SourceOptions, path: Path) -> int:
+    """Quarter turns counter-clockwise that are made. Raises InputError if the file states some and the user nothing."""
+    if facts.turn and options.orientation is None:
+        raise InputError(
+            f"{path}: the file states that its pictures are shown turned by {facts.turn} degrees counter-clockwise;"
+            " intrinsics, masks and depth hold for one of the two: allowed: --orientation turned (as players and ffmpeg"
+            " show them) or --orientation stored (as the sensor wrote them)"
+        )
+    return facts.turn // 90 if options.orientation == "turned" else 0
+
+
+def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
+    found = [
+        f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {facts.codec}, {rate or 0:g} a second"
+    ]
+    if facts.interlaced:
+        found.append(f"{path.name} is interlaced: deinterlaced, one picture for the two fields (bwdif)")
+    if facts.pixel_shape != 1:
+        found.append(f"{path.name}: pixels are {facts.pixel_shape:.4g} times as wide as high: fx and fy differ by that")
+    if facts.times is None:
+        found.append(f"{path.name} states no times: frames count as evenly spaced")
+    return found
 
 
 LAYOUT = Layout(name="video", about="a video file", rank=5, recognises=recognises, open=open_video)

@@ -1,0 +1,215 @@
+"""Reading video files: what a file holds, the time of every picture, and the pictures in order.
+
+Comes in: a path and the numbers of the wanted pictures, ascending; goes out: RGB pictures one by one. FFmpeg decodes
+them, in the package PyAV, and this is the one module that imports it. A video is decoded from its start: seeking by
+number is inexact for most codecs. Interlaced pictures, two moments woven into one, are deinterlaced (bwdif): the rows
+of the first field are kept and those of the second are interpolated. The rotation that a file states is reported, not
+applied.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import open_regular
+from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.png import MOST_PIXELS
+
+LARGEST_FILE = 1 << 40  # bytes: a video is decoded picture by picture
+# First bytes of the containers: the ending of a name says nothing of what a decoder would do with a play list.
+STARTS = {
+    0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"G", b"0&\xb2u"),  # avi, mkv and webm, mpeg, ts, wmv
+    4: (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # mp4 and mov
+}
+VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
+HIDDEN = ("vp8",)  # codecs with packets that hold no picture of their own: their pictures are counted by decoding
+WIDE_RANGE = {16: "PQ", 18: "HLG"}  # transfer functions of high dynamic range
+PROBED = 3  # pictures that are decoded to learn what the header does not say
+
+
+class VideoFacts(NamedTuple):
+    """What a video holds. Lengths and times are those of the pictures, not of the sound."""
+
+    width: int  # as stored
+    height: int
+    count: int
+    rate: float | None  # pictures a second on average
+    times: NDArray[np.float64] | None  # (count,) seconds from the first picture, ascending; None: not stated
+    turn: int  # degrees counter-clockwise by which a player turns the pictures: 0, 90, 180 or 270
+    interlaced: bool
+    codec: str
+    pixel_shape: float  # width / height of a pixel
+
+
+def video_facts(path: Path) -> VideoFacts:
+    """Size, number, times and kind of the pictures.
+
+    Raises:  InputError if the file is no video that can be decoded, or one of high dynamic range.
+    """
+    with _opened(path) as (container, stream):
+        codec, context = stream.codec_context.name, stream.codec_context
+        shape = float(stream.sample_aspect_ratio or 1) or 1.0
+        stated, rate = int(stream.frames or 0), float(stream.average_rate or 0)
+        first = list(itertools.islice(_decoded(container.decode(stream), path), PROBED))
+        if not first:
+            raise InputError(
+                f"{path}: holds no pictures that can be decoded ({codec} {context.width}x{context.height})"
+            )
+        _refuse_wide_range(first[0], path)
+        width, height, turn = first[0].width, first[0].height, round(first[0].rotation) % 360
+        interlaced = any(frame.interlaced_frame for frame in first)
+    times = _times(path, by_decoding=interlaced or codec in HIDDEN)
+    if len(times) < stated:
+        raise InputError(
+            f"{path}: the video ends after {len(times)} of {stated} pictures: it is truncated or damaged; allowed: a"
+            f" whole file (`ffmpeg -i {path.name} -c copy whole{path.suffix}` keeps what is left)"
+        )
+    if turn % 90:
+        raise InputError(f"{path}: the file states a turn of {turn} degrees; allowed: 0, 90, 180 and 270")
+    known = len(times) > 1 and bool(np.isfinite(times).all()) and bool((np.diff(times) > 0).all())
+    if known:
+        rate = (len(times) - 1) / float(times[-1] - times[0])
+    found = times - times[0] if known else None
+    usable = rate if np.isfinite(rate) and rate > 0 else None
+    return VideoFacts(width, height, len(times), usable, found, turn, interlaced, codec, shape)
+
+
+def _refuse_wide_range(frame: Any, path: Path) -> None:
+    """Raises InputError for pictures whose numbers are not display RGB."""
+    kind = WIDE_RANGE.get(int(frame.color_trc or 0))
+    if kind:
+        raise InputError(
+            f"{path}: pictures of high dynamic range ({kind}); allowed: display RGB, for example after a tone mapping"
+            " by the program that exported the video"
+        )
+
+
+def _times(path: Path, by_decoding: bool) -> NDArray[np.float64]:
+    """Seconds of every picture in the order of display, from the packets; NaN where the file does not say."""
+    with _opened(path) as (container, stream):
+        if by_decoding:
+            found = [frame.pts for frame in _decoded(container.decode(stream), path)]
+        else:
+            packets = [(p.pts, p.dts) for p in _decoded(container.demux(stream), path) if p.size and not p.is_discard]
+            shown = [pts for pts, _ in packets]
+            found = shown if None not in shown else [dts for _, dts in packets]
+        step = float(stream.time_base or 0)
+    values = np.array([np.nan if stamp is None else stamp for stamp in found], np.float64)
+    return np.sort(values) * step
+
+
+def video_pictures(path: Path, wanted: list[int]) -> Iterator[NDArray[np.uint8]]:
+    """The pictures with these numbers, ascending, from 0: (H, W, 3) RGB each, as stored (not turned), deinterlaced.
+
+    Raises:  InputError naming the picture that is damaged, of another size, or at which the video ends too early.
+    """
+    with _opened(path) as (container, stream):
+        stream.thread_type = "AUTO"
+        pictures = enumerate(_progressive(_decoded(container.decode(stream), path)))
+        size, position = None, -1
+        for number in wanted:
+            while position < number:
+                position, frame = next(pictures, (position, None))
+                if frame is None:
+                    raise InputError(
+                        f"{path}: the video ends after {position + 1} pictures: it is truncated or damaged"
+                    )
+                if frame.is_corrupt:
+                    raise InputError(f"{path}: picture {position} is damaged; allowed: a whole file, or other --frames")
+            size = size or (frame.width, frame.height)
+            if (frame.width, frame.height) != size:
+                raise InputError(
+                    f"{path}: picture {position}: {frame.width}x{frame.height} pixels, those before have"
+                    f" {size[0]}x{size[1]}; allowed: one size"
+                )
+            yield np.ascontiguousarray(frame.to_ndarray(format="rgb24", interpolation="BICUBIC"))
+
+
+def _progressive(frames: Iterable[Any]) -> Iterator[Any]:
+    """The frames, deinterlaced from the first one on that is interlaced; progressive ones among them pass unchanged."""
+    graph = None
+    for frame in frames:
+        if graph is None and frame.interlaced_frame:
+            graph = _deinterlacer(frame)
+        if graph is None:
+            yield frame
+        else:
+            graph.push(frame)
+            yield from _pulled(graph)
+    if graph is not None:
+        graph.push(None)
+        yield from _pulled(graph)
+
+
+def _deinterlacer(frame: Any) -> Any:
+    """A filter graph that takes interlaced frames like this one and gives as many progressive ones."""
+    import av.filter
+
+    graph = av.filter.Graph()
+    names = graph.add_buffer(
+        width=frame.width, height=frame.height, format=frame.format.name, time_base=frame.time_base
+    )
+    weaver = graph.add("bwdif", "mode=send_frame:parity=auto:deint=interlaced")
+    sink = graph.add("buffersink")
+    names.link_to(weaver)
+    weaver.link_to(sink)
+    graph.configure()
+    return graph
+
+
+def _pulled(graph: Any) -> Iterator[Any]:
+    """All frames that a filter graph has ready."""
+    import av
+
+    while True:
+        try:
+            yield graph.pull()
+        except (av.error.BlockingIOError, av.error.EOFError):
+            return
+
+
+def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
+    """The items of a decoder; its errors become an InputError that names the picture."""
+    import av
+
+    position = 0
+    try:
+        for item in items:
+            yield item
+            position += 1
+    except av.error.EOFError:
+        return
+    except (av.error.FFmpegError, ValueError, MemoryError) as error:
+        raise InputError(f"{path}: cannot be decoded at picture {position}: {plain_line(str(error))}") from None
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """The container and its best video stream; the decoder opens no other file. Raises InputError."""
+    import av
+
+    path = Path(path)
+    with open_regular(path, LARGEST_FILE) as file:
+        begin = file.read(16)
+        if not any(begin.startswith(starts, place) for place, starts in STARTS.items()):
+            raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
+        file.seek(0)
+        try:
+            container = av.open(file, "r", metadata_errors="ignore")
+        except (av.error.FFmpegError, ValueError, MemoryError) as error:
+            raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None
+        with container:
+            stream = container.streams.best("video")
+            if stream is None or stream.codec_context is None:
+                raise InputError(f"{path}: holds no pictures, or those of a codec that is not known")
+            if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
+                size = f"{stream.codec_context.width}x{stream.codec_context.height}"
+                raise InputError(f"{path}: pictures of {size} pixels; allowed: at most {MOST_PIXELS}")
+            stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+            yield container, stream
