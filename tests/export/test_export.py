@@ -98,6 +98,15 @@ def test_numbers_beyond_half_precision_stay_finite(tmp_path):
         ("a.ply", Times(times=(1.5,)), Content(), "export: --times 1.5 is not allowed"),
         ("a.ply", Times(), Content(least_opacity=2), "--opacity 2 is not allowed"),
         ("a.mp4", Times(), Content(), "a folder of ply files, and this is the name of a .mp4 file"),
+        (
+            "a.spz",
+            Times(),
+            Content(),
+            "the name of a .spz file; allowed: FILE.ply (Gaussians, points or a mesh at",
+        ),
+        ("a.splat", Times(), Content(), "this is the name of a .splat file; allowed: FILE.ply"),
+        ("a.obj", Times(), Content("mesh"), "this is the name of a .obj file; allowed: FILE.ply"),
+        ("a.glb", Times(), Content("mesh"), "FILE.npz (a slim model), or a name without an ending"),
         ("no/a.ply", Times(), Content(), "cannot be written"),
     ],
 )
@@ -105,6 +114,12 @@ def test_what_cannot_be_exported_is_refused(name, times, content, said, tmp_path
     with pytest.raises(InputError) as refused:
         export(moving_scene(), tmp_path / name, times, content)
     assert said in str(refused.value) and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["a", "run.2", "scale_0.5", "2026.11.24"])
+def test_a_name_without_an_ending_is_a_folder(name, tmp_path):
+    export(moving_scene(), tmp_path / name, Times(count=1))
+    assert [file.name for file in (tmp_path / name).iterdir()] == ["00000.ply"]
 
 
 def damaged(tmp_path, change):

@@ -1,5 +1,6 @@
 """What `endotsr export` writes: a slim model, one ply file, or a folder of them, chosen by the name of the output."""
 
+import re
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -13,7 +14,11 @@ from endotsr.runs.files import refuse_unwritable, replacing_folder
 from endotsr.runs.folder import refuse_existing
 
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
-FILE_ENDINGS = (*FILM_ENDINGS, ".png", ".jpg", ".jpeg", ".npy", ".npz", ".ply", ".html", ".json", ".csv")
+ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # of a file; `run.2` and `scale_0.5` are names of folders
+WRITTEN = (
+    "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.npz (a slim model), or a name without an ending"
+    " (a folder of .ply files)"
+)
 
 
 class Content(NamedTuple):
@@ -28,16 +33,17 @@ class Content(NamedTuple):
 ALL_TIMES, GAUSSIANS = Times(), Content()
 
 
-def check_folder_name(out: Path, of: str, film: str = "") -> None:
-    """Raises InputError for a folder whose name is that of a file of another kind.
+def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> None:
+    """Raises InputError for a folder whose name has the ending of a file.
 
-    of     what the folder holds, for the message
-    film   how a film is written instead
+    of        what the folder holds, for the message
+    film      how a film is written instead
+    written   what can be written instead
     """
     ending = out.suffix.lower()
-    if ending in FILE_ENDINGS and not out.is_dir():
-        advice = f"; {film}" if film and ending in FILM_ENDINGS else ""
-        raise InputError(f"{out}: --out is a folder of {of}, and this is the name of a {ending} file{advice}")
+    if ENDING.fullmatch(ending) and not out.is_dir():
+        advice = film if film and ending in FILM_ENDINGS else written or "allowed: a name without an ending"
+        raise InputError(f"{out}: --out is a folder of {of}, and this is the name of a {ending} file; {advice}")
 
 
 def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Content = GAUSSIANS) -> str:
@@ -57,7 +63,7 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
         return _slim(scene, out, times, content)
     if ending == ".ply":
         return _one_time(scene, out, times, content)
-    check_folder_name(out, "ply files")
+    check_folder_name(out, "ply files", written=WRITTEN)
     return _every_time(scene, out, times, content)
 
 
