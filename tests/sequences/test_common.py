@@ -1,5 +1,6 @@
 """The common format: what is written is read, units and axes are exact, and every wrong file has one line."""
 
+import contextlib
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
 from scipy.spatial.transform import Rotation
 
+from endotsr.cli.main import main
 from endotsr.config import PAPER, SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import read_png, write_png
@@ -216,3 +218,36 @@ def test_without_depth_the_remedy_is_named(tmp_path):
         read_common(tmp_path / "stereo", WHOLE, 0.2)
     with pytest.raises(InputError, match=r"no depth.*allowed: depth of every frame"):
         read_common(tmp_path / "mono", WHOLE, 0.2)
+
+
+def inverted(folder):
+    """Masks with the other polarity than sequence.toml states."""
+    for file in (folder / "masks").iterdir():
+        write_png(file, 255 - read_png(file))
+
+
+@pytest.mark.parametrize("stated", ["white", "black"])
+def test_the_remedy_for_inverted_masks_works(tmp_path, stated, capsys):
+    """What the message says to set makes the same folder readable, in `check` and in the training."""
+    written(tmp_path, masks=True)
+    right = read_common(tmp_path, WHOLE, 0.2).masks
+    if stated == "white":
+        inverted(tmp_path)
+    else:
+        text = (tmp_path / FILE_NAME).read_text()
+        (tmp_path / FILE_NAME).write_text(text.replace('excluded_value = "white"', 'excluded_value = "black"'))
+    assert main(["check", str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    if stated == "white":
+        assert "set --sequence.excluded-value black" in said
+        config, words = SequenceConfig(excluded_value="black"), ["--sequence.excluded-value", "black"]
+    else:
+        assert f'set [masks] excluded_value = "white" in {tmp_path / FILE_NAME}' in said
+        (tmp_path / FILE_NAME).write_text(text)
+        config, words = SequenceConfig(), []
+    with pytest.raises(InputError, match="other polarity") if stated == "white" else contextlib.nullcontext():
+        read_common(tmp_path, SequenceConfig(), 0.2)
+    assert main(["check", str(tmp_path), *words]) == 0
+    sequence = read_common(tmp_path, config, 0.2)
+    np.testing.assert_array_equal(sequence.masks, right)
+    assert any("takes the place" in note for note in sequence.notes) == (stated == "white")

@@ -12,7 +12,7 @@ import pytest
 from data_folder import data_folder
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.sequences.assemble import clip_depth
+from endotsr.sequences.depth_files import clip_depth
 from endotsr.sequences.endonerf import input_hashes, read_endonerf, write_endonerf
 from endotsr.sequences.files import check_pairing
 from synthetic_folder import FOCAL, identity_rows, write_synthetic_folder

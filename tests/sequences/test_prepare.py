@@ -18,6 +18,7 @@ from endotsr.sequences.prepare import PrepareSettings, prepare, step_of_depth
 from endotsr.sequences.recording import lens_of_matrix
 from endotsr.sequences.sequence_file import read_sequence_file
 from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.straighten import straightener
 from endotsr.splatting.camera import camera_centre
 
 WHOLE = SequenceConfig(depth_percentiles=(0.0, 100.0), allow_tissue_fraction=True)
@@ -76,11 +77,35 @@ def test_resizing_moves_the_camera_along(tmp_path):
     assert half.lens and whole.lens and half.lens[:6] == tuple(np.array(whole.lens[:6]) * 0.75)
     assert half.baseline == whole.baseline and half.poses and whole.poses
     np.testing.assert_array_equal(half.poses[3].translation, whole.poses[3].translation)
-    same = read_common(tmp_path / "a", SequenceConfig(scale=0.75, depth_percentiles=(0.0, 100.0)), 0.2)
-    ours = read_common(tmp_path / "b", WHOLE, 0.2)
+    same = read_common(tmp_path / "a", SequenceConfig(scale=0.75), 0.2)
+    ours = read_common(tmp_path / "b", SequenceConfig(), 0.2)
     np.testing.assert_array_equal(same.images, ours.images)
     np.testing.assert_array_equal(same.masks, ours.masks)
     np.testing.assert_allclose(same.depth, ours.depth, atol=0.01)
+
+
+@pytest.mark.parametrize("scale", [0.75, 0.7])
+def test_depth_is_reduced_as_a_training_reduces_it(tmp_path, scale):
+    """An outlier is clipped before it is averaged into its neighbours; the arrays are those of `sequence.scale`."""
+    written(tmp_path / "a", poses=moving())
+    for file in (tmp_path / "a/depth").iterdir():
+        plane = read_png(file)
+        plane[20, 25] = 60000  # 600 mm among 40 to 60
+        write_png(file, plane)
+    prepared(tmp_path / "a", tmp_path / "b", PrepareSettings(scale=scale))
+    whole = read_common(tmp_path / "a", SequenceConfig(scale=scale), 0.2)
+    recording = open_common(tmp_path / "a")
+    straight = straightener(recording, 32, 24, scale)
+    for i in range(whole.count):
+        np.testing.assert_array_equal(straight.depth(recording.depth(i)), whole.depth[i])  # pyright: ignore
+    reduced = read_common(tmp_path / "b", SequenceConfig(), 0.2)
+    step = read_sequence_file(tmp_path / "b").depth.scale  # pyright: ignore[reportOptionalMemberAccess]
+    np.testing.assert_allclose(reduced.depth, whole.depth, rtol=0, atol=0.51 * step)
+    assert reduced.depth.max() < 61 and any("before it was reduced, and not again" in note for note in reduced.notes)
+    prepared(tmp_path / "b", tmp_path / "c")
+    np.testing.assert_allclose(
+        read_common(tmp_path / "c", SequenceConfig(), 0.2).depth, reduced.depth, atol=1.01 * step
+    )
 
 
 def test_rectified_rows_correspond_and_each_camera_has_its_own_distortion():

@@ -10,7 +10,7 @@ from endotsr.api import train
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import read_png
-from endotsr.sequences.assemble import clip_depth
+from endotsr.sequences.depth_files import clip_depth
 from endotsr.sequences.endonerf import read_endonerf
 from endotsr.simulator import SimulatorSettings, simulate, with_effects
 from endotsr.simulator.field_of_view import check_field_of_view

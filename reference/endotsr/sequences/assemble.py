@@ -17,6 +17,7 @@ from endotsr.opencv import area_resize
 from endotsr.sequences.checks.depth import DepthFacts
 from endotsr.sequences.checks.frames import FrameFacts
 from endotsr.sequences.checks.guard import guarded, with_coverage
+from endotsr.sequences.depth_files import reduced_depth
 from endotsr.sequences.files import shortened
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction, sparse_step
@@ -38,6 +39,7 @@ class MaskSource(NamedTuple):
     folder: str  # path
     names: list[str]  # n paths
     excluded_value: str  # white or black
+    stated_in: str = ""  # the file that states it; "": the settings do
 
 
 class Frames(NamedTuple):
@@ -121,16 +123,6 @@ def check_percentiles(config: SequenceConfig) -> None:
         raise InputError(f"depth_percentiles: ({low:g}, {high:g}): allowed: two ascending values in [0, 100]")
 
 
-def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.float32]:
-    """Depth clipped to two percentiles of its non-zero values; 0 (no depth) stays 0. (H, W) to (H, W) float32."""
-    result = depth.astype(np.float32)
-    valid = result > 0
-    if valid.any():
-        low, high = np.percentile(result[valid], percentiles)
-        result[valid] = np.clip(result[valid], low, high)
-    return result
-
-
 def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype], unit: str) -> None:
     """Refuse a depth picture that is scaled to 16 bits while others hold lengths in 8 bits.
 
@@ -160,10 +152,10 @@ def _mask_notes(frames: Frames, config: SequenceConfig) -> list[str]:
     """The note on the masks: polarity, tissue fraction, evidence. Raises InputError for masks that look inverted."""
     if frames.mask_source is None:
         return [NO_MASKS]
-    where, _, excluded = frames.mask_source
+    where, _, excluded, stated_in = frames.mask_source
     allow = config.allow_tissue_fraction
     fraction = check_tissue_fraction(frames.masks, where, excluded, allow)
-    evidence = check_polarity(frames.masks, frames.depth, frames.images, where, excluded, allow)
+    evidence = check_polarity(frames.masks, frames.depth, frames.images, where, excluded, allow, stated_in)
     return [f"{Path(where).name}: {excluded} = excluded; tissue fraction {fraction:.4f}; {evidence}"]
 
 
@@ -230,6 +222,5 @@ def _scaled(
     for i in range(n):
         small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
         tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
-        fraction = area_resize((depth[i] > 0).astype(np.float32), width, height)
-        np.divide(area_resize(depth[i], width, height), fraction, out=prior[i], where=fraction > 0)
+        prior[i] = reduced_depth(depth[i], width, height)
     return small, tissue, prior

@@ -1,14 +1,15 @@
 """Reading the common format: `sequence.toml` beside `images/`, `masks/`, `depth/` and `images_right/`.
 
 Comes in: a folder and the `SequenceConfig`; goes out: a `Sequence`, or a `Recording` for `prepare` and `depth`.
-The fields of `sequence.toml` are described in `sequence_file`. The file states the polarity of the masks and
-the units; `sequence.excluded_value` does not apply.
+The fields of `sequence.toml` are described in `sequence_file`. The file states the units and the polarity of the masks,
+which `sequence.excluded_value = "black"` replaces.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,8 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.sequences.splits import parse_frame_range, split_frames
 from endotsr.splatting.camera import Camera
+
+EVERYTHING = (0.0, 100.0)  # percentiles that clip nothing
 
 
 class Contents(NamedTuple):
@@ -104,7 +107,9 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         notes.append("masks: proposed by a program, checked by nobody")
     read = _read_frames(contents, config, notes)
     cameras, static = cameras_of(contents)
-    excluded = contents.file.masks.excluded_value if contents.file.masks else "white"
+    excluded, stated_in = polarity(contents.file, contents.folder, config)
+    if contents.masks and not stated_in and contents.file.masks and excluded != contents.file.masks.excluded_value:
+        notes.append(f"sequence.excluded_value = {excluded!r} takes the place of that of {FILE_NAME}")
     names = [str(file) for file in contents.masks]
     unit = "arbitrary unit" if contents.file.arbitrary else "mm"
     times = contents.file.times
@@ -120,11 +125,20 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         facts=read.facts,
         store=read.store,
         unit=unit,
-        mask_source=MaskSource(str(contents.masks[0].parent), names, excluded) if names else None,
+        mask_source=MaskSource(str(contents.masks[0].parent), names, excluded, stated_in) if names else None,
         arbitrary=contents.file.arbitrary,
         seconds=seconds,
     )
     return assemble(frames, config, near, Path(folder), notes)
+
+
+def polarity(file: SequenceFile, folder: Path, config: SequenceConfig) -> tuple[str, str]:
+    """The excluded value of the masks, and the file that states it; "" where the settings do.
+
+    The file states it. The setting takes its place where it is not the default, white.
+    """
+    stated = file.masks.excluded_value if file.masks else "white"
+    return (config.excluded_value, "") if stated == "white" else (stated, str(Path(folder) / FILE_NAME))
 
 
 def common_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
@@ -150,7 +164,7 @@ def cameras_of(contents: Contents) -> tuple[list[Camera], bool]:
 
 def _read_frames(contents: Contents, config: SequenceConfig, notes: list[str]) -> ReadFrames:
     """All selected frames."""
-    entry, masks = contents.file.depth, contents.file.masks
+    entry = contents.file.depth
     assert entry is not None
     files = FrameFiles(
         contents.images,
@@ -161,9 +175,12 @@ def _read_frames(contents: Contents, config: SequenceConfig, notes: list[str]) -
         plane=lambda path: _sized(contents, read_plane(path), path),
         depth_scale=entry.scale * contents.file.to_scene(entry.unit),
         unit=entry.unit,
-        excluded_value=masks.excluded_value if masks else "white",
+        excluded_value=polarity(contents.file, contents.folder, config)[0],
     )
     size = contents.file.camera.width, contents.file.camera.height
+    if entry.clipped and entry.clipped == list(config.depth_percentiles):
+        config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
+        notes.append(f"depth: clipped to its percentiles {entry.clipped} before it was reduced, and not again")
     return read_frames(files, size, config, contents.folder, notes)
 
 
@@ -209,6 +226,7 @@ def open_common(folder: Path) -> Recording:
         masks=mask if contents.masks else None,
         proposed=bool(found.masks and found.masks.proposed and contents.masks),
         depth=depth if contents.depth else None,
+        depth_clipped=bool(found.depth and found.depth.clipped),
         unit="arbitrary" if found.arbitrary else "mm",
         lens=found.camera.lens(folder),
         baseline=found.camera.baseline * found.to_scene(found.unit) or None,

@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+from endotsr.opencv import area_resize
 from endotsr.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
 from endotsr.sequences.arrays import read_npy, read_pfm
 from endotsr.sequences.recording import grey_plane
 
+CLIPPED = SequenceConfig().depth_percentiles  # by which depth is clipped before it is reduced
 DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
 
 
@@ -41,3 +44,20 @@ def depth_plane(raw: NDArray, scale: float, where: object) -> NDArray[np.float32
     if depth.size and depth.max() > np.finfo(np.float32).max:
         raise InputError(f"{where}: depth {depth.max():g} is too large")
     return depth.astype(np.float32)
+
+
+def clip_depth(depth: NDArray, percentiles: tuple[float, float]) -> NDArray[np.float32]:
+    """Depth clipped to two percentiles of its non-zero values; 0 (no depth) stays 0. (H, W) to (H, W) float32."""
+    result = depth.astype(np.float32)
+    valid = result > 0
+    if valid.any():
+        low, high = np.percentile(result[valid], percentiles)
+        result[valid] = np.clip(result[valid], low, high)
+    return result
+
+
+def reduced_depth(depth: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+    """Depth (H, W) at a smaller size: the mean of the depths that a new pixel covers; 0 where it covers none."""
+    fraction = area_resize((depth > 0).astype(np.float32), width, height)
+    found = np.zeros(fraction.shape, np.float32)
+    return np.divide(area_resize(depth, width, height), fraction, out=found, where=fraction > 0)

@@ -104,12 +104,14 @@ def check_polarity(
     where: str,
     excluded_value: str,
     allow: bool,
+    stated_in: str = "",
 ) -> str:
     """Refuse a polarity that the pictures contradict; otherwise return a sentence on the evidence for it.
 
     masks    (n, H, W) True = tissue, as understood so far
     depth    (n, H, W) 0 = missing
     images   (n, 3, H, W) display RGB
+    stated_in   the file that states the polarity in place of the settings; "": the settings do
 
     Wrong if (a) at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on "tissue" than
     on excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,
@@ -119,10 +121,9 @@ def check_polarity(
         return "polarity not checked: all pixels are on one side of the mask"
     on_tissue, on_excluded, missing = _missing_fractions(masks, depth)
     other = "black" if excluded_value == "white" else "white"
-    advice = (
-        f"the masks seem to have the other polarity: set --sequence.excluded-value {other}"
-        f' (TOML: [sequence] excluded_value = "{other}"); to go on with these masks, set {ALLOW}'
-    )
+    mend = f'--sequence.excluded-value {other} (TOML: [sequence] excluded_value = "{other}")'
+    mend = f'[masks] excluded_value = "{other}" in {stated_in}' if stated_in else mend
+    advice = f"the masks seem to have the other polarity: set {mend}; to go on with these masks, set {ALLOW}"
     if missing >= LEAST_MISSING_FRACTION and abs(on_tissue - on_excluded) > MISSING_MARGIN:
         found = f"depth is missing on {on_tissue:.1%} of the tissue and {on_excluded:.1%} of the excluded pixels"
         if on_tissue > on_excluded and not allow:

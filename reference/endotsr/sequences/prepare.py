@@ -18,6 +18,7 @@ from endotsr.opencv import write_png
 from endotsr.opencv.pictures import write_jpeg
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.sequences.checks.guard import notes_of
+from endotsr.sequences.depth_files import CLIPPED
 from endotsr.sequences.files import shortened
 from endotsr.sequences.points import depth_from_points
 from endotsr.sequences.recording import ARBITRARY, Lens, Pair, Pose, Recording
@@ -273,6 +274,7 @@ def _file_of(
     if (recording.depth or recording.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
     method = "given" if recording.depth else f"points, {settings.points}"
+    clipped = list(CLIPPED) if recording.depth and (settings.scale < 1 or recording.depth_clipped) else []
     times, rate = written_times(recording, chosen, settings.rate, notes)
     return SequenceFile(
         format=FORMAT,
@@ -283,7 +285,7 @@ def _file_of(
         frame_rate=rate,
         times=times,
         masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
-        depth=DepthEntry(unit=unit, scale=depth_scale, method=method) if depth_scale else None,
+        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method) if depth_scale else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
-from endotsr.sequences.assemble import check_depth_scale, clip_depth
+from endotsr.sequences.assemble import check_depth_scale
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts
-from endotsr.sequences.depth_files import depth_plane
+from endotsr.sequences.depth_files import clip_depth, depth_plane
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.recording import Picture

@@ -74,6 +74,7 @@ class Recording:
     masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
     proposed: bool = False  # a program made the masks, and nobody has checked them
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
+    depth_clipped: bool = False  # to the percentiles of a training, before it was reduced
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions that a frame sees, in `unit`
     unit: str = "mm"
     lens: Lens | None = None

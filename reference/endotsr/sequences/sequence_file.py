@@ -21,6 +21,7 @@
     folder = "depth"
     unit = "mm"
     scale = 0.01                       # length = stored value x scale, in `unit`; 0 = no depth here
+    clipped = []                       # percentiles to which depth was clipped before it was reduced: not done again
     method = "given"
 
     [poses]                            # absent: the camera rests at the origin
@@ -86,6 +87,7 @@ class DepthEntry(Section, frozen=True, kw_only=True):
     folder: str = DEPTH
     unit: Unit = "mm"
     scale: Positive = 1.0
+    clipped: list[float] = msgspec.field(default_factory=list)
     method: str = "given"
 
 
@@ -173,7 +175,8 @@ def _check_section(data: dict, kind: type[Section], path: Path, key: str) -> Non
             raise InputError(f"{path}: {key}.{field.name} is missing")
     try:
         msgspec.convert(data.get("matrices", []), list[list[float]], strict=True)
-        msgspec.convert(data.get("distortion", []), list[float], strict=True)
+        for name in ("distortion", "clipped"):
+            msgspec.convert(data.get(name, []), list[float], strict=True)
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: {key}: a list of numbers is expected: {error}") from None
     checked(data, kind, str(path), f"{key}.")

@@ -202,6 +202,7 @@ def with_stated(recording: Recording, options: SourceOptions) -> Recording:
         recording,
         masks=masks or recording.masks,
         depth=depth or recording.depth,
+        depth_clipped=recording.depth_clipped and depth is None,
         proposed=recording.proposed and masks is None,
     )
 

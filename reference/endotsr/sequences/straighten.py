@@ -13,6 +13,7 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv import area_resize
 from endotsr.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
+from endotsr.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.sequences.recording import Lens, Pair, Picture, Pose, Recording, lens_of_matrix, opencv_matrix
 
 SKEWED = 0.5  # of the baseline: a pair whose cameras stand higher than wide apart by more is not side by side
@@ -28,6 +29,7 @@ class Straightener:
     turn: FloatArray  # (3, 3) x_new = turn @ x_old, camera axes of the left picture
     baseline: float | None
     notes: list[str]
+    clipped: bool = False  # the depth of the recording is already
 
     def pictures(self, pair: Pair) -> Pair:
         """Both pictures in the new camera."""
@@ -44,12 +46,17 @@ class Straightener:
         return area_resize((~mask).astype(np.float32), self.lens.width, self.lens.height) == 0
 
     def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Mean of the depths that a new pixel covers; 0 where it covers none."""
+        """Mean of the depths that a new pixel covers; 0 where it covers none.
+
+        Depth that is reduced is clipped to `CLIPPED` before, as a training at a scale does: an outlier must not be
+        averaged into its neighbours. Depth of unchanged size is left to the training.
+        """
         if self.left:
             depth = remapped(depth, self.left, nearest=True)
-        fraction = area_resize((depth > 0).astype(np.float32), self.lens.width, self.lens.height)
-        found = np.zeros(fraction.shape, np.float32)
-        return np.divide(area_resize(depth, self.lens.width, self.lens.height), fraction, out=found, where=fraction > 0)
+        if depth.shape == (self.lens.height, self.lens.width):
+            return depth
+        plane = depth if self.clipped else clip_depth(depth, CLIPPED)
+        return reduced_depth(plane, self.lens.width, self.lens.height)
 
     def pose(self, pose: Pose) -> Pose:
         """World-to-camera of the new left camera."""
@@ -83,11 +90,15 @@ def straightener(recording: Recording, width: int, height: int, scale: float) ->
         )
     if not any(lens.distortion):
         plain = lens._replace(distortion=())
-        return Straightener(plain.scaled(*new_size), None, None, np.eye(3), recording.baseline, [])
+        return Straightener(
+            plain.scaled(*new_size), None, None, np.eye(3), recording.baseline, [], recording.depth_clipped
+        )
     maps = undistortion_maps(opencv_matrix(lens), np.array(lens.distortion), width, height)
     new = lens_of_matrix(maps.matrix, width, height, where=recording.where)
     note = f"straightened: distortion {', '.join(f'{k:g}' for k in lens.distortion)}"
-    return Straightener(new.scaled(*new_size), maps, maps, np.eye(3), recording.baseline, [note])
+    return Straightener(
+        new.scaled(*new_size), maps, maps, np.eye(3), recording.baseline, [note], recording.depth_clipped
+    )
 
 
 def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:

@@ -196,7 +196,12 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
     excluded = parts.excluded_value
     if run.tried(lambda: check_tissue_fraction(masks, where, excluded, allow), "tissue-fraction", where) is None:
         return
-    if run.tried(lambda: check_polarity(masks, depth, images, where, excluded, allow), "polarity", where) is None:
+    if (
+        run.tried(
+            lambda: check_polarity(masks, depth, images, where, excluded, allow, parts.stated_in), "polarity", where
+        )
+        is None
+    ):
         return
     run.tried(lambda: check_single_masks(masks, depth, images, names, allow), "single-mask", where)
 

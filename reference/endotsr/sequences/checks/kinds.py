@@ -53,8 +53,8 @@ KINDS: dict[str, Kind] = {
                            "look at proposed_masks.png"),
     "mask": Kind("refusal", REFUSED, "export the mask again"),
     "mask-values": Kind("refusal", REFUSED, "store two values"),
-    "tissue-fraction": Kind("refusal", REFUSED, "set sequence.excluded_value, or mend the masks"),
-    "polarity": Kind("refusal", REFUSED, "set sequence.excluded_value, or mend the masks"),
+    "tissue-fraction": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
+    "polarity": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
     "single-mask": Kind("refusal", REFUSED, "mend this mask"),
     # depth
     "no-depth": Kind("refusal", "nothing can be placed in space", "make it with `endotsr depth`, or check its scale"),

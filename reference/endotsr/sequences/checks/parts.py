@@ -11,7 +11,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS
 from endotsr.sequences.checks.findings import Finding, finding
-from endotsr.sequences.common import Contents, cameras_of
+from endotsr.sequences.common import Contents, cameras_of, polarity
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.endonerf import NO_MASKS
 from endotsr.sequences.files import list_pictures
@@ -35,6 +35,7 @@ class Parts(NamedTuple):
     camera_file: Path
     cameras: Callable[[int, int], list[Camera]]  # of pictures of this width and height
     seconds: NDArray[np.float64] | None = None  # of the frames, where they are not evenly spaced
+    stated_in: str = ""  # the file that states the polarity of the masks; "": the settings do
 
 
 def parts_of(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
@@ -95,9 +96,11 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
         return cameras_of(Contents(folder, file, images, right, masks, depth, read_poses(file, where)))[0]
 
     scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
-    excluded = file.masks.excluded_value if file.masks else "white"
+    excluded, stated_in = polarity(file, folder, config)
     seconds = None if file.times is None else np.array(file.times, np.float64)
-    return Parts(folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds)
+    return Parts(
+        folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds, stated_in
+    )
 
 
 def _stated(file: SequenceFile, where: Path) -> list[Finding]:
