@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 from endotsr.errors import InputError
 from endotsr.export.mesh import surface
 from endotsr.export.model import save_slim_model
+from endotsr.export.placement import placed_points, placed_scene
 from endotsr.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import Times, moments
@@ -31,6 +32,7 @@ class Content(NamedTuple):
 
 
 ALL_TIMES, GAUSSIANS = Times(), Content()
+AXES = "axes: x right, y down, z forward, of the camera of the first frame"
 
 
 def check_folder_name(out: Path, of: str, film: str = "", written: str = "") -> None:
@@ -72,6 +74,8 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
         raise InputError(
             f"{out}: a slim model holds every time and the whole scene; allowed: --out alone, or a .ply file"
         )
+    if scene.one_moment:
+        raise InputError(f"{out}: a .ply file is one moment, a slim model a whole scene; allowed: of a run folder")
     refuse_unwritable(out)
     model = scene.model
     record = scene.record if scene.folder is None else scene.folder.sequence_record("largest_depth")
@@ -106,12 +110,14 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
     """One ply file; returns the number of its Gaussians, points or triangles."""
     unit = scene.record.get("unit", "scene units")
-    comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}")
+    comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}", AXES)
+    placement = scene.placement
     if content.kind == "mesh":
         found = surface(scene, time, content.voxel, content.taken_out)
-        write_ply(file, mesh_vertices(found.vertices, found.colours), comments, found.faces)
+        vertices = placed_points(found.vertices.T, placement).T
+        write_ply(file, mesh_vertices(vertices, found.colours), comments, found.faces)
         return len(found.faces)
-    moment = scene.at(time, content.taken_out)
+    moment = placed_scene(scene.at(time, content.taken_out), placement)
     vertices = point_vertices(moment, content.least_opacity) if content.kind == "points" else gaussian_vertices(moment)
     write_ply(file, vertices, comments)
     return vertices.size

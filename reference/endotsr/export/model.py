@@ -1,9 +1,10 @@
 """The slim model: all that rendering needs of a run, in one compressed file of half precision.
 
 A checkpoint also holds the state of the optimiser, in full precision. The slim model drops it and rounds every array
-but the positions to float16: the positions keep float32, since an error of theirs moves the picture. The file is an
-npz without pickle: a JSON header (as bytes) with settings, iteration and the record of the sequence, and one entry an
-array.
+but the positions to float16: the positions keep float32, since an error of theirs moves the picture. The arrays are in
+the world of the training, as the cameras of the record are; `placement` leads to the axes of the other outputs. The
+file is an npz without pickle: a JSON header (as bytes) with settings, iteration and the record of the sequence, and one
+entry an array.
 """
 
 import json

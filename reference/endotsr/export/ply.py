@@ -2,8 +2,8 @@
 
 Binary little-endian vertices with the properties that the original program writes and other viewers expect: x y z,
 nx ny nz (zero), f_dc_0..2, f_rest_* (all of red, then green, then blue), opacity (logit), scale_0..2 (logarithms),
-rot_0..3 (w x y z), all float32. Axes and harmonics are those of this package. Numbers of a file are user input: a
-Gaussian with a number that is not finite is left out when it is read.
+rot_0..3 (w x y z), all float32. Harmonics are those of this package; `placement` gives the axes. Numbers of a
+file are user input: a Gaussian with a number that is not finite is left out when it is read.
 """
 
 from collections.abc import Sequence

@@ -14,6 +14,7 @@ import numpy as np
 from endotsr.config import PAPER, ModelConfig
 from endotsr.errors import InputError
 from endotsr.export.model import load_slim_model
+from endotsr.export.placement import HERE, Placement, placement_of
 from endotsr.export.ply import read_gaussians
 from endotsr.fitting.model import corrected_cameras, render_at, scene_at, spectral_from, without
 from endotsr.kernels.arrays import FloatArray
@@ -40,6 +41,7 @@ class MovingScene:
     record: dict[str, Any]
     loaded: Model | None = None
     folder: RunFolder | None = None
+    one_moment: bool = False  # of a ply file, which has the axes of the outputs
 
     @cached_property
     def model(self) -> Model:
@@ -55,6 +57,11 @@ class MovingScene:
     def cameras(self) -> list[Camera]:
         """The cameras of the frames, with the corrections of the model."""
         return corrected_cameras(self.model.frames, remembered_cameras(self.record), self.record["times"])
+
+    @property
+    def placement(self) -> Placement:
+        """From the world of the training to the axes of the outputs; a ply file has these already."""
+        return HERE if self.one_moment else placement_of(self.cameras[0])
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
         """Render at a time in [0, 1]; `taken_out` names spectral components to leave out."""
@@ -105,7 +112,8 @@ def _from_ply(path: Path) -> MovingScene:
         "test_index": [0],
         "cameras": [camera._asdict() | {name: getattr(camera, name).tolist() for name in ("rotation", "translation")}],
     }
-    return MovingScene(record, Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0))
+    model = Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0)
+    return MovingScene(record, model, one_moment=True)
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:

@@ -78,7 +78,8 @@ def pivot_depth_of(depth: FloatArray, opacity: FloatArray) -> float:
 def read_cameras(file: Path, like: Camera) -> list[Camera]:
     """The cameras of a JSON file: `{"cameras": [{"rotation": 3x3, "translation": [3], "fx": ..., ...}, ...]}`.
 
-    The keys are those of sequence.json: a world-to-camera pose and pinhole intrinsics in pixels. Intrinsics and size
+    The keys are those of sequence.json: a world-to-camera pose and pinhole intrinsics in pixels. The world is that of
+    the outputs (`export.placement`), in which the first frame has the identity as its pose. Intrinsics and size
     that a camera does not name are those of `like`.
 
     Raises: InputError naming file, camera and key.

@@ -13,6 +13,7 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.files import check_folder_name
+from endotsr.export.placement import Placement, placed_camera
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import moments
 from endotsr.opencv import write_png
@@ -69,7 +70,7 @@ def requested_views(scene: MovingScene, request: Request, default: str) -> list[
         time, frame, _, _ = moments("render", request.times, scene.record, default)[0]
         out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
-    return views_of(request, scene.record, scene.cameras, pivot_depth, default)
+    return views_of(request, scene.record, scene.cameras, pivot_depth, default, scene.placement)
 
 
 def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
@@ -129,7 +130,7 @@ def write_pictures(
         def written() -> Iterator[tuple[View, RenderOut]]:
             for view, picture in chain([first], pictures):
                 _write_view(target, view.label, picture, step, npy)
-                entries.append(_entry(view))
+                entries.append(_entry(view, scene.placement))
                 yield view, picture
 
         consume(written())
@@ -139,10 +140,10 @@ def write_pictures(
     return len(entries)
 
 
-def _entry(view: View) -> dict[str, Any]:
+def _entry(view: View, placement: Placement) -> dict[str, Any]:
     """The entry of render.json; the camera is named where it is not that of a frame at its own time."""
     entry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
-    return entry if view.exact else entry | {"camera": _as_json(view.camera)}
+    return entry if view.exact else entry | {"camera": _as_json(placed_camera(view.camera, placement))}
 
 
 def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool) -> None:

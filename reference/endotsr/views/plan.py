@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.export.placement import HERE, Placement, training_camera
 from endotsr.export.times import Times, moments
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
@@ -53,7 +54,12 @@ def check_request(request: Request, record: dict[str, Any], default: str = "test
 
 
 def views_of(
-    request: Request, record: dict[str, Any], observed: list[Camera], pivot_depth: float, default: str = "test"
+    request: Request,
+    record: dict[str, Any],
+    observed: list[Camera],
+    pivot_depth: float,
+    default: str = "test",
+    placement: Placement = HERE,
 ) -> list[View]:
     """The views of a request.
 
@@ -62,11 +68,12 @@ def views_of(
     observed      the cameras of its frames
     pivot_depth   depth of the point around which `orbit` and `sway` turn, scene units
     default       frames to show if no times are chosen
+    placement     of the outputs: the cameras of a file are in its axes
 
     Raises: InputError for a file of cameras that cannot be used.
     """
     wanted = moments("render", request.times, record, default)
-    cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth)
+    cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth, placement)
     if any(request.offset):
         cameras = [shifted(camera, request.offset) for camera in cameras]
     if request.size:
@@ -79,7 +86,7 @@ def views_of(
 
 
 def _cameras(
-    request: Request, observed: list[Camera], frames: list[int], pivot_depth: float
+    request: Request, observed: list[Camera], frames: list[int], pivot_depth: float, placement: Placement
 ) -> tuple[list[Camera], bool]:
     """One camera for each of the frames, and whether they are those of the frames."""
     nearest = [observed[i] for i in frames]
@@ -87,7 +94,8 @@ def _cameras(
         return path_cameras(request.camera, nearest, request.angle, pivot_depth), request.camera == "observed"
     if request.camera.isdecimal():
         return [observed[int(request.camera)]] * len(frames), False
-    return along(read_cameras(Path(request.camera), observed[0]), len(frames)), False
+    given = along(read_cameras(Path(request.camera), observed[0]), len(frames))
+    return [training_camera(camera, placement) for camera in given], False
 
 
 def read_size(text: str) -> tuple[int, int]:
