@@ -38,7 +38,7 @@ def resume(out):
 def test_run_folder_explains_itself(finished_run):
     names = {p.name for p in finished_run.iterdir()}
     expected = {"config.toml", "run.json", "sequence.json", "log.jsonl", "checkpoint.npz", "checkpoint.previous.npz"}
-    assert names == expected | {"metrics.json", "renders", "curves.png", "report.html", "view.html", "test"}
+    assert names == expected | {"metrics.json", "renders", "curves.png", "report.html", "view.html", "test", "run.lock"}
     record = RunFolder(finished_run).record()
     assert record["status"] == "finished" and record["iterations_done"] == LAST
     assert record["seed"] == 0 and record["threads"] == 1 and record["versions"]["numba"]
@@ -239,7 +239,6 @@ def test_a_signal_while_the_checkpoint_is_written_leaves_the_one_before(tmp_path
 
 
 def test_a_run_is_trained_by_one_process_alone(tmp_path, capsys, monkeypatch):
-    pytest.importorskip("fcntl")
     out = tmp_path / "run"
     signal_at(2, monkeypatch, lambda: None)
     assert main(train_only(out)) == 130

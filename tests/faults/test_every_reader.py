@@ -156,14 +156,15 @@ def test_a_record_that_lacks_what_the_report_needs_is_refused_before_the_report(
     assert_refused(capfd, ["evaluate", str(run)], f"machine.{key} is missing")
 
 
-@pytest.mark.parametrize("file", ["log.jsonl", "renders", "test"])
+@pytest.mark.parametrize("file", ["log.jsonl", "run.lock", "renders", "test"])
 def test_a_link_in_a_run_folder_changes_no_file_elsewhere(file, run, tmp_path, capfd):
     victim = tmp_path / "victim"
     victim.mkdir()
     (victim / "letter.txt").write_text("mine\n")
     (run / file).unlink(missing_ok=True)
-    (run / file).symlink_to(victim / "letter.txt" if file == "log.jsonl" else victim)
-    words = ["train", "--out", str(run), "--resume"] if file == "log.jsonl" else ["evaluate", str(run)]
+    trained = file in ("log.jsonl", "run.lock")
+    (run / file).symlink_to(victim / "letter.txt" if trained else victim)
+    words = ["train", "--out", str(run), "--resume"] if trained else ["evaluate", str(run)]
     assert_refused(capfd, words, file, "is a link")
     assert (victim / "letter.txt").read_text() == "mine\n" and len(list(victim.iterdir())) == 1
 

@@ -10,7 +10,7 @@ import pytest
 from endotsr.config import DEMO, SequenceConfig
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
-from endotsr.kernels.memory import Kept, bytes_of, memory_limit
+from endotsr.kernels.memory import ASSUMED, Kept, bytes_of, memory_limit
 from endotsr.scene.gaussians import arrays
 from endotsr.sequences.endonerf import read_endonerf, write_endonerf
 from endotsr.sequences.frame_store import FrameStore
@@ -83,7 +83,15 @@ def test_the_limit_is_half_of_the_machine_unless_it_is_stated(monkeypatch):
     assert memory_limit(0.0) == 4e9 and FrameStore(2000, 640, 512, 0.0, "clip").in_file
     assert not FrameStore(500, 640, 512, 0.0, "clip").in_file
     monkeypatch.setattr("endotsr.kernels.memory.memory_of_machine", lambda: None)
-    assert memory_limit(0.0) == np.inf
+    assert memory_limit(0.0) == ASSUMED / 2
+
+
+def test_unknown_memory_is_said_and_refuses_what_no_machine_holds(monkeypatch):
+    monkeypatch.setattr("endotsr.kernels.memory.memory_of_machine", lambda: None)
+    assert "4 GB assumed; sequence.memory states it" in FrameStore(2000, 640, 512, 0.0, "clip").note
+    assert "assumed" not in FrameStore(2000, 640, 512, 1.0, "clip").note
+    with pytest.raises(ValueError, match=r"need 29491\.2 GB, more than half .* 4 GB assumed; sequence\.memory"):
+        FrameStore(10_000_000, 640, 512, 0.0, "clip")
 
 
 def test_a_full_disk_is_an_error_of_one_line(monkeypatch):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from endotsr.kernels.machine import memory_of_machine
 from endotsr.sweeps.capacity import Size, capacity, free_memory, run_bytes
 
 FULL = Size(63, 640, 512)
@@ -32,5 +33,10 @@ def test_a_run_of_full_size_needs_what_was_measured():
 
 
 def test_memory_of_this_machine_is_found():
-    found = free_memory()
-    assert found is None or 1e6 < found < 1e15
+    assert 1e6 < (free_memory() or 0.0) <= (memory_of_machine() or 0) < 1e15
+
+
+def test_where_memory_is_unknown_little_is_assumed_and_said(monkeypatch):
+    monkeypatch.setattr("endotsr.sweeps.capacity.free_memory", lambda: None)
+    found = capacity([FULL] * 9, cores=64)
+    assert found.workers == 1 and found.reason.endswith("4.0 GB assumed: the system does not say what is free")

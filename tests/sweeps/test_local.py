@@ -1,5 +1,7 @@
 """The process pool, with processes that are killed."""
 
+import contextlib
+import json
 import os
 import signal
 from pathlib import Path
@@ -35,6 +37,13 @@ def children(pid: int) -> list[int]:
         if parent == pid and any(b"spawn_main" in word for word in words):
             found.append(int(folder.name))
     return found
+
+
+def running(pid: int) -> bool:
+    """Whether a process exists and is more than an entry that its parent has not read."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    return False
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +93,25 @@ def test_a_killed_worker_loses_no_run(undisturbed, tmp_path):
     os.kill(children(process.pid)[0], signal.SIGKILL)
     said, errors = process.communicate(timeout=500)
     assert process.returncode == 0, (said, errors)
+    assert_whole(out, undisturbed)
+
+
+@pytest.mark.slow
+def test_workers_end_with_a_checkpoint_when_the_file_appears_and_no_signal_is_sent(undisturbed, tmp_path):
+    out = tmp_path / "out"
+    words = ("sweep", str(write_spec(tmp_path, iterations=str(LENGTH))), "--out", str(out), "--workers", "1")
+    process = start(*words)
+    wait_until(lambda: middle(out) or process.poll() is not None)
+    os.kill(process.pid, signal.SIGSTOP)  # the parent does nothing
+    (out / "sweep.stop").touch()
+    wait_until(lambda: not any(running(pid) for pid in children(process.pid)), 60)
+    (run,) = (
+        run for run in (out / "runs").iterdir() if json.loads((run / "run.json").read_text())["status"] != "finished"
+    )
+    assert json.loads((run / "run.json").read_text())["iterations_done"] == len(iterations(run))  # none is lost
+    kill(process)
+    again = start(*words)
+    assert again.wait(timeout=500) == 0 and not (out / "sweep.stop").exists()
     assert_whole(out, undisturbed)
 
 

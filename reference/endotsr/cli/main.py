@@ -5,6 +5,7 @@ did not pass, 2 invalid input or usage, 130 interrupted (Ctrl-C or SIGTERM), 141
 output was closed (128 + SIGPIPE, as other programs).
 """
 
+import errno
 import importlib
 import io
 import os
@@ -76,7 +77,10 @@ def _main(words: list[str]) -> int:
         return _completion(words)
     try:
         with signals_stop():
-            return _command(words[0])(words[1:])
+            code = _command(words[0])(words[1:])
+            if sys.stdout is not None:
+                sys.stdout.flush()  # a pipe that was closed is noticed here at the latest
+            return code
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
         print(table)
@@ -88,10 +92,10 @@ def _main(words: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"\nendotsr: interrupted{': ' if interrupt.args else ''}{' '.join(interrupt.args)}", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # the pipe that reads the output was closed (`endotsr ... | head`)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
     except OSError as error:
+        if _is_closed_pipe(error):  # the pipe that reads the output was closed (`endotsr ... | head`)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 141
         from endotsr.runs.files import os_error_line
 
         return _fail(os_error_line(error))
@@ -100,6 +104,12 @@ def _main(words: list[str]) -> int:
         return 1
     except MemoryError:
         return _fail(f"not enough memory; {LESS_MEMORY.get(words[0], OTHER_PROGRAMS)}")
+
+
+def _is_closed_pipe(error: OSError) -> bool:
+    """On Windows a write to a pipe that was closed is an invalid argument, without the name of a file."""
+    invalid = os.name == "nt" and error.errno == errno.EINVAL and error.filename is None
+    return isinstance(error, BrokenPipeError) or invalid
 
 
 def _command(name: str):

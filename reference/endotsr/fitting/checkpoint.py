@@ -29,6 +29,7 @@ from endotsr.scene.density_control import DensityStatistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, trained
 from endotsr.untrusted.arrays import NpzFile, Refused, open_npz
+from endotsr.untrusted.files import rename
 from endotsr.untrusted.json import parsed
 from endotsr.untrusted.names import shown
 
@@ -96,7 +97,7 @@ def save_checkpoint(
             file.flush()
             os.fsync(file.fileno())
         _keep_previous(path)
-        os.replace(temporary, path)
+        rename(temporary, path)
     except BaseException as error:
         with contextlib.suppress(OSError):  # of a folder that has vanished
             temporary.unlink(missing_ok=True)
@@ -120,10 +121,10 @@ def _keep_previous(path: Path) -> None:
     try:
         os.link(path, spare)
     except OSError:  # a file system without hard links: for a moment the file has its second name only
-        os.replace(path, previous)
+        rename(path, previous)
         return
     try:
-        os.replace(spare, previous)
+        rename(spare, previous)
     finally:
         spare.unlink(missing_ok=True)  # it remains where both names are of one file already
 

@@ -10,7 +10,18 @@ def usable_cores() -> int:
 
 def memory_of_machine() -> int | None:
     """Bytes of memory of this machine; None where the system does not say."""
+    return _memory("total")
+
+
+def memory_available() -> int | None:
+    """Bytes that programs can still take without swapping; None where the system does not say."""
+    return _memory("available")
+
+
+def _memory(kind: str) -> int | None:
+    import psutil
+
     try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
+        return getattr(psutil.virtual_memory(), kind)
+    except (psutil.Error, NotImplementedError, OSError, RuntimeError):  # a system without /proc, say
         return None

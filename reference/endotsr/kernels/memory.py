@@ -12,6 +12,7 @@ from endotsr.kernels.machine import memory_of_machine
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
+ASSUMED = 4e9  # bytes of memory of a machine whose system does not say how much it has
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # of mallopt(3)
 
 
@@ -32,11 +33,18 @@ def keep_freed_memory() -> bool:
 
 
 def memory_limit(gigabytes: float) -> float:
-    """Bytes that the frames of a clip and what is computed from them may take: 0 = half of this machine's memory."""
-    if gigabytes > 0:
-        return gigabytes * 1e9
-    machine = memory_of_machine()
-    return np.inf if machine is None else machine / 2
+    """Bytes that the frames of a clip and what is computed from them may take.
+
+    gigabytes   `sequence.memory`; 0 = half of this machine's memory, or of ASSUMED where the system does not say
+    """
+    return gigabytes * 1e9 if gigabytes > 0 else (memory_of_machine() or ASSUMED) / 2
+
+
+def unknown_memory() -> str:
+    """Words that say what is assumed where the system does not say how much memory there is; "" if it does."""
+    return (
+        "" if memory_of_machine() else f"the system does not say how much memory it has: {ASSUMED / 1e9:g} GB assumed"
+    )
 
 
 def bytes_of(value: object) -> int:

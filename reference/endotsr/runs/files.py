@@ -14,6 +14,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
+from endotsr.untrusted.files import rename
 from endotsr.untrusted.names import plain_line
 
 
@@ -64,7 +65,7 @@ def refuse_unwritable(*files: Path | None) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write JSON with null for every number that is not finite; the file is replaced whole."""
     text = json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n"
-    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
@@ -76,7 +77,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     temporary = path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
     try:
         write(temporary)
-        os.replace(temporary, path)
+        rename(temporary, path)
     except BaseException as error:
         with contextlib.suppress(OSError):  # of a folder that is missing or is none
             temporary.unlink(missing_ok=True)
@@ -101,7 +102,7 @@ def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
             raise InputError(f"{path}: exists already; choose another --out")
         if path.exists():
             shutil.rmtree(path)
-        os.rename(temporary, path)
+        rename(temporary, path)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise

@@ -6,6 +6,7 @@
     log.jsonl        one line an iteration
     checkpoint.npz   the latest checkpoint, and checkpoint.previous.npz, the one before it
     diverged.npz     the state before an iteration whose numbers were not finite
+    run.lock         empty; the process that trains the run holds its lock
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 
 A run folder appears complete under its name or not at all, files are replaced whole, and the log of a resumed run
@@ -51,6 +52,11 @@ class RunFolder:
         """One JSON object an iteration."""
         return self.path / "log.jsonl"
 
+    @property
+    def lock(self) -> Path:
+        """The file whose lock is held while the run is trained."""
+        return self.path / "run.lock"
+
     def config(self) -> Config:
         """The resolved settings of the run: its length is `training.iterations`, in runs of earlier versions too."""
         return with_fixed_length(load_config(self.path / "config.toml"))
@@ -73,11 +79,12 @@ class RunFolder:
     def locked(self) -> Iterator[None]:
         """Hold the lock of the run for the block; the system releases the lock of a process that was killed.
 
-        Raises: RunBusy, an InputError, if another process holds it. Without effect where the system or the disk
-                supports no locks.
+        The lock is that of an empty file of its own: on Windows no other process reads what is locked.
+        Raises: RunBusy, an InputError, if another process holds it. Without effect where the disk supports no locks.
         """
-        refuse_link(self.log)
-        with self.log.open("ab") as file:
+        for file in (self.log, self.lock):
+            refuse_link(file)
+        with self.lock.open("ab") as file:
             if not lock_taken(file):
                 raise RunBusy(f"{self.path}: another process trains this run; wait until it ends, or stop it")
             yield
@@ -95,18 +102,16 @@ class RunFolder:
 
 
 def lock_taken(file: IO[bytes]) -> bool:
-    """Take the lock of an open file: whether no other process holds it. True where there are no locks."""
+    """Take the lock of an open file: whether no other process holds it. True where the disk has no locks.
+
+    It is `flock` on POSIX systems and `LockFileEx` on Windows: the system releases it with the file, or the process.
+    """
+    from filelock import lock_descriptor
+
     try:
-        import fcntl
-    except ImportError:
+        return lock_descriptor(file.fileno(), blocking=False)
+    except OSError:  # some network disks
         return True
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
 
 
 def refuse_existing(path: Path) -> None:
@@ -132,7 +137,7 @@ def create_run(path: Path, config: Config, record: dict[str, Any], sequence_reco
     try:
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
         with replacing_folder(path, replace=False) as folder:
-            (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8")
+            (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8", newline="\n")
             write_json(folder / "run.json", record)
             write_json(folder / "sequence.json", sequence_record)
             (folder / "log.jsonl").touch()

@@ -43,8 +43,10 @@ def peak_memory_bytes() -> int | None:
     """Largest resident memory of this process so far; None where the system does not report it."""
     try:
         import resource
-    except ImportError:
-        return None
+    except ImportError:  # Windows
+        import psutil
+
+        return getattr(psutil.Process().memory_info(), "peak_wset", None)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
 

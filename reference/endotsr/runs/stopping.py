@@ -15,6 +15,7 @@ import signal
 import threading
 from collections.abc import Iterator
 
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)]
 PATIENCE = 0.7  # seconds after the first signal within which work inside `finishing` must end
 
 _asked = threading.Event()
@@ -23,7 +24,10 @@ _finishing: list[threading.Timer] = []  # the clocks of the open `finishing` blo
 
 @contextlib.contextmanager
 def signals_stop() -> Iterator[None]:
-    """In the block, SIGTERM (a batch system, a shutdown) acts like Ctrl-C: KeyboardInterrupt in the main thread."""
+    """In the block, SIGTERM (a batch system, a shutdown) acts like Ctrl-C: KeyboardInterrupt in the main thread.
+
+    So does SIGBREAK, which Windows sends for Ctrl-Break and when a console is closed; it has no SIGTERM of others.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -38,7 +42,7 @@ def signals_stop() -> Iterator[None]:
         raise KeyboardInterrupt
 
     _asked.clear()
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, stop) for number in SIGNALS}
     try:
         yield
     finally:

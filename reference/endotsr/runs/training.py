@@ -113,7 +113,9 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
         if folder.checkpoint.exists():
             save_training(folder, load_training(folder, before), config)
         text = config_to_toml(config)
-        replace_file(folder.path / "config.toml", lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        replace_file(
+            folder.path / "config.toml", lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n")
+        )
         entry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
         folder.update(extended=[*folder.record().get("extended", []), entry])
 
@@ -164,14 +166,15 @@ class _Recorder:
         self._between_iterations = False  # whether the run was stopped after a whole iteration
 
     def on_iteration(self, entry: dict[str, Any]) -> None:
-        """Log one iteration. Raises KeyboardInterrupt after a signal."""
+        """Log one iteration. Raises KeyboardInterrupt after a signal, or where the observer does."""
         tick = time.monotonic()
         self.log.append(entry | {"seconds": round(tick - self._last_tick, 5)})
         self._last_tick = tick
+        self._between_iterations = True  # the observer may end the run too
         self._observer.update(entry)
         if stop_asked():
-            self._between_iterations = True
             raise KeyboardInterrupt
+        self._between_iterations = False
 
     def on_checkpoint(self, state: "TrainingState") -> None:
         """Replace the checkpoint."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from endotsr.errors import InputError
-from endotsr.kernels.memory import memory_limit
+from endotsr.kernels.memory import memory_limit, unknown_memory
 
 PIXEL_BYTES = 3 + 1 + 4 + 1  # image, mask, depth, and the stored mask while it is read
 
@@ -26,19 +26,20 @@ class FrameStore:
     def __init__(self, count: int, width: int, height: int, memory: float, where: object) -> None:
         """Decide where the arrays lie.
 
-        memory  `sequence.memory`, GB; 0 = half of this machine's
+        memory  `sequence.memory`, GB; 0 = half of this machine's (of 4 GB where the system does not say)
 
         Raises:  InputError if neither the memory nor the disk holds the clip; nothing was read then.
         """
         self.needed = count * width * height * PIXEL_BYTES
         self.in_file = self.needed > memory_limit(memory) / 2
+        self._unknown = unknown_memory() if self.in_file and not memory > 0 else ""
         self._what = f"{where}: {count} frames of {width}x{height} need {self.needed / 1e9:.1f} GB"
         free = shutil.disk_usage(tempfile.gettempdir()).free
         if self.in_file and self.needed > free:
             raise InputError(
                 f"{self._what}, more than half of the allowed memory, and {tempfile.gettempdir()} has"
                 f" {free / 1e9:.1f} GB; allowed: fewer --frames, smaller pictures (endotsr prepare --scale), or a"
-                " larger disk (TMPDIR)"
+                f" larger disk (TMPDIR){self._remedy}"
             )
 
     @property
@@ -48,8 +49,13 @@ class FrameStore:
             return ""
         return (
             f"frames: {self.needed / 1e9:.2g} GB, more than half of sequence.memory, lie in a file without a name in"
-            f" {tempfile.gettempdir()}; it goes with this process"
+            f" {tempfile.gettempdir()}; it goes with this process{self._remedy}"
         )
+
+    @property
+    def _remedy(self) -> str:
+        """What a user can state whose system does not say how much memory there is."""
+        return f"; {self._unknown}; sequence.memory states it" if self._unknown else ""
 
     def array(self, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray:
         """An array of zeros. Raises InputError if the disk is full."""

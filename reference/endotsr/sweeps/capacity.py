@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from endotsr.kernels.machine import memory_of_machine, usable_cores
+from endotsr.kernels.machine import memory_available, memory_of_machine, usable_cores
+from endotsr.kernels.memory import ASSUMED
 from endotsr.sequences.checks.cost import estimated_cost
 
 MARGIN = 1.4  # measured peaks of a training over the estimate, both presets
@@ -49,27 +50,23 @@ def capacity(
     than few runs with many.
     """
     cores = cores or usable_cores()
-    free = free_memory() if free is None else free
+    known = free_memory() if free is None else free
+    free = ASSUMED if known is None else known
     needed = max(map(run_bytes, sizes), default=0.0)
-    by_memory = max(1, int(USABLE * free / needed)) if free and needed else cores
+    by_memory = max(1, int(USABLE * free / needed)) if needed else cores
     by_cores = max(1, cores // threads) if threads else cores
     chosen = workers or max(1, min(len(sizes), by_memory, by_cores))
-    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run" + (f", {free / 1e9:.1f} GB free" if free else "")
+    memory = f"{free / 1e9:.1f} GB " + (
+        "free" if known is not None else "assumed: the system does not say what is free"
+    )
+    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run, {memory}"
     return Capacity(chosen, threads or max(1, cores // chosen), reason)
 
 
 def free_memory() -> float | None:
     """Bytes that programs can still take, within the limit of a container; None where the system does not say."""
-    found = [value for value in (_available(), _container_limit(), memory_of_machine()) if value is not None]
+    found = [value for value in (memory_available(), _container_limit(), memory_of_machine()) if value is not None]
     return min(found, default=None)
-
-
-def _available() -> float | None:
-    try:
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        return next(1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
-    except (OSError, ValueError, StopIteration):
-        return None
 
 
 def _container_limit() -> float | None:

@@ -24,12 +24,12 @@ from endotsr.kernels.machine import usable_cores
 from endotsr.runs.machine import versions
 from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.execute import FAILED, Outcome, execute
-from endotsr.sweeps.jobs import Job
+from endotsr.sweeps.jobs import STOP, Job
 
 TICK = 0.5  # seconds between two looks at the runs
 PATIENCE = 15.0  # seconds for a scheduler to answer, and for its first worker
 MOST_LOSSES = 3  # times that the data of a run may be lost with all workers that held it
-STOP, TOKEN = "sweep.stop", "sweep.token"  # files in the folder of the sweep
+TOKEN = "sweep.token"  # a file in the folder of the sweep
 
 
 def cluster_outcomes(
@@ -48,7 +48,7 @@ def cluster_outcomes(
             yield from _outcomes(client, jobs, sequence_of, out, threads)
         except BaseException:
             with contextlib.suppress(OSError):
-                (out / STOP).touch()  # the runs look for it, and end at their last checkpoint
+                (out / STOP).touch()  # the runs look for it
             raise
 
 
@@ -171,7 +171,7 @@ def _refuse_workers(client: Any, out: Path) -> None:
         if count != 1:
             raise InputError(f"worker {worker}: takes {count} runs at a time; allowed: --nthreads 1")
     token, expected = secrets.token_hex(8), _fingerprint()
-    (out / TOKEN).write_text(token, encoding="ascii")
+    (out / TOKEN).write_text(token, encoding="ascii", newline="\n")
     for worker, found in client.run(_seen, str(out / TOKEN), on_error="return").items():
         if isinstance(found, BaseException):
             raise InputError(f"worker {worker}: cannot load endotsr: {str(found).splitlines()[0]}; allowed: {expected}")

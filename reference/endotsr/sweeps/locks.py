@@ -1,6 +1,6 @@
 """One process at a time: the lock of a sweep, and that of a checkpoint which several runs begin with.
 
-The system releases the lock of a process that was killed. Without effect where the system or the disk has no locks.
+The system releases the lock of a process that was killed. Without effect where the disk has no locks.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""Opening and reading of files that another program or person made.
+"""Opening and reading of files that another program or person made, and renaming where another program reads.
 
 Only regular files are opened: a named pipe would block the command for ever, and a device may never end. Reading is
 bounded by a size that the caller states. It happens in the calling thread, or in threads that do not keep the process
@@ -9,6 +9,7 @@ import io
 import os
 import stat
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
@@ -16,6 +17,7 @@ from queue import SimpleQueue
 from endotsr.errors import InputError
 
 LARGEST_TEXT = 1 << 26  # bytes of a settings or record file: 64 MiB
+PATIENCE = 2.0  # seconds that a file which another program has open is waited for, on Windows
 MOST_READERS = 8  # threads that read files at the same time
 KINDS = {
     stat.S_IFDIR: "a folder",
@@ -73,6 +75,22 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
         return read_bytes(path, largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: cannot be read: not UTF-8 text: byte {error.start}") from None
+
+
+def rename(source: Path, target: Path) -> None:
+    """Put a file or folder in the place of another, as `os.replace`.
+
+    Windows refuses that while a program has one of the two open, a virus scanner or a viewer say: it is tried again.
+    Raises: OSError of the file system.
+    """
+    ends = time.monotonic() + (PATIENCE if os.name == "nt" else 0.0)
+    while True:
+        try:
+            return os.replace(source, target)
+        except PermissionError:
+            if time.monotonic() >= ends:
+                raise
+            time.sleep(0.02)
 
 
 def _check_regular(path: Path, mode: int) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import sys
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from endotsr.cli.golden import run
 from endotsr.errors import InputError
+from endotsr.golden.judge.command import words_of
 from endotsr.golden.judge.npy import npy_bytes, read_plain
 from endotsr.golden.judge.report import as_table
 from endotsr.golden.judge.store import golden_folder, read_golden
@@ -224,3 +226,21 @@ def test_a_trajectory_says_where_it_leaves_the_path(golden, answered, tmp_path):
     (loss,) = [o for o in report.cases[0].outputs if o.name == "loss"]
     assert loss.index == (4,)
     assert "first wrong at iteration 5: term_ssim, loss" in as_table(report)
+
+
+COMMANDS = {  # words of a command line on Windows, and on the other systems
+    r"C:\ports\x.exe {requests} {outputs}": ([r"C:\ports\x.exe", "{requests}", "{outputs}"], "C:portsx.exe"),
+    r'"C:\my ports\x.exe" -n \'a b\' {requests}': (
+        [r"C:\my ports\x.exe", "-n", "a b", "{requests}"],
+        r"C:\my ports\x.exe",
+    ),
+    r"./my\ port {requests}": (["./my\\", "port", "{requests}"], "./my port"),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_words_of_a_command_are_those_of_the_system(command):
+    windows, first = COMMANDS[command]
+    assert words_of(command, backslash_escapes=False) == windows
+    assert words_of(command, backslash_escapes=True)[0] == first
+    assert words_of(command, backslash_escapes=True) == shlex.split(command)

@@ -56,19 +56,31 @@ def write_requests(golden: Golden, folder: Path, precision: Precision, level: in
             inputs={name: array.file for name, array in case.inputs.items()}, outputs=outputs,
         )  # fmt: skip
         root.mkdir(parents=True, exist_ok=True)
-        (root / "request.json").write_text(to_json(request), encoding="utf-8")
+        (root / "request.json").write_text(to_json(request), encoding="utf-8", newline="\n")
     head = Requests(
         version=golden.manifest.version, precision=precision, level=level,  # type: ignore[arg-type]
         cases=tuple(case.name for case in wanted),
     )  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "requests.json").write_text(to_json(head), encoding="utf-8")
+    (folder / "requests.json").write_text(to_json(head), encoding="utf-8", newline="\n")
 
 
 def refuse_command(command: str) -> None:
     """Raises InputError if a port's command lacks {requests} or {outputs}."""
     if "{requests}" not in command or "{outputs}" not in command:
         raise InputError(f"--port {command!r} must contain {{requests}} and {{outputs}}")
+
+
+def words_of(command: str, *, backslash_escapes: bool = os.name != "nt") -> list[str]:
+    """The words of a command line, quoted as in a POSIX shell; on Windows a backslash stands in paths and is kept.
+
+    Raises: ValueError for a quotation mark that is not closed.
+    """
+    lexer = shlex.shlex(command, posix=True)
+    lexer.whitespace_split, lexer.commenters = True, ""
+    if not backslash_escapes:
+        lexer.escape = ""
+    return list(lexer)
 
 
 def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str:
@@ -79,7 +91,7 @@ def run_port(command: str, requests: Path, outputs: Path, seconds: float) -> str
     refuse_command(command)
     outputs.mkdir(parents=True, exist_ok=True)
     try:
-        split = shlex.split(command)
+        split = words_of(command)
         words = [w.replace("{requests}", str(requests)).replace("{outputs}", str(outputs)) for w in split]
         done = subprocess.run(words, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:

@@ -20,6 +20,7 @@ T = TypeVar("T")
 MAGIC = b"\x93NUMPY"
 LONGEST_HEADER = 4096
 LARGEST = 1 << 28  # bytes of an array that is read
+FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 _HEADER = re.compile(
     r"\{'descr': '([<>|=][a-zA-Z]\d{1,3})', 'fortran_order': (True|False), "
     r"'shape': \(((?:\d{1,12}(?:, ?\d{1,12}){0,7})?,?)\),? ?\}\s*"
@@ -87,7 +88,9 @@ def _with_open(path: Path, root: Path | None, read: Callable[[int], T]) -> T:
     try:
         if root is not None and not path.resolve().is_relative_to(root.resolve()):
             raise Refused("a link that leaves the folder")
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
+        if stat.S_ISLNK(os.lstat(path).st_mode):
+            raise Refused("a link; allowed: a regular file")
+        handle = os.open(path, FLAGS)
     except FileNotFoundError:
         raise Refused("missing") from None
     except (OSError, ValueError, RuntimeError) as error:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.kernels.machine import memory_of_machine
+from endotsr.kernels.memory import ASSUMED, unknown_memory
 from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.cost import Cost, estimated_cost
@@ -216,9 +217,10 @@ def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Co
     if cost.file_bytes:
         what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and lie in a file while a training runs"
         run.findings.append(finding("frames-in-file", where, what))
-    memory = memory_of_machine()
-    if memory is not None and cost.total_bytes > memory:
-        what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, this machine has {memory / 1e9:.1f} GB"
+    memory = memory_of_machine() or ASSUMED
+    if cost.total_bytes > memory:
+        has = unknown_memory() or f"this machine has {memory / 1e9:.1f} GB"
+        what = f"a training needs about {cost.total_bytes / 1e9:.1f} GB, {has}"
         run.findings.append(finding("memory", where, what))
     return cost
 
