@@ -30,7 +30,7 @@ nitpicky = True
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 
-# The notebooks (docs/notebooks -> ../notebooks) are pages, and run when the book is built: at the small size of the
+# The notebooks (copied to docs/notebooks) are pages, and run when the book is built: at the small size of the
 # tests, or with ENDOTSR_NOTEBOOK_SIZE=full at the size of the text. ENDOTSR_DOCS_EXECUTE=0 leaves the pictures out.
 os.environ.setdefault("ENDOTSR_NOTEBOOK_SIZE", "small")
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}

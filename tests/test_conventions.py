@@ -102,6 +102,29 @@ def test_oracles_import_nothing_of_the_package(file):
     assert "importlib" not in imported(file)
 
 
+def test_text_is_written_with_its_encoding_and_line_end():
+    """The defaults of Windows are another encoding and CRLF, which checksums, ports and other systems would see."""
+    wrong = []
+    for file in SOURCES:
+        for node in (node for node in ast.walk(parse(file)) if isinstance(node, ast.Call)):
+            given, called = (
+                {word.arg for word in node.keywords},
+                getattr(node.func, "attr", getattr(node.func, "id", "")),
+            )
+            modes = [a.value for a in node.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+            text = called == "write_text" or (called == "open" and any(set(m) <= set("wax+t") for m in modes if m))
+            if text and not {"encoding", "newline"} <= given:
+                wrong.append(f"{module_name(file)}:{node.lineno}: encoding and newline")
+            if called == "read_text" and isinstance(node.func, ast.Attribute) and "encoding" not in given:
+                wrong.append(f"{module_name(file)}:{node.lineno}: encoding")
+    assert wrong == []
+
+
+def test_no_link_is_part_of_the_tree():
+    """A clone on Windows holds a text file in its place."""
+    assert [str(path) for path in ROOT.glob("*/*") if path.is_symlink()] == []
+
+
 def test_no_file_is_too_long():
     files = [*SOURCES, *(ROOT / "tests").rglob("*.py")]
     lengths = {str(f.relative_to(ROOT)): len(f.read_text(encoding="utf-8").splitlines()) for f in files}

@@ -183,7 +183,7 @@ def gradient_reports() -> dict[str, PairReport]:
 def write(file: Path, text: str) -> None:
     """Write, but leave the date of an unchanged file alone: Sphinx reads it again otherwise."""
     if not file.is_file() or file.read_text(encoding="utf-8") != text:
-        file.write_text(text, encoding="utf-8")
+        file.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_pages(app: Sphinx) -> None:

@@ -1,4 +1,7 @@
-"""Runs the notebooks of a build before its pages are read, as many at once as there are cores.
+"""Copies the notebooks into the book, and runs them before its pages are read, as many at once as there are cores.
+
+The copies are docs/notebooks, which git ignores: a link in their place would be a text file in a clone on Windows.
+Every build makes them anew, and removes what has no notebook any more.
 
 MyST-NB runs a notebook when it reads its page, one after the other. Here the runs come first, and its cache, which
 lives no longer than the build, hands them to the pages. A notebook that fails is not in the cache: its page runs it
@@ -12,11 +15,26 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from book_pages import DOCS, write
+from package_names import NOTEBOOKS
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.logging import getLogger
 
 logger = getLogger(__name__)
+
+
+def copy_notebooks(app: Sphinx) -> None:
+    """Make docs/notebooks equal to the notebooks; the date of an unchanged copy stays, so that its page is kept."""
+    copies = DOCS / "notebooks"
+    if copies.is_symlink():  # of a checkout that had a link there
+        copies.unlink()
+    copies.mkdir(exist_ok=True)
+    sources = {file.name: file for file in NOTEBOOKS.iterdir() if file.suffix in (".py", ".md")}
+    for name, file in sources.items():
+        write(copies / name, file.read_text(encoding="utf-8"))
+    for stale in (file for file in copies.iterdir() if file.is_file() and file.name not in sources):
+        stale.unlink()
 
 
 def run_notebooks(app: Sphinx, env: BuildEnvironment, names: list[str]) -> None:
@@ -49,6 +67,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Called by Sphinx."""
     kept = os.environ.get("ENDOTSR_DOCS_CACHE")
     app.config.nb_execution_cache_path = kept or tempfile.mkdtemp(prefix="endotsr-notebooks-")
+    app.connect("builder-inited", copy_notebooks)
     app.connect("env-before-read-docs", run_notebooks)
     app.connect("build-finished", forget_runs)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

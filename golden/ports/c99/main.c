@@ -8,7 +8,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _WIN32
+#include <direct.h>
+#define mkdir(path, mode) _mkdir(path)
+#else
 #include <sys/stat.h>
+#endif
 
 static const struct {
     const char *name;
@@ -80,7 +85,7 @@ int main(int count, char **words)
     }
     free(head);
     snprintf(path, sizeof path, "%s/not_ported.txt", words[2]);
-    FILE *file = fopen(path, "w");
+    FILE *file = fopen(path, "wb");
     if (!file || fputs(missing + 1, file) == EOF || fclose(file) != 0)
         fail("%s: cannot be written", path);
     return 0;

@@ -93,7 +93,7 @@ bool setting_is(const Request *request, const char *path, const char *word)
     const char *value = known_setting(request, path);
     value += *value == '"';
     size_t length = strlen(word);
-    return strncmp(value, word, length) == 0 && strchr("\",}\n ", value[length]) != NULL;
+    return strncmp(value, word, length) == 0 && strchr("\",}\r\n ", value[length]) != NULL;
 }
 
 void setting_text(const Request *request, const char *path, char *out, size_t size)

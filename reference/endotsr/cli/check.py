@@ -53,5 +53,5 @@ def run(words: list[str]) -> int:
         write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
     if options.html is not None:
         page = check_page(checked)
-        replace_file(options.html, lambda temporary: temporary.write_text(page, encoding="utf-8"))
+        replace_file(options.html, lambda temporary: temporary.write_text(page, encoding="utf-8", newline="\n"))
     return 1 if checked.refused else 0

@@ -88,7 +88,7 @@ def run(words: list[str]) -> int:
         write_json(options.json, metrics)
     if options.csv:
         text = frames_csv(metrics, metrics.get("label", "this model"))
-        replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
     return 0
 
 

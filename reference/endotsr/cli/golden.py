@@ -135,7 +135,7 @@ def _tell(report, golden, outdir: Path, options: _Reported) -> int:
     if options.json:
         options.json.write_bytes(as_json(report))
     if options.html:
-        options.html.write_text(as_html(report, golden, outdir), encoding="utf-8")
+        options.html.write_text(as_html(report, golden, outdir), encoding="utf-8", newline="\n")
     accepted = all(case.status in ("passed", "not ported") for case in report.cases) if options.only else report.passed
     return 0 if accepted else 1
 

@@ -41,7 +41,7 @@ def run_gradcheck(
     print(summary(reports, precisions), flush=True)
     if json_path is not None:
         try:
-            Path(json_path).write_text(to_json(reports, precisions, seed), encoding="utf-8")
+            Path(json_path).write_text(to_json(reports, precisions, seed), encoding="utf-8", newline="\n")
         except OSError as error:
             raise InputError(f"{json_path}: cannot be written: {error.strerror}") from None
     return 0 if all(r.passed for r in (*reports, *precisions)) else 1

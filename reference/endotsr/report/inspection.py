@@ -21,7 +21,7 @@ SMALL = ("none", "good", "degree 0")
 def write_inspection(path: Path, title: str, inspection: Inspection, plan: Plan) -> None:
     """Write the page, complete or not at all. Raises OSError as the file system reports it."""
     content = inspection_html(title, inspection, plan)
-    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8"))
+    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8", newline="\n"))
 
 
 def inspection_html(title: str, inspection: Inspection, plan: Plan) -> str:

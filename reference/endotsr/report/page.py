@@ -21,7 +21,7 @@ def write_report(path: Path, data: ReportData) -> None:
     Raises   OSError as the file system reports it
     """
     content = report_html(data)
-    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8"))
+    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8", newline="\n"))
 
 
 def report_html(data: ReportData) -> str:

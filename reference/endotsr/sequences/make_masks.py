@@ -73,7 +73,7 @@ def write_proposal(recording: Recording, out: Path) -> Proposal:
         _write_masks(place / MASKS, recording.names, proposal)
         write_png(place / OVERLAY, overlays(recording, proposal))
         about = {"source": recording.where.name, "proposed": True, "excluded_value": "white", "found": proposal.reason}
-        (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+        (place / PROPOSAL).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8", newline="\n")
     return proposal
 
 

@@ -234,7 +234,7 @@ def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:
 
 def write_sequence_file(found: SequenceFile, folder: Path) -> None:
     """Write `sequence.toml`. `read_sequence_file` returns an equal value."""
-    (Path(folder) / FILE_NAME).write_text(sequence_text(found), encoding="utf-8")
+    (Path(folder) / FILE_NAME).write_text(sequence_text(found), encoding="utf-8", newline="\n")
 
 
 def sequence_text(found: SequenceFile) -> str:

@@ -42,7 +42,7 @@ def replace_text(path: Path, text: str) -> None:
     """Replace a text file in one step."""
     temporary = path.with_name(f".partial-{os.getpid()}-{path.name}")
     try:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
         os.replace(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)

@@ -57,8 +57,8 @@ def write_recording(
 
     check_recording(settings)
     scene = make_scene(settings)
-    (folder / CALIBRATION).write_text(calibration_text(scene), encoding="utf-8")
-    (folder / TRAJECTORY).write_text(trajectory_text(scene), encoding="utf-8")
+    (folder / CALIBRATION).write_text(calibration_text(scene), encoding="utf-8", newline="\n")
+    (folder / TRAJECTORY).write_text(trajectory_text(scene), encoding="utf-8", newline="\n")
     write_video(folder / VIDEO, _stacked(folder, scene, name, on_frame), RATE, lossless)
 
 

@@ -111,7 +111,7 @@ def write_scene(folder: Path, scene: Scene, name: str, tracks: MaterialTracks, l
     np.savez(folder / "tracks.npz", light=light, **tracks._asdict())
     record = {"format": FORMAT, "scene": name, "unit": "mm", "effects": effects_on(settings), "settings": settings}
     text = json.dumps(msgspec.to_builtins(record), indent=2) + "\n"
-    (folder / "truth.json").write_text(text, encoding="utf-8")
+    (folder / "truth.json").write_text(text, encoding="utf-8", newline="\n")
 
 
 def noise_sigma(settings: SimulatorSettings) -> float:

@@ -54,7 +54,7 @@ def write_ablation(out: Path, rows: list[dict[str, Any]], command: list[str]) ->
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
     text = ablation_markdown(record) + "\n"
-    replace_file(out / FILES[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    replace_file(out / FILES[1], lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
     if record["increments"]:
         draw(record, out / FILES[2])
     return record

@@ -88,7 +88,9 @@ def write_results(out: Path, rows: list[dict[str, Any]]) -> None:
     """results.json, results.csv and results.md, each replaced whole. Raises OSError."""
     write_json(out / FILES[0], {"format": FORMAT, "date": now(), "rows": rows})
     for name, text in zip(FILES[1:], (results_csv(rows), results_markdown(rows) + "\n"), strict=True):
-        replace_file(out / name, lambda temporary, text=text: temporary.write_text(text, encoding="utf-8"))
+        replace_file(
+            out / name, lambda temporary, text=text: temporary.write_text(text, encoding="utf-8", newline="\n")
+        )
 
 
 def results_csv(rows: list[dict[str, Any]]) -> str:

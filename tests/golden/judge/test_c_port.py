@@ -44,6 +44,17 @@ def test_the_port_passes_level_2(precision, real, tmp_path, capsys):
     assert all(name in claim for name in up_to_2 - PORTED)
 
 
+def test_requests_with_the_line_ends_of_windows_are_read_alike(tmp_path):
+    requests, outputs, golden = tmp_path / "requests", tmp_path / "outputs", read_golden(golden_folder())
+    write_requests(golden, requests, "float64", 2)
+    for file in requests.rglob("*.json"):
+        text = file.read_bytes()
+        assert b"\r" not in text and b"\n" in text, "requests are written with LF everywhere"
+        file.write_bytes(text.replace(b"\n", b"\r\n"))
+    assert run_port(f"{compiled(SOURCES, tmp_path, 'double')} {{requests}} {{outputs}}", requests, outputs, 60) == ""
+    assert judge(golden, outputs, "float64", level=2).level == 2
+
+
 def test_a_mistake_in_its_source_is_named(tmp_path):
     sources, requests, outputs = tmp_path / "c99", tmp_path / "requests", tmp_path / "outputs"
     shutil.copytree(SOURCES, sources)

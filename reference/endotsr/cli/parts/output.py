@@ -60,7 +60,7 @@ def saying(output: Output) -> Iterator[None]:
 
 def _opened(file: Path) -> IO[str]:
     try:
-        return file.open("w", encoding="utf-8", buffering=1)
+        return file.open("w", encoding="utf-8", newline="\n", buffering=1)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
 
