@@ -44,7 +44,7 @@ def compare_methods(asked: Comparison) -> None:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
         text = comparison_csv(rows)
-        replace_file(asked.csv, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        replace_file(asked.csv, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
 
 
 def _named(word: str) -> tuple[str, Path]:
