@@ -14,9 +14,9 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[1]
 # From the ground up. A module imports its own room and the rooms before it, nothing else.
 ROOMS = (
-    "definition", "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv", "sequences",
-    "scene", "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views", "stages", "gradcheck",
-    "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
+    "definition", "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv",
+    "sequences", "scene", "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views",
+    "stages", "gradcheck", "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
 )  # fmt: skip
 METHOD = ("definition", "kernels", "equations", "losses", "splatting", "scene", "fitting")
 LONGEST_FUNCTION = 40  # lines
