@@ -9,13 +9,13 @@ configurations a claim compares stands in `sweeps.ablation.COMPARISONS` alone.
 from typing import Any
 
 import numpy as np
+from claims_cost import planned_hours
 from over_seeds import interval
 
 from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
 from endotsr.sweeps.ablation import COMPARISONS, STEPS, Comparison
 from endotsr.sweeps.ablation_page import increment_table, interval_text, level_table
-from endotsr.sweeps.cost import planned_hours
 
 NOT_YET = "Not measured yet."
 HUNDREDTH = 0.01  # dB

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import msgspec
+from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.golden.contract import all_operations
 from endotsr.golden.judge.compare import judged
 from endotsr.golden.judge.format import Case, Manifest, read_struct
-from endotsr.golden.judge.store import plain_or_none
+from endotsr.golden.judge.npy import Refused, read_plain
 from makers.files import machine_class, rendered_files
 from makers.making import Spec
 from makers.registry import all_specs, all_wrong_ports
@@ -78,7 +79,7 @@ def moved(folder: Path, one: Solved) -> list[str]:
     root = folder / "cases" / one.case.family / one.case.case
     lines = []
     for name, file, value in one.files():
-        old = plain_or_none(root / file)
+        old = _plain_or_none(root / file)
         if old is None or old.shape != value.shape:
             lines.append(f"{one.case.name}/{name}: new")
         elif old.tobytes() != value.tobytes():
@@ -93,6 +94,14 @@ def moved(folder: Path, one: Solved) -> list[str]:
     if (before.settings, before.title, before.flags) != (fresh.settings, fresh.title, fresh.flags):
         lines.append(f"{one.case.name}: settings, title or flags changed")
     return lines
+
+
+def _plain_or_none(path: Path) -> NDArray | None:
+    """An array of the folder, None if it is missing or no plain array."""
+    try:
+        return read_plain(path)
+    except Refused:
+        return None
 
 
 def write(folder: Path) -> list[str]:

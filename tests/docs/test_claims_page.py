@@ -6,6 +6,7 @@ from itertools import pairwise
 import claims
 import numpy as np
 import pytest
+from claims_cost import planned_hours
 from claims_parts import NOT_YET, increment_verdict, level_verdict, protocols, student, tables, verdicts
 from marks import replaced
 from scipy import stats
@@ -13,7 +14,6 @@ from scipy import stats
 from endotsr.cli.ablate import AblateOptions
 from endotsr.cli.parts.fields import fields_of
 from endotsr.sweeps.ablation_page import ablation_record
-from endotsr.sweeps.cost import planned_hours
 
 
 @pytest.mark.parametrize("page", [claims.PAGE, claims.GUIDE], ids=lambda page: page.name)

@@ -3,6 +3,7 @@
 import math
 import re
 
+import effects_study
 import pytest
 from effects_parts import ANSWERED
 from marks import replaced
@@ -79,8 +80,6 @@ def test_words_that_mean_nothing_are_refused(words, named):
 
 def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
     """Made-up answers: stopped after three clips, started again, and written when all are there."""
-    from endotsr.effects import study
-
     asked = []
 
     def answer_of(trial, frames):
@@ -90,16 +89,17 @@ def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
         said = {name: bool(expected) for name, expected in trial.expected.items()}
         return {"key": trial.key, "size": trial.amplitude, "noise": 0.01, "said": said}
 
-    monkeypatch.setattr(study, "answer_of", answer_of)
+    monkeypatch.setattr(effects_study, "answer_of", answer_of)
     monkeypatch.setattr(effects, "RESULTS", tmp_path)
     with pytest.raises(KeyboardInterrupt):
         effects.main(["detect", "1"])
     assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json.part"]
     effects.main(["detect", "1"])
-    clips = [trial.key for trial in study.trials([study.FIRST_SEED])]
+    clips = [trial.key for trial in effects_study.trials([effects_study.FIRST_SEED])]
     assert asked == clips[:4] + clips[3:]
     assert [path.name for path in tmp_path.iterdir()] == ["effects_detect.json"]
     result = effects.read(tmp_path)["detect"]
-    assert result["first_seed"] == study.FIRST_SEED and result["clips"] == len(clips)
+    assert result["first_seed"] == effects_study.FIRST_SEED and result["clips"] == len(clips)
     text = effects.fragments({"detect": result})["detections"]
-    assert f"seeds {study.FIRST_SEED} to {study.FIRST_SEED}, which no threshold was set with" in text
+    first = effects_study.FIRST_SEED
+    assert f"seeds {first} to {first}, which no threshold was set with" in text

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.golden.judge.format import Case, FileEntry, Manifest, read_struct
 from endotsr.golden.judge.npy import LARGEST as LARGEST_ARRAY
-from endotsr.golden.judge.npy import Refused, read_plain
+from endotsr.golden.judge.npy import read_plain
 from endotsr.untrusted.files import read_bytes, read_text
 
 
@@ -89,11 +89,3 @@ def _verify(folder: Path, entry: FileEntry) -> None:
         raise InputError(f"{error}; the golden folder is incomplete") from None
     if hashlib.sha256(data).hexdigest() != entry.sha256:
         raise InputError(f"{path}: differs from the checksum in manifest.json; the golden folder is damaged")
-
-
-def plain_or_none(path: Path) -> NDArray | None:
-    """An array of the folder, None if it is missing or no plain array."""
-    try:
-        return read_plain(path)
-    except Refused:
-        return None
