@@ -1,7 +1,8 @@
 """The shape of the package, read from its sources: python tests/house.py [FOLDER OF ANOTHER CHECKOUT]
 
-Prints the lines of the method and of the instruments around it, modules at the root, long functions and signatures,
-and every import that runs up or round in a circle. `test_layout.py` asserts what must stay true.
+Prints the lines of every room of the package, of the method, and of the programs beside it that are not installed;
+the numbers of settings and commands; the longest signature; long functions; and every import that runs up or round in
+a circle. `test_layout.py` asserts what must stay true.
 """
 
 import ast
@@ -19,8 +20,10 @@ ROOMS = (
     "stages", "gradcheck", "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
 )  # fmt: skip
 METHOD = ("definition", "kernels", "equations", "losses", "splatting", "scene", "fitting")
+GROUND = ("errors", "untrusted", "config", "opencv", "sequences")  # what the method may know beside itself
+BESIDE = ("golden", "docs/pages")  # folders of programs that run in the repository and are not installed
 LONGEST_FUNCTION = 40  # lines
-MOST_ARGUMENTS = 12
+MOST_POSITIONAL = 12
 
 
 class Function(NamedTuple):
@@ -28,7 +31,7 @@ class Function(NamedTuple):
 
     name: str  # dotted, below the package
     lines: int
-    arguments: int
+    positional: int  # parameters that may be given by position
 
 
 @cache
@@ -103,7 +106,7 @@ def functions(root: Path = ROOT) -> Iterator[Function]:
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 a = node.args
-                count = len(a.posonlyargs) + len(a.args) + len(a.kwonlyargs)
+                count = len(a.posonlyargs) + len(a.args)
                 first = node.body[1] if ast.get_docstring(node) and len(node.body) > 1 else node.body[0]
                 lines = (node.end_lineno or node.lineno) - first.lineno + 1
                 yield Function(f"{name}.{node.name}", lines, count)
@@ -114,22 +117,63 @@ def lines_of(root: Path = ROOT) -> dict[str, int]:
     package, found = root / "reference" / "endotsr", {}
     for file in package.rglob("*.py"):
         first = file.relative_to(package).parts[0].removesuffix(".py")
-        found[first] = found.get(first, 0) + len(file.read_text(encoding="utf-8").splitlines())
+        found[first] = found.get(first, 0) + _count(file)
     return found
+
+
+def lines_beside(root: Path = ROOT) -> dict[str, int]:
+    """Lines of the programs that are not installed, ports of other authors left out."""
+    found = {}
+    for name in BESIDE:
+        files = [file for file in (root / name).rglob("*.py") if "ports" not in file.parts]
+        found[name] = sum(map(_count, files))
+    return found
+
+
+def _count(file: Path) -> int:
+    return len(file.read_text(encoding="utf-8").splitlines())
+
+
+def settings(root: Path = ROOT) -> list[str]:
+    """Every key of the configuration, as section.name; one that stands outside the sections by its name alone."""
+    sections = {node.name: node for node in modules(root)["config"].body if isinstance(node, ast.ClassDef)}
+    fields = lambda section: [node for node in section.body if isinstance(node, ast.AnnAssign)]
+    found = []
+    for field in fields(sections["Config"]):
+        name, section = ast.unparse(field.target), sections.get(ast.unparse(field.annotation))
+        found += [f"{name}.{ast.unparse(key.target)}" for key in fields(section)] if section else [name]
+    return found
+
+
+def commands(root: Path = ROOT) -> list[str]:
+    """The words that may follow `endotsr`."""
+    for node in modules(root)["cli.main"].body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "COMMANDS":
+            return list(ast.literal_eval(node.value))
+    raise ValueError("cli/main.py has no table COMMANDS")
 
 
 def main(root: Path) -> None:
     """Print the measures."""
     lines, found = lines_of(root), list(functions(root))
+    rank = {name: k for k, name in enumerate(ROOMS)}
+    for name in sorted(lines, key=lambda name: rank.get(name, len(rank))):
+        print(f"    {lines[name]:6d} {name}")
     method = sum(lines.get(name, 0) for name in METHOD)
-    print(f"lines: {sum(lines.values())}, of the method ({', '.join(METHOD)}): {method}")
-    print("modules at the root:", sum(1 for file in (root / "reference" / "endotsr").glob("*.py")))
-    widest, long = max(found, key=lambda f: f.arguments), [f for f in found if f.lines > LONGEST_FUNCTION]
-    print(f"most arguments: {widest.arguments} ({widest.name}); functions above {LONGEST_FUNCTION} lines: {len(long)}")
+    print(f"lines of the wheel: {sum(lines.values())}, of the method ({', '.join(METHOD)}): {method}")
+    print("lines beside it, not installed:", ", ".join(f"{name} {n}" for name, n in lines_beside(root).items()))
+    print(f"modules at the root: {sum(1 for file in (root / 'reference' / 'endotsr').glob('*.py'))}")
+    print(f"settings: {len(settings(root))}; commands: {len(commands(root))}")
+    widest = max(found, key=lambda f: f.positional)
+    wide = [f for f in found if f.positional > MOST_POSITIONAL]
+    print(f"longest signature: {widest.positional} positional parameters ({widest.name})")
+    print(f"functions with more than {MOST_POSITIONAL}: {len(wide)}")
+    for f in sorted(wide, key=lambda f: -f.positional):
+        print(f"    {f.positional:4d} {f.name}")
+    long = [f for f in found if f.lines > LONGEST_FUNCTION]
+    print(f"functions above {LONGEST_FUNCTION} lines: {len(long)}")
     for f in sorted(long, key=lambda f: -f.lines):
         print(f"    {f.lines:4d} {f.name}")
-    wide = [f for f in found if f.arguments > MOST_ARGUMENTS]
-    print(f"functions with more than {MOST_ARGUMENTS} arguments: {len(wide)}")
     up, round_ = upward(root), circles(root)
     print("imports that run up:", len(up), *up, sep="\n    ")
     print("circles:", len(round_), *round_, sep="\n    ")

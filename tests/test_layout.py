@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 
+import msgspec
 import pytest
 
 import house
@@ -63,9 +64,36 @@ def test_the_trainer_knows_no_file_format():
     assert {b for a, b in house.imports() if house.room(a) == "fitting" and house.room(b) == "sequences"} <= known
 
 
+def test_rooms_of_the_method_import_no_instrument():
+    """Beside one another they know the ground alone, and of the readers the sequence as it is held in memory."""
+    known = {*house.METHOD, *house.GROUND}
+    assert [(a, b) for a, b in house.imports() if house.room(a) in house.METHOD and house.room(b) not in known] == []
+
+
+def test_the_package_imports_nothing_that_is_not_installed():
+    """Makers of golden vectors and of pages import the package, never the other way."""
+    beside = {file.stem for name in house.BESIDE for file in (house.ROOT / name).glob("*.py")} | {"makers"}
+    assert len(beside) > 30 and not beside & sys.stdlib_module_names
+    for name, tree in house.modules().items():
+        found = {alias.name for n in ast.walk(tree) if isinstance(n, ast.Import) for alias in n.names}
+        found |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+        assert not {module.split(".")[0] for module in found} & beside, name
+
+
 @pytest.mark.parametrize("name", ["scene", "splatting", "losses", "equations"])
 def test_what_is_fitted_does_not_know_the_optimiser(name):
     assert not [b for a, b in house.imports() if house.room(a) == name and house.room(b) == "fitting"]
+
+
+def test_settings_and_commands_are_counted():
+    """Read from the sources, they are those that the package has."""
+    from endotsr.cli.main import COMMANDS
+    from endotsr.config import PAPER
+
+    data = msgspec.to_builtins(PAPER)
+    preset = data.pop("preset")
+    assert house.settings() == ["preset"] * bool(preset) + [f"{name}.{key}" for name in data for key in data[name]]
+    assert house.commands() == [*COMMANDS]
 
 
 def test_an_import_that_runs_up_is_seen(tmp_path):

@@ -1,6 +1,9 @@
 """The wheel holds the package, its data files and its licence, and nothing else."""
 
+import ast
 import email
+import re
+import sys
 import zipfile
 from pathlib import Path
 
@@ -42,3 +45,28 @@ def test_the_metadata_is_complete(wheel):
     assert found["Summary"] and found["Author"] and len(found.get_all("Classifier")) > 5
     assert found["Description-Content-Type"] == "text/markdown" and "## Two commands" in found.get_payload()
     assert {"test", "docs", "mesh", "peers", "cluster"} == {*found.get_all("Provides-Extra")}
+
+
+# Distributions whose import has another name.
+IMPORTED_AS = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL", "scikit-image": "skimage"}
+INDIRECT = {"llvmlite": "numba", "pytest": "test", "dask": "distributed"}  # comes with; pytest calls the door for ports
+
+
+def test_the_wheel_needs_what_the_package_imports_and_nothing_else(wheel):
+    """What only tests and the programs of the repository import is no dependency of a user."""
+    found = email.message_from_bytes(next(text for name, text in wheel.items() if name.endswith("/METADATA")))
+    needed, extra = set(), set()
+    for line in found.get_all("Requires-Dist"):
+        name = re.match(r"[\w.-]+", line)[0]
+        (extra if "extra ==" in line else needed).add(IMPORTED_AS.get(name, name))
+    imported = set()
+    for name, content in wheel.items():
+        if name.endswith(".py"):
+            for node in ast.walk(ast.parse(content)):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom):
+                    imported.add((node.module or "").split(".")[0])
+    imported -= {*sys.stdlib_module_names, "endotsr"}
+    assert needed <= imported, f"nobody imports {needed - imported}"
+    assert imported - needed - extra - {*INDIRECT} == set()
