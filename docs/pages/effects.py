@@ -35,6 +35,7 @@ FILES = {
     "detect": "effects_detect.json", "train": "effects_train.json", "real": "effects_real.json",
     "truth": "effects_truth.json", "bench": "bench_effects.json",
 }  # fmt: skip
+STUDY = ("effects_study",)  # makes the clips
 SEEDS, FRAMES, TRAIN_FRAMES, ITERATIONS, REAL_ITERATIONS = 5, 40, 24, DEMO.training.iterations, 1000
 SCENES = {
     "still": ("noise",),
@@ -60,7 +61,7 @@ def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
         print(f"{key}: {', '.join(wrong(clips[key], answer['said'])) or 'right'}", flush=True)
         return answer
 
-    about = {"frames": FRAMES, "sources": kept.sources("effects", "simulator")}
+    about = {"frames": FRAMES, "sources": kept.sources("effects", "simulator", beside=STUDY)}
     return summary(chosen, FRAMES, kept.measured(RESULTS / FILES["detect"], about, clips, measure))
 
 
@@ -89,7 +90,9 @@ def train(seeds: int, names: list[str]) -> dict[str, Any]:
         return found
 
     about = {"frames": TRAIN_FRAMES, "iterations": ITERATIONS, "real_iterations": REAL_ITERATIONS}
-    answers = kept.measured(RESULTS / FILES["train"], about | {"sources": kept.sources("")}, pairs, measure)
+    answers = kept.measured(
+        RESULTS / FILES["train"], about | {"sources": kept.sources("", beside=STUDY)}, pairs, measure
+    )
     found = {name: [answers[f"{name} {seed}"] for seed in range(seeds)] for name in every}
     return {"seeds": seeds, **about, "scenes": found, "real": list(folders)}
 

@@ -43,7 +43,7 @@ def truth(file: Path, seeds: int, iterations: int) -> dict[str, Any]:
         return found
 
     about = {"frames": FRAMES, "iterations": iterations}
-    answers = kept.measured(file, about | {"sources": kept.sources("")}, runs, measure)
+    answers = kept.measured(file, about | {"sources": kept.sources("", beside=("effects_study",))}, runs, measure)
     scenes = {s: {v: [answers[f"{s} {v} {seed}"] for seed in range(seeds)] for v in VARIANTS} for s in SCENES}
     return {"seeds": seeds, **about, "scenes": scenes}
 

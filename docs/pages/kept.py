@@ -66,12 +66,17 @@ def _with_threads(count: int) -> None:
     os.environ["NUMBA_NUM_THREADS"] = str(max(1, count))
 
 
-def sources(*rooms: str) -> str:
-    """First 16 hex digits of the SHA-256 over the source files of rooms of the package; "" is the whole package."""
+def sources(*rooms: str, beside: Iterable[str] = ()) -> str:
+    """First 16 hex digits of the SHA-256 over the source files of rooms of the package; "" is the whole package.
+
+    beside  names of modules of this folder that take part in the measurement
+    """
     package, digest = Path(endotsr.__file__).parent, hashlib.sha256()
     for room in rooms:
         for file in sorted((package / room).rglob("*.py")):
             digest.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
+    for name in beside:
+        digest.update(name.encode() + Path(__file__).with_name(f"{name}.py").read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -124,7 +124,8 @@ def found(clips: dict[str, str], seeds: int, jobs: int) -> dict[str, Any]:
     ]
     runs = {f"{', '.join(row)}, seed {seed}": (*row, seed) for seed in range(seeds) for row in rows}
     about = {
-        "sources": kept.sources(""), "size": SIZE, "frames": FRAMES, "iterations": (ITERATIONS, CLIP_ITERATIONS),
+        "sources": kept.sources("", beside=("effects_study",)),
+        "size": SIZE, "frames": FRAMES, "iterations": (ITERATIONS, CLIP_ITERATIONS),
         "swing": SWING, "breath": BREATH, "error": ERROR, "step": STEP, "settings": SETTINGS, "scenes": SCENES,
     }  # fmt: skip
     answers = kept.measured(FILE, about, runs, partial(measured, runs=runs, clips=clips), jobs)

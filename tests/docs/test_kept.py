@@ -74,3 +74,4 @@ def test_a_changed_source_is_another_measurement(tmp_path, monkeypatch):
     assert kept.sources("") == whole != room and kept.sources("simulator") != room
     (package / "effects" / "one.py").write_text("x = 2\n", encoding="utf-8")
     assert kept.sources("") != whole and kept.sources("effects") != room
+    assert kept.sources("effects", beside=("marks",)) != kept.sources("effects", beside=("kept",))

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Line = Callable[[float], NDArray | None]
 
@@ -33,21 +33,6 @@ class Difference(NamedTuple):
     error: float
     step: float
     refused: bool = False
-
-
-def central_difference(line: Callable[[float], ArrayLike], step: float) -> float:
-    """(f(h) - f(-h)) / 2h, error O(h^2)."""
-    return float(np.sum(np.asarray(line(step)) - np.asarray(line(-step))) / (2 * step))
-
-
-def five_point_difference(line: Callable[[float], ArrayLike], step: float) -> float:
-    """(8 (f(h) - f(-h)) - (f(2h) - f(-2h))) / 12h, error O(h^4)."""
-    return (4 * central_difference(line, step) - central_difference(line, 2 * step)) / 3
-
-
-def complex_step(line: Callable[[complex], ArrayLike], step: float = 1e-40) -> float:
-    """Im f(ih) / h: no subtraction, exact to rounding. For smooth functions that accept complex input."""
-    return float(np.sum(np.imag(line(1j * step))) / step)
 
 
 def plateau_difference(line: Line, eps: float = float(np.finfo(np.float64).eps)) -> Difference:
@@ -144,10 +129,3 @@ def taylor_slope(line: Line, derivative: float, steps: Sequence[float] = LADDER)
         return Taylor(np.inf, linear=True)
     (coarse, above), (fine, below) = points[-2:]
     return Taylor(float(np.log(above / below) / np.log(coarse / fine)), linear=False)
-
-
-def adjoint_gap(jacobian_v: ArrayLike, u: ArrayLike, v: ArrayLike, transpose_u: ArrayLike) -> float:
-    """|<Jv, u> - <v, J^T u>| over the larger of the two; inf when both are zero (nothing was tested)."""
-    one, two = float(np.sum(np.multiply(jacobian_v, u))), float(np.sum(np.multiply(v, transpose_u)))
-    larger = max(abs(one), abs(two))
-    return abs(one - two) / larger if larger > 0 else np.inf

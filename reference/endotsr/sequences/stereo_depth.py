@@ -18,7 +18,6 @@ from endotsr.sequences.recording import Lens, Picture
 
 MULTIPLE = 16  # OpenCV searches multiples of this many disparities
 MOST = 512  # searched disparities; more would be a wrong calibration
-SUBPIXEL = 0.5  # px of disparity: between two frames, matching noise is below this
 
 
 class StereoSettings(Section, frozen=True, kw_only=True):
