@@ -4,8 +4,8 @@ In: for every calibration view the RMS, over all pixels and channels, of the gra
 and of L_lap by the unclamped render. Out: lambda_lap = r / median over the views of (g_lap / g_rgb). The trainer
 renders the views; this module does not depend on it.
 
-For a mean-L1 loss these RMS values depend on how many residuals are nonzero, not on their size: the ratio
-measures how concentrated the two gradients are.
+For a mean of absolute values these RMS values depend on the signs of the residuals, not on their size: that of (B6) on
+how many are nonzero, that of (5) on the pattern of signs of the bands.
 """
 
 import math
