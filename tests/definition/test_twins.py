@@ -17,7 +17,8 @@ def stored(name):
     for case in GOLDEN.cases:
         if case.operation == name:
             inputs = {key: GOLDEN.array(case, array.file) for key, array in case.inputs.items()}
-            yield Request(f"golden {case.name}", inputs, case.settings, tuple(case.outputs))
+            asked = tuple(output for output, o in case.outputs.items() if o.compare.float64 < 1)  # else: any value
+            yield Request(f"golden {case.name}", inputs, case.settings, asked)
 
 
 @pytest.mark.parametrize("name", TWINS)

@@ -1,13 +1,14 @@
-"""The flexible deformation model, equation (B1), against its oracle and on its hard cases F1-F9."""
+"""The flexible deformation model, equation (B1), against its definition and on its hard cases F1-F9."""
 
 import numba
 import numpy as np
 import pytest
 
+from endotsr.definition import deformation as definition
 from endotsr.equations.deformation import BASES, deformation_forward, deformation_reverse
 from endotsr.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
 from endotsr.gradcheck import all_pairs
-from oracle import deformation as oracle
+from oracle.complex_step import derivative
 
 PAIRS = [pair for pair in all_pairs().values() if pair.equation == "B1"]
 UNIT = {"float32": 2.0**-24, "float64": 2.0**-53}
@@ -28,11 +29,11 @@ def arrays(rng, bases=4, count=7, dtype=np.float64):
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_values_equal_the_oracle(rng, basis, dtype):
+def test_values_equal_the_definition(rng, basis, dtype):
     """8 u a basis value of absolute weight at most 1, summed over B bases: 8 B u."""
     weight, centre, width = arrays(rng, dtype=dtype)
     out, _ = deformation_forward(weight, centre, width, 0.375, basis)
-    truth = oracle.offsets(*(a.astype(np.float64) for a in (weight, centre, width)), 0.375, basis)
+    truth, _ = definition.deformation_forward(*(a.astype(np.float64) for a in (weight, centre, width)), 0.375, basis)
     assert out.dtype == dtype
     assert np.abs(truth).max() > 0.3
     assert np.abs(out - truth).max() <= 8 * weight.shape[1] * UNIT[dtype]
@@ -40,19 +41,25 @@ def test_values_equal_the_oracle(rng, basis, dtype):
 
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_gradients_equal_complex_steps_of_the_oracle(rng, basis, dtype):
+def test_gradients_equal_complex_steps_of_the_definition(rng, basis, dtype):
     """Gradients carry factors up to 1/S = 1e4; the bound is relative to the largest entry of each array."""
     weight, centre, width = arrays(rng, bases=3, count=2, dtype=dtype)
     d_offsets = rng.normal(size=(10, 2)).astype(dtype)
     _, saved = deformation_forward(weight, centre, width, 0.5, basis)
     grads = deformation_reverse(d_offsets, saved)
-    exact = [a.astype(np.float64) for a in (weight, centre, width)]
+    exact = {name: a.astype(np.float64) for name, a in zip(("weight", "centre", "width"), (weight, centre, width))}
+    exact["t"] = np.array(0.5)
+
+    def weighted(name, moved):
+        psi, _ = definition.deformation_forward(*(exact | {name: moved}).values(), basis)
+        return (d_offsets.astype(np.float64) * psi).sum()
+
     for name in ("weight", "centre", "width"):
-        truth = oracle.derivative(*exact, 0.5, basis, d_offsets.astype(np.float64), name)
+        truth = derivative(lambda moved, name=name: weighted(name, moved), exact[name])
         found = getattr(grads, f"d_fdm_{name}")
         assert found.dtype == dtype
         assert np.abs(found - truth).max() <= 64 * UNIT[dtype] * np.abs(truth).max(), name
-    truth = oracle.derivative_by_time(*exact, 0.5, basis, d_offsets.astype(np.float64))
+    truth = derivative(lambda moved: weighted("t", moved), exact["t"])
     scale = np.abs(grads.d_fdm_centre).sum()
     assert abs(grads.d_t - truth) <= 64 * UNIT[dtype] * scale
 
@@ -122,7 +129,7 @@ def test_hard_F5_smallest_sizes(rng, bases, count):
     assert out.shape == (10, count)
     assert grads.d_fdm_weight.shape == weight.shape
     last = slice(max(count - 2, 0), None)
-    truth = oracle.offsets(weight[..., last], centre[..., last], width[..., last], 0.4, "quartic")
+    truth, _ = definition.deformation_forward(weight[..., last], centre[..., last], width[..., last], 0.4)
     np.testing.assert_allclose(out[:, last], truth, rtol=0, atol=1e-14)
 
 

@@ -5,11 +5,12 @@ import numba
 import numpy as np
 import pytest
 
+from endotsr.definition import appearance as definition
+from endotsr.definition import motion as motion_definition
 from endotsr.equations import appearance, atom_sums
 from endotsr.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.equations.motion import motion_forward, motion_reverse
 from endotsr.kernels.constants import Y00
-from oracle import residuals_oracle
 
 BETA = 0.3
 DTYPES = [np.float32, np.float64]
@@ -34,22 +35,23 @@ def one_argument(x, dtype):
 
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("n", [0, 1, 7, 70, 1100])
-def test_residuals_against_oracle(n, dtype):
+def test_residuals_equal_their_definition(n, dtype):
     coefficients, atoms, upstream = case(n, dtype)
     wide = [a.astype(np.float64) for a in (coefficients, atoms, upstream)]
     bound = 64 * unit(dtype)  # 16 products and sums of size <= 4, then the squashing
     residual, saved = appearance_forward(coefficients, atoms, BETA)
     assert residual.dtype == dtype
-    np.testing.assert_allclose(residual, residuals_oracle.colour_residual(*wide[:2], BETA), rtol=0, atol=bound)
+    expected_residual, wide_saved = definition.appearance_forward(*wide[:2], BETA)
+    np.testing.assert_allclose(residual, expected_residual, rtol=0, atol=bound)
     grads = appearance_reverse(upstream, saved)
-    for found, expected in zip(grads, residuals_oracle.colour_gradients(wide[2], wide[0], wide[1], BETA)):
+    for found, expected in zip(grads, definition.appearance_reverse(wide[2], wide_saved)):
         assert found.dtype == dtype
         np.testing.assert_allclose(found, expected, rtol=bound, atol=bound * (1 + np.abs(expected).max(initial=0)))
     translation, saved = motion_forward(coefficients, atoms)
-    np.testing.assert_allclose(translation, residuals_oracle.linear(*wide[:2]), rtol=0, atol=bound)
-    for found, expected in zip(
-        motion_reverse(upstream, saved), residuals_oracle.linear_gradients(wide[2], wide[0], wide[1])
-    ):
+    expected_translation, wide_saved = motion_definition.motion_forward(*wide[:2])
+    np.testing.assert_allclose(translation, expected_translation, rtol=0, atol=bound)
+    wanted = motion_definition.motion_reverse(wide[2], wide_saved)
+    for found, expected in zip(motion_reverse(upstream, saved), wanted):
         np.testing.assert_allclose(found, expected, rtol=bound, atol=bound * (1 + np.abs(expected).max(initial=0)))
 
 

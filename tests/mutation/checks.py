@@ -1,8 +1,8 @@
 """The checks of mutants: gradient checks, golden cases and tests, each with the kernels it runs.
 
-The suites: `gradcheck` the public checker on the registered pairs; `oracle` tests that compare with tests/oracle or
-with a library; `hard` the tests named after the catalogue of hard cases; `properties` all other tests; `golden` the
-expected arrays of the folder golden/.
+The suites: `gradcheck` the public checker on the registered pairs; `oracle` tests that compare with the definition,
+with tests/oracle or with a library; `hard` the tests named after the catalogue of hard cases; `properties` all other
+tests; `golden` the expected arrays of the folder golden/.
 """
 
 import inspect
@@ -29,6 +29,7 @@ from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")
 SLOW = 1.0  # s of processor time; a check that takes longer without the compiler is left out
+INDEPENDENT = re.compile(r"oracle|mpmath|scipy|skimage|cv2|definition\.|by_definition|(the|its|their)_definition")
 BLOCKS = 0.01  # s; a forward pass as quick as this is also differentiated block by block
 
 
@@ -163,4 +164,4 @@ def suite_of(item: pytest.Function) -> str:
     if item.name.startswith("test_hard_"):
         return "hard"
     source = inspect.getsource(item.function)
-    return "oracle" if re.search(r"oracle|mpmath|scipy|skimage|cv2", item.nodeid + source) else "properties"
+    return "oracle" if INDEPENDENT.search(item.nodeid + source) else "properties"

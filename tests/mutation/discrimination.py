@@ -42,6 +42,7 @@ from mutation.survey import Checks  # noqa: E402
 FOLDERS = (
     "kernels/test_exponential.py",
     "kernels/test_sums.py",
+    "definition",
     "equations",
     "splatting",
     "losses",

@@ -127,7 +127,7 @@ SUITES = (
     "- `gradcheck`: the public checker on the registered pairs. A mutant that only the reverse pass runs is compared "
     "with the differences of the correct forward pass, along every line of the checker. Any other mutant is compared "
     "along two joint lines, and along two lines of every block where the forward pass is fast.",
-    "- `oracle`: tests that compare with an independent formula or library.",
+    "- `oracle`: tests that compare with the definition, with another independent formula or with a library.",
     "- `golden`: the reference against the stored answers of `golden/`, both paths in float64, the definition in "
     "float32.",
     "- `hard`: the tests named after the catalogue of hard cases.",

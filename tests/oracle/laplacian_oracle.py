@@ -1,4 +1,4 @@
-"""Equation (5) with dense matrices: the filter from scipy, the interpolation from numpy, two pyramids taken apart."""
+"""The supports of the pyramid (5) in two other ways, by impulse responses and by a mask of numbers; filter of scipy."""
 
 import numpy as np
 from scipy.ndimage import correlate1d
@@ -10,27 +10,15 @@ def reduce_matrix(n):
 
 
 def expand_matrix(n, rule):
-    """(n, ceil(n/2)): linear interpolation, constant beyond the end samples."""
+    """(n, ceil(n/2)): the two weights of every fine sample, the end sample repeated beyond the ends."""
     m = (n + 1) // 2
-    fine = np.arange(n) / 2 if rule == "co_sited" else (np.arange(n) + 0.5) / 2 - 0.5
-    return np.stack([np.interp(fine, np.arange(m), row) for row in np.eye(m)], axis=1)
-
-
-def both_axes(matrix_of, image, *arguments):
-    rows = matrix_of(arguments[0][0], *arguments[1:])
-    columns = matrix_of(arguments[0][1], *arguments[1:])
-    return np.einsum("yh,chw,xw->cyx", rows, image, columns, optimize=True)
-
-
-def pyramid(image, rule, levels=3):
-    """bands, coarsest image"""
-    bands = []
-    for _ in range(levels):
-        shape = image.shape[1:]
-        coarse = both_axes(reduce_matrix, image, shape)
-        bands.append(image - both_axes(expand_matrix, coarse, shape, rule))
-        image = coarse
-    return bands, image
+    wide = np.pad(np.eye(m), ((1, 1), (0, 0)), mode="edge")  # row k + 1 is coarse sample k
+    even, odd = (0.0, 0.5) if rule == "co_sited" else (0.25, 0.75)  # weight of the earlier coarse sample
+    rows = [
+        even * wide[k] + (1 - even) * wide[k + 1] if i % 2 == 0 else odd * wide[k + 1] + (1 - odd) * wide[k + 2]
+        for i, k in ((i, i // 2) for i in range(n))
+    ]
+    return np.array(rows)
 
 
 def _valid(matrix_rows, matrix_columns, mask):
@@ -54,12 +42,11 @@ def masks_by_impulse_response(mask, rule, levels=3):
 
 def masks_by_float(mask, rule, levels=3):
     """A mask of ones sent through the dyadic weights: valid where it is still exactly 1."""
-    image = mask[None].astype(float)
-    found = []
+    image, found = mask.astype(float), []
     for _ in range(levels):
-        coarse = both_axes(reduce_matrix, image, image.shape[1:])
-        smooth = both_axes(expand_matrix, coarse, image.shape[1:], rule)
-        found.append(((image == 1.0) & (smooth == 1.0))[0])
+        h, w = image.shape
+        coarse = reduce_matrix(h) @ image @ reduce_matrix(w).T
+        found.append((image == 1.0) & (expand_matrix(h, rule) @ coarse @ expand_matrix(w, rule).T == 1.0))
         image = coarse
     return found
 
@@ -75,31 +62,3 @@ def footprint_lengths(n, rule, levels=3):
         found.append({int(count) for count in union[inner].sum(axis=1)})
         to = following
     return found
-
-
-def loss(rendered, observed, masks, rule):
-    with np.errstate(invalid="ignore"):
-        a, _ = pyramid(rendered, rule, len(masks))
-        b, _ = pyramid(observed, rule, len(masks))
-    total = 0.0
-    for p, q, valid in zip(a, b, masks):
-        if valid.any():
-            total += np.abs(p - q)[:, valid].mean()
-    return total / len(masks)
-
-
-def loss_gradient(rendered, observed, masks, rule):
-    gradient = np.zeros_like(rendered)
-    difference = rendered - observed
-    bands, _ = pyramid(difference, rule, len(masks))
-    channels, h, w = rendered.shape
-    to_rows, to_columns = np.eye(h), np.eye(w)
-    for band, valid in zip(bands, masks):
-        lh, lw = valid.shape
-        sign = np.sign(band) * valid / max(1, channels * valid.sum()) / len(masks)
-        next_rows, next_columns = reduce_matrix(lh) @ to_rows, reduce_matrix(lw) @ to_columns
-        smooth_rows = expand_matrix(lh, rule) @ next_rows
-        smooth_columns = expand_matrix(lw, rule) @ next_columns
-        gradient += to_rows.T @ sign @ to_columns - smooth_rows.T @ sign @ smooth_columns
-        to_rows, to_columns = next_rows, next_columns
-    return gradient

@@ -112,16 +112,6 @@ def run(
     return out._asdict(), {name: a for name, a in named.items() if a is not None}
 
 
-def rules(settings: RasterSettings) -> dict:
-    """The settings as the oracle takes them."""
-    return {name: value for name, value in settings._asdict().items() if name != "deviations"}
-
-
-def lens(camera: Camera) -> tuple:
-    """Intrinsics as the oracle takes them."""
-    return camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height
-
-
 def deviating(settings: RasterSettings, **flags: bool) -> RasterSettings:
     """The settings with exactly these deviations."""
     return settings._replace(deviations=LegacyDeviations(**flags))

@@ -15,10 +15,10 @@ from made_up_scenes import (
     screen_scene,
 )
 
+from endotsr.definition.compositing import opacity_of
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.records import log_opacity
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER
-from oracle import splatting_oracle as oracle
 
 PIXEL = Camera(np.eye(3), np.zeros(3), 10.0, 10.0, 0.5, 0.5, 1, 1)
 BACKGROUND = np.array([0.3, 0.6, 0.1])
@@ -68,7 +68,7 @@ def test_hard_A4_stacks_against_the_recursion_by_hand(name, dtype, u):
     given = tuple(a.astype(dtype) for a in GIVEN)
     images, gradients = run(scene, PIXEL, EXACT, background=BACKGROUND, given=given)
     assert_finite(images, gradients)
-    used = oracle.sigmoid(scene.opacity_logit.astype(np.longdouble))
+    used = opacity_of(scene.opacity_logit.astype(np.longdouble))
     shown = 0.5 + Y00 * scene.harmonics[0].astype(np.longdouble)
     colour, depth, opacity, by_alpha, by_rgb, by_background = by_hand(used, shown, scene.position[2], given)
     by_logit = by_alpha * used * (1 - used)

@@ -11,10 +11,8 @@ from made_up_scenes import (
     assert_close_l2,
     assert_finite,
     deviating,
-    lens,
     plain_camera,
     random_scene,
-    rules,
     run,
     select,
     threads,
@@ -23,12 +21,14 @@ from made_up_scenes import (
 
 from data_folder import data_folder
 from endotsr.config import ModelConfig
+from endotsr.definition import render as definition
+from endotsr.definition.compositing import composite_reverse as composite_by_definition
+from endotsr.definition.covariance import covariance_matrix
 from endotsr.fitting.model import scene_at, spectral_from
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import Scene, check_scene, render_forward, render_reverse
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, PRESETS
-from oracle import splatting_oracle as oracle
 
 __all__ = ["threads"]
 BACKGROUND = np.array([0.3, 0.6, 0.1])
@@ -231,18 +231,10 @@ def test_legacy_double_clamp_term_doubles_exactly_the_share_of_z_under_the_clamp
     difference = camera.rotation @ (double["position"] - plain["position"])
     free = ~(clamped_x | clamped_y)
     assert (difference[:, free] == 0).all() and np.abs(difference[:2]).max() <= 1e-12 * np.abs(difference).max()
-    # g_J02 and g_J12 from the gradient by (a, b, c), which the oracle's compositing reverse gives
-    sigma = oracle.covariance(scene.quaternion, scene.log_scale)
-    u, v, a, b, c, z = oracle.project(
-        scene.position, sigma, (camera.rotation, camera.translation), lens(camera), rules(PAPER)
-    )
-    centre = -camera.rotation.T @ camera.translation
-    rgb = oracle.colour(scene.harmonics, scene.residual, scene.position, centre, 3)
-    given = cotangents_as_in_run(camera)
-    abc = oracle.composite_reverse(
-        *given, u, v, a, b, c, z, oracle.sigmoid(scene.opacity_logit), z > 0.2, rgb, np.zeros(3),
-        camera.width, camera.height, rules(PAPER), False,
-    )["covariance2d"]  # fmt: skip
+    # g_J02 and g_J12 from the gradient by (a, b, c), which the definition's compositing reverse gives
+    _, saved = definition.render_forward(scene, camera, PAPER)
+    abc = composite_by_definition(*cotangents_as_in_run(camera), saved.composite).d_covariance2d
+    sigma, z = covariance_matrix(saved.projection.shape), np.where(saved.projection.visible, seen[2], 1)
     slope_x, slope_y = np.clip(seen[0] / z, -limit_x, limit_x), np.clip(seen[1] / z, -limit_y, limit_y)
     nil = np.zeros_like(z)
     j = np.array([[camera.fx / z, nil, -camera.fx * slope_x / z], [nil, camera.fy / z, -camera.fy * slope_y / z]])
@@ -266,11 +258,8 @@ def test_legacy_conic_epsilon_scales_the_gradient_of_the_shape():
     scene, camera, _ = deviation_scene()
     plain = run(scene, camera, PAPER, "definition")[1]
     other = run(scene, camera, deviating(PAPER, conic_epsilon=True), "definition")[1]
-    sigma = oracle.covariance(scene.quaternion, scene.log_scale)
-    _, _, a, b, c, _ = oracle.project(
-        scene.position, sigma, (camera.rotation, camera.translation), lens(camera), rules(PAPER)
-    )
-    square = (a * c - b * b) ** 2
+    _, saved = definition.render_forward(scene, camera, PAPER)
+    square = saved.composite.projected.determinant**2
     factor = square / (square + 1e-7)
     assert factor.min() < 1 - 1e-7
     for name in ("log_scale", "quaternion"):

@@ -5,7 +5,7 @@ from collections import namedtuple
 import numpy as np
 
 SsimTarget = namedtuple("SsimTarget", "image mask count")  # the observed frame, 0 outside tissue; C x tissue pixels
-SsimSaved = namedtuple("SsimSaved", "x slopes target")  # slopes: of the map by mu_x, k * x^2 and k * (x y)
+SsimSaved = namedtuple("SsimSaved", "x map slopes target")  # slopes: of the map by mu_x, k * x^2 and k * (x y)
 
 C1, C2 = 0.01**2, 0.03**2
 
@@ -38,11 +38,11 @@ def masked_ssim_forward(rendered, target):
     s = a1 * a2 / (b1 * b2)
     by_mean = 2 * mu_y * (a2 - a1) / (b1 * b2) - 2 * mu_x * s * (1 / b1 - 1 / b2)
     mean = np.where(target.mask, s, 0).sum() / target.count if target.count else 1.0
-    return mean, SsimSaved(x, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)
+    return mean, SsimSaved(x, s, (by_mean, -s / b2, 2 * a1 / (b1 * b2)), target)
 
 
 def masked_ssim_reverse(d_ssim, saved):
     """Reverse of (B7): d_rendered (C, H, W). The window is symmetric, so it is its own adjoint."""
-    x, slopes, (y, mask, count) = saved
+    x, _, slopes, (y, mask, count) = saved
     p, p_xx, p_xy = (blurred(np.where(mask, d_ssim * slope / max(count, 1), 0)) for slope in slopes)
     return np.where(mask, p + 2 * x * p_xx + y * p_xy, 0)

@@ -24,7 +24,7 @@ class Asked(NamedTuple):
     level: int
     unit: str = "1"
     scale: str = "max"  # "exact", "max" or "last"
-    oracle: str = ""  # "<file of tests/oracle>.<function>"; empty: the reference itself is the truth
+    oracle: str = ""  # name in the golden files of the independent program that gives the value; empty: there is none
     least32: float = 0.0  # least float32 tolerance: what another sound formula loses, beyond the measured spread
     order: str = ""  # "iteration": entry k is of iteration k + 1
 

@@ -67,7 +67,7 @@ class Truth(_Strict, frozen=True, kw_only=True):
 
     kind: Literal["oracle", "self"]
     oracle: str = ""
-    """function of tests/oracle that gives the same value independently"""
+    """name of the independent program that gives the same value; tests/golden/vectors/test_truth.py says which it is"""
 
 
 class Array(_Strict, frozen=True, kw_only=True):

@@ -1,11 +1,12 @@
-"""The definition of the render against an independent oracle: images, and every gradient by complex step."""
+"""The compiled render against its definition in plain NumPy: images, and every gradient by complex step."""
 
 import numpy as np
 import pytest
-from made_up_scenes import IMAGES, assert_close, deviating, lens, random_scene, rules, run, turned_camera
+from made_up_scenes import IMAGES, assert_close, deviating, random_scene, run, turned_camera
 
+from endotsr.definition import render as definition
+from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, LegacyDeviations
-from oracle import splatting_oracle as oracle
 
 PRESETS = {"exact": EXACT, "paper": PAPER, "legacy": LEGACY, "between": PAPER._replace(support="everywhere")}
 BACKGROUND = np.array([0.2, 0.5, 0.9])
@@ -25,9 +26,10 @@ def scene_of(seed, count=60):
     return scene
 
 
-def oracle_images(inputs, settings, degree=3):
-    pose = (inputs["rotation_matrix"], inputs["translation"])
-    return oracle.render(inputs, pose, lens(CAMERA), rules(settings), inputs["background"], degree)[:3]
+def images_of(inputs, settings, degree=3):
+    scene = Scene(*(inputs[name] for name in Scene._fields))
+    camera = CAMERA._replace(rotation=inputs["rotation_matrix"], translation=inputs["translation"])
+    return definition.render_forward(scene, camera, settings, degree=degree, background=inputs["background"])
 
 
 def inputs_of(scene):
@@ -38,12 +40,12 @@ def inputs_of(scene):
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 @pytest.mark.parametrize("preset", list(PRESETS))
-def test_images_equal_the_oracle(preset, degree):
+def test_images_equal_the_definition(preset, degree):
     scene = scene_of(degree)
     images, _ = run(scene, CAMERA, PRESETS[preset], "definition", background=BACKGROUND, degree=degree)
-    wanted = oracle_images(inputs_of(scene), PRESETS[preset], degree)
+    wanted, _ = images_of(inputs_of(scene), PRESETS[preset], degree)
     assert np.ptp(images["colour"]) > 0.3 and (images["opacity"] > 0.1).mean() > 0.5
-    assert_close(images, dict(zip(IMAGES, wanted)), 1e-12)
+    assert_close(images, wanted._asdict(), 1e-12)
 
 
 @pytest.mark.parametrize("preset, path", [*((preset, "definition") for preset in PRESETS), ("paper", "blocks")])
@@ -56,6 +58,7 @@ def test_every_gradient_equals_the_complex_step(preset, path):
     rng = np.random.default_rng(3)
     given = tuple(rng.normal(0, 1, images[name].shape) for name in IMAGES)
     _, gradients = run(scene, CAMERA, settings, path, background=BACKGROUND, given=given)
+    written = by_definition(inputs, settings, given)
     blocks = {name: (name, np.ones(inputs[name].shape, bool)) for name in inputs}
     for axis in range(3):
         mask = np.zeros(scene.position.shape, bool)
@@ -68,26 +71,24 @@ def test_every_gradient_equals_the_complex_step(preset, path):
         direction = rng.normal(0, 1, inputs[name].shape) * mask
         moved = {key: a.astype(complex) for key, a in inputs.items()}
         moved[name] = moved[name] + 1j * H * direction
-        derivative = sum(np.sum(g * image.imag) / H for g, image in zip(given, oracle_images(moved, settings)))
-        found = np.sum(gradients[name] * direction)
-        scale = np.linalg.norm(gradients[name] * mask) * np.linalg.norm(direction)
-        assert scale > 1e-3, label
-        assert abs(found - derivative) <= 1e-10 * abs(derivative) + 1e-13 * scale, label
+        derivative = sum(np.sum(g * image.imag) / H for g, image in zip(given, images_of(moved, settings)[0]))
+        for found in (gradients[name], written[name]):
+            scale = np.linalg.norm(found * mask) * np.linalg.norm(direction)
+            assert scale > 1e-3, label
+            assert abs(np.sum(found * direction) - derivative) <= 1e-10 * abs(derivative) + 1e-13 * scale, label
 
 
-def staged(scene, settings):
-    """What the compositing of the oracle takes, and the gradients it returns, for a scene of degree 0."""
-    pose = (CAMERA.rotation, CAMERA.translation)
-    sigma = oracle.covariance(scene.quaternion, scene.log_scale)
-    u, v, a, b, c, z = oracle.project(scene.position, sigma, pose, lens(CAMERA), rules(settings))
-    centre = -CAMERA.rotation.T @ CAMERA.translation
-    rgb = oracle.colour(scene.harmonics, scene.residual, scene.position, centre, 0)
-    return u, v, a, b, c, z, oracle.sigmoid(scene.opacity_logit), z > settings.near, rgb
+def by_definition(inputs, settings, given, degree=3):
+    """All gradients by name."""
+    grads = definition.render_reverse(*given, images_of(inputs, settings, degree)[1])._asdict()
+    camera = grads.pop("d_camera")
+    grads |= {"d_rotation_matrix": camera.d_rotation, "d_translation": camera.d_translation}
+    return {name.removeprefix("d_"): array for name, array in grads.items()}
 
 
 @pytest.mark.parametrize("passes", [False, True])
 @pytest.mark.parametrize("preset", ["exact", "paper", "legacy"])
-def test_compositing_reverse_equals_the_loop_of_the_oracle(preset, passes):
+def test_compositing_reverse_equals_the_loop_of_the_definition(preset, passes):
     """mean2d, logit, degree-0 colour and background, with and without the pass through the alpha clamp."""
     settings = deviating(PRESETS[preset], pass_clamped_alpha=passes)
     scene = scene_of(11)
@@ -97,9 +98,6 @@ def test_compositing_reverse_equals_the_loop_of_the_oracle(preset, passes):
     rng = np.random.default_rng(5)
     given = tuple(rng.normal(0, 1, images[name].shape) for name in IMAGES)
     _, found = run(scene, CAMERA, settings, "definition", background=BACKGROUND, degree=0, given=given)
-    size = (CAMERA.width, CAMERA.height)
-    stages = staged(scene, settings)
-    wanted = oracle.composite_reverse(*given, *stages, BACKGROUND, *size, rules(settings), passes)
-    wanted["residual"] = np.where(stages[-1] > 0, wanted["colour"], 0.0) * oracle.C0
+    wanted = by_definition(inputs_of(scene), settings, given, degree=0)
     compared = ("mean2d", "opacity_logit", "residual", "background")
     assert_close({n: found[n] for n in compared}, {n: wanted[n] for n in compared}, 1e-11)
