@@ -45,7 +45,7 @@ PAPER_CONFIG = Config(
 SMALL = PAPER_CONFIG._replace(
     model=PAPER_CONFIG.model._replace(bases=9, initial_width=0.1, frequencies=4, frequency_max=4.0),
     loss=PAPER_CONFIG.loss._replace(smoothness_from=60, laplacian_from=50, laplacian_full=100),
-    density=PAPER_CONFIG.density._replace(start=20, interval=40, until=140, gradient_threshold=2e-3, maximum=300),
+    density=PAPER_CONFIG.density._replace(start=20, interval=40, until=140, gradient_threshold=1e-2, maximum=300),
     initialisation=section(first_frame_points=150, other_frame_points=64, motion_threshold=0.1),
     training=section(iterations=300, residual_activation=100, harmonics_interval=60),
 )

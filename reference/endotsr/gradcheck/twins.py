@@ -55,7 +55,7 @@ def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[Request]:
             inputs = variant.inputs(rng)
             inputs |= {} if variant.fixed is None else variant.fixed(np.dtype(np.float64))
             outputs, _ = stage.forward(inputs, variant.settings)
-            cotangents = {f"d_{name}": rng.normal(0, 1, np.shape(value)) for name, value in outputs.items()}
+            cotangents = {f"d_{name}": rng.normal(0, 1, np.asarray(value).shape) for name, value in outputs.items()}
             yield Request(f"{variant.name}, seed {seed}", inputs | cotangents, variant.settings)
 
 

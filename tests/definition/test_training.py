@@ -1,0 +1,149 @@
+"""The small training of the definition: it learns, and the fast path takes the same steps from the same start."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from endotsr.config import (
+    Config,
+    DensityConfig,
+    InitialisationConfig,
+    LossConfig,
+    ModelConfig,
+    OptimiserConfig,
+    TrainingConfig,
+)
+from endotsr.definition import train
+from endotsr.definition.initialisation import initialise as initialise_by_definition
+from endotsr.definition.scene import spectral_from
+from endotsr.definition.settings import PAPER, PAPER_CONFIG, SMALL
+from endotsr.definition.simulate import simulate
+from endotsr.fitting.state import fresh_state, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.gradcheck.twins import scaled
+from endotsr.opencv import canny_edges
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.initialisation import initialise
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.settings import PAPER as FAST_PAPER
+
+STEPS = 50
+LOSS_BOUND, ARRAY_BOUND = 1e-13, 1e-10  # relative to the loss, and to the largest entry of an array
+
+# Everything that the training of the paper does happens within the first 50 iterations.
+SHORT = SMALL._replace(
+    loss=SMALL.loss._replace(smoothness_from=5, laplacian_from=3, laplacian_full=20),
+    density=SMALL.density._replace(start=15, interval=20, until=45),
+    training=SMALL.training._replace(residual_activation=25, harmonics_interval=12),
+)
+
+
+def fast_config(config):
+    """The same settings as the package takes them."""
+    return Config(
+        model=ModelConfig(**config.model._asdict()),
+        loss=LossConfig(**config.loss._asdict()),
+        optimiser=OptimiserConfig(**config.optimiser._asdict()),
+        density=DensityConfig(**config.density._asdict()),
+        initialisation=InitialisationConfig(**config.initialisation._asdict()),
+        training=TrainingConfig(precision="float64", **config.training._asdict()),
+    )
+
+
+def fast_sequence(sequence):
+    cameras = [Camera(*camera) for camera in sequence.cameras]
+    names = [str(k) for k in range(len(sequence.images))]
+    return Sequence(
+        sequence.images, sequence.masks, sequence.depth, sequence.times, cameras, names, "scene unit", True,
+        sequence.train_index, sequence.test_index,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def start():
+    """Sequence, configuration and Gaussians; these are not round, because a round one has no gradient to turn by."""
+    sequence, rng = simulate(), np.random.default_rng(1)
+    made = initialise_by_definition(sequence, SHORT.initialisation, SHORT.model, rng)
+    made = made._replace(
+        log_scale=made.log_scale + rng.normal(0, 0.3, made.log_scale.shape),
+        quaternion=made.quaternion + rng.normal(0, 0.3, made.quaternion.shape),
+        fdm_weight=rng.normal(0, 0.01, made.fdm_weight.shape),
+    )
+    return sequence, made
+
+
+def test_the_settings_of_the_definition_are_those_of_paper():
+    fast = fast_config(PAPER_CONFIG)
+    assert fast == Config(training=TrainingConfig(precision="float64"))
+    assert PAPER[:7] == FAST_PAPER[:7] and not any(PAPER.deviations)
+
+
+def test_the_fast_path_starts_with_the_same_gaussians():
+    sequence = simulate()
+    made = initialise_by_definition(sequence, SHORT.initialisation, SHORT.model, np.random.default_rng(3))
+    config = fast_config(SHORT)
+    rng = np.random.default_rng(3)
+    fast = initialise(fast_sequence(sequence), config.initialisation, config.model, rng, np.float64)
+    assert fast.count > 150
+    for name, array in arrays(fast).items():
+        np.testing.assert_allclose(getattr(made, name), array, rtol=0, atol=1e-14, err_msg=name)
+
+
+def test_the_fast_path_takes_the_same_steps(start):
+    """Fifty iterations with the same draws, through density control and the activation of the residuals."""
+    sequence, made = start
+    config = fast_config(SHORT)
+    shop = workshop(fast_sequence(sequence), config)
+    fast = Gaussians(
+        **{name: np.array(array, order="C") for name, array in made._asdict().items() if array is not None}
+    )
+    fast_state = fresh_state(fast, None, np.random.default_rng(7), lambda_lap=config.loss.lambda_lap)
+    state, rng = train.start(made), np.random.default_rng(7)
+    spectral = spectral_from(SHORT.model, sequence.times[sequence.train_index])
+    counts = set()
+    for iteration in range(1, STEPS + 1):
+        state, view = train.iterate(state, sequence, spectral, SHORT, rng, edges=canny_edges)
+        entry = training_step(fast_state, shop)
+        counts.add(entry["gaussians"])
+        print(f"iteration {iteration:2d}  definition {view.loss:.16f}  fast path {entry['loss']:.16f}")
+        assert entry["loss"] == pytest.approx(view.loss, rel=LOSS_BOUND), iteration
+        assert set(view.terms) <= set(entry)
+    assert len(counts) > 1, "no density control"
+    found, wanted = arrays(fast_state.gaussians), train.arrays(state.gaussians)
+    assert found.keys() == wanted.keys() and {"appearance_coefficients", "motion_coefficients"} <= found.keys()
+    off = {name: scaled(found[name], wanted[name], "max") for name in wanted}
+    print(off)
+    assert {name: value for name, value in off.items() if value > ARRAY_BOUND} == {}
+    np.testing.assert_array_equal(fast_state.statistics.visits, state.statistics.visits)
+    for name, (first, second, step) in state.adam.items():
+        assert fast_state.adam.step[name] == step
+        assert scaled(fast_state.adam.first[name], first, "max") <= ARRAY_BOUND, name
+        assert scaled(fast_state.adam.second[name], second, "max") <= ARRAY_BOUND, name
+
+
+def test_the_small_training_learns():
+    """40 of its 300 iterations: the loss falls, and the render comes nearer to the held-out frames."""
+    sequence, losses = simulate(), []
+    config = SMALL._replace(training=SMALL.training._replace(iterations=40))
+    before = train.train(
+        sequence, config._replace(training=config.training._replace(iterations=0)), np.random.default_rng(0)
+    )
+    after = train.train(
+        sequence, config, np.random.default_rng(0), on_iteration=lambda state, view: losses.append(view.loss)
+    )
+    assert len(losses) == 40 and np.mean(losses[-5:]) < 0.5 * losses[0]
+    one, other = (train.evaluate(*model, sequence, config, sequence.test_index) for model in (before, after))
+    assert other > one + 3
+
+
+def test_the_command_prints_iteration_and_loss():
+    code = (
+        "import endotsr.definition.settings as s; s.SMALL = s.SMALL._replace(training=s.SMALL.training._replace("
+        "iterations=2)); import runpy; runpy.run_module('endotsr.definition', run_name='__main__')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    first, *_, last = done.stdout.splitlines()
+    assert first.startswith("iteration    1  loss 0.7") and last.startswith("held-out PSNR over tissue: ")
