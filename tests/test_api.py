@@ -126,11 +126,24 @@ def test_sequences_that_cannot_be_loaded(given, named):
         endotsr.load_sequence(**given)
 
 
-def test_training_is_that_of_the_command(run, tmp_path):
-    words = ["--simulator.width=48", "--simulator.height=32", "--simulator.frames=9", "--preset=demo"]
-    words += ["--iterations=8", "--initialisation.first-frame-points=150", "--initialisation.other-frame-points=40"]
+@pytest.fixture(scope="module")
+def folder(sequence, tmp_path_factory):
+    """The simulated sequence as a folder that the commands read."""
+    place = tmp_path_factory.mktemp("folder") / "sequence"
+    write_endonerf(sequence, place)
+    return place
+
+
+def test_training_is_that_of_the_command(folder, tmp_path):
+    run = tiny(endotsr.load_sequence(folder))
+    words = [
+        "--preset=demo",
+        "--iterations=8",
+        "--initialisation.first-frame-points=150",
+        "--initialisation.other-frame-points=40",
+    ]
     out = tmp_path / "command"
-    assert main(["train", "simulated", "--out", str(out), *words, "--threads=1", "--no-evaluate"]) == 0
+    assert main(["train", str(folder), "--out", str(out), *words, "--threads=1", "--no-evaluate"]) == 0
     commanded = endotsr.open_run(out)
     assert commanded.config == run.config
     assert arrays(commanded) == arrays(run)
@@ -268,12 +281,10 @@ def test_a_run_in_memory_renders_with_the_exposure_of_its_frames(tmp_path):
     assert (run.render(0.3).colour == again.render(0.3).colour).all()
 
 
-def test_inspect_gives_what_the_command_writes(tmp_path, capsys):
+def test_inspect_gives_what_the_command_writes(folder, tmp_path, capsys):
     page = tmp_path / "found.json"
-    words = ["--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"]
-    assert main(["inspect", "simulated", *words, "--json", str(page)]) == 0
-    loaded = endotsr.load_sequence("simulated", simulator=SIMULATOR)
-    assert json.loads(page.read_text()) == finite(endotsr.inspect(loaded))
+    assert main(["inspect", str(folder), "--json", str(page)]) == 0
+    assert json.loads(page.read_text()) == finite(endotsr.inspect(endotsr.load_sequence(folder)))
 
 
 def test_effects_auto_follows_the_plan_and_given_keys_stay(capsys):

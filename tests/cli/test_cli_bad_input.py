@@ -92,7 +92,8 @@ def test_scale_too_small(folder, capsys):
 
 
 def test_frames_of_a_simulated_sequence(tmp_path, capsys):
-    assert_refused(capsys, train_words(tmp_path / "run", "--frames", "0:5"), "--simulator.frames")
+    words = train_words(tmp_path / "run", "--frames", "0:5", source="simulated")
+    assert_refused(capsys, words, "endotsr simulate SCENE --frames N")
 
 
 @pytest.mark.parametrize("kind", ["folder", "file"])

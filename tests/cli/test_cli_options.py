@@ -99,12 +99,23 @@ BAD = [
     (["--iterations", "0"], ["--iterations", "0", ">= 1"]),
     (["--iterations", "many"], ["--iterations", "many"]),
     (["--config", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
-    (["--simulator.noise.on", "perhaps"], ["perhaps"]),
-    (["--simulator.noise.of", "1"], ["unknown key simulator.noise.of", "on, sigma"]),
-    (["--simulator.width", "4"], ["simulator.width", "4", ">= 16"]),
+    (["--simulator.width", "48"], ["unknown key simulator", "sequence, model"]),
     (["--frobnicate"], ["--frobnicate"]),
     (["--model.frequency-max", "0.5"], ["model.frequency_max", "model.frequency_min"]),
 ]
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--noise.on", "perhaps"], ["perhaps"]),
+        (["--noise.of", "1"], ["unknown key noise.of", "on, sigma"]),
+        (["--width", "4"], ["width", "4", ">= 16"]),
+    ],
+)
+def test_an_unusable_setting_of_the_simulator_is_one_line(words, named, tmp_path, capsys):
+    assert_refused(capsys, ["simulate", "still", "--out", str(tmp_path / "scene"), *words], *named)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("words", "named"), BAD, ids=[" ".join(words) for words, _ in BAD])

@@ -6,7 +6,7 @@ import shutil
 import numba
 import numpy as np
 import pytest
-from tiny import SEQUENCE, SETTINGS, assert_refused
+from tiny import SETTINGS, assert_refused
 
 from endotsr.bench.clock import REST, STAGES
 from endotsr.cli.main import main
@@ -57,8 +57,8 @@ def test_render_between_frames_is_between_times(finished_run, tmp_path):
 
 def test_render_of_a_held_out_frame_is_that_of_the_evaluation(finished_run, tmp_path):
     render(finished_run, tmp_path / "pictures", "--frames", "test")
-    again = read_png(tmp_path / "pictures" / "colour" / "simulated-000001.png")
-    assert np.array_equal(again, read_png(finished_run / "renders" / "simulated-000001.png"))
+    again = read_png(tmp_path / "pictures" / "colour" / "000001.png")
+    assert np.array_equal(again, read_png(finished_run / "renders" / "000001.png"))
 
 
 def test_render_without_a_component_differs(finished_run, tmp_path):
@@ -165,7 +165,7 @@ def test_calibrate_prints_the_table_and_leaves_the_run_alone(finished_run, tmp_p
     said = capsys.readouterr().out
     found = json.loads((tmp_path / "found.json").read_text())
     assert f"lambda_lap = {found['lambda_lap']:.6g} ({len(found['ratios'])} views)" in said
-    assert "simulated-000000" in said and "loss.ssim_weight = 0.2 (run: 0.1)" in said
+    assert "000000" in said and "loss.ssim_weight = 0.2 (run: 0.1)" in said
     assert before == {p: p.stat().st_mtime_ns for p in finished_run.rglob("*")}
 
 
@@ -261,7 +261,7 @@ def test_bench_refuses_what_cannot_be_timed(words, said, capsys):
 
 def test_demo_is_the_simulated_sequence_on_its_preset(tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["--out", str(out), *SEQUENCE, *SETTINGS, "--iterations", "4"]
+    words = ["--out", str(out), "--scale", "0.3", *SETTINGS, "--iterations", "4"]
     assert main(["demo", *words]) == 0
     assert f"report: {out / 'report.html'}" in capsys.readouterr().out
     assert json.loads((out / "metrics.json").read_text())["run"]["settings"]["preset"] == "demo"

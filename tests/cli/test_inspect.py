@@ -3,22 +3,19 @@
 import json
 
 import pytest
-from tiny import SEQUENCE, assert_refused, train_words, written_folder
+from tiny import assert_refused, scene, train_words, written_folder
 
 from endotsr.cli.main import main
 from endotsr.cli.parts.options import explicit_settings
 from endotsr.cli.train import TrainOptions
 from endotsr.config import load_config
 
-STILL = [
-    f"--simulator.{name}.no-on"
-    for name in ("breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument")
-]
+STILL = ("breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument")  # off
 
 
 def test_inspect_prints_verdicts_and_plan(capsys, tmp_path):
     page, data = tmp_path / "report.html", tmp_path / "report.json"
-    words = ["inspect", "simulated", *SEQUENCE, *STILL, "--out", str(page), "--json", str(data), "--frame-rate", "15"]
+    words = ["inspect", scene(*STILL), "--out", str(page), "--json", str(data), "--frame-rate", "15"]
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "motion           none" in said and "model.deformation = false (now true)" in said
@@ -62,7 +59,9 @@ def test_explicit_settings_are_those_of_the_command_line_and_of_the_file(tmp_pat
 
 def test_effects_auto_trains_what_the_clip_calls_for_and_says_so(capsys, tmp_path):
     out = tmp_path / "run"
-    words = train_words(out, *STILL, "--effects", "auto", "--model.harmonics-degree", "2", "--no-evaluate")
+    words = train_words(
+        out, "--effects", "auto", "--model.harmonics-degree", "2", "--no-evaluate", source=scene(*STILL)
+    )
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "  model.deformation = false (was true): No tile moves" in said
@@ -75,8 +74,8 @@ def test_effects_auto_trains_what_the_clip_calls_for_and_says_so(capsys, tmp_pat
 
 def test_effects_everything_says_so_and_changes_nothing(capsys, tmp_path):
     one, other = tmp_path / "one", tmp_path / "other"
-    assert main(train_words(one, *STILL, "--no-evaluate")) == 0
+    assert main(train_words(one, "--no-evaluate", source=scene(*STILL))) == 0
     assert "effects: everything" in capsys.readouterr().out
-    assert main(train_words(other, *STILL, "--effects", "everything", "--no-evaluate")) == 0
+    assert main(train_words(other, "--effects", "everything", "--no-evaluate", source=scene(*STILL))) == 0
     assert (one / "config.toml").read_bytes() == (other / "config.toml").read_bytes()
     assert "effects" not in json.loads((one / "run.json").read_text(encoding="utf-8"))

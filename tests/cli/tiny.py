@@ -1,19 +1,24 @@
 """Runs small enough for tests: a 48x32 simulated sequence, a few hundred Gaussians, 30 iterations."""
 
+import atexit
+import functools
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from endotsr.cli.main import main
 from endotsr.sequences.endonerf import write_endonerf
-from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.folder import write_sequence
+from endotsr.simulator.scenes import IN_FILES, effects_on
+from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
-SEQUENCE = ["--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"]
 SETTINGS = [
     *("--iterations", "30"),
     *("--initialisation.first-frame-points", "150"),
@@ -24,9 +29,20 @@ SETTINGS = [
 ]
 
 
-def train_words(out: Path, *more: str) -> list[str]:
-    """`train simulated --out OUT` with tiny settings."""
-    return ["train", "simulated", "--out", str(out), *SEQUENCE, *SETTINGS, *more]
+def train_words(out: Path, *more: str, source: str | None = None) -> list[str]:
+    """`train SOURCE --out OUT` with tiny settings, on `scene()` if no other source is named."""
+    return ["train", scene() if source is None else source, "--out", str(out), *SETTINGS, *more]
+
+
+@functools.cache
+def scene(*off: str, frames: int = 9, seed: int = 0) -> str:
+    """A folder with a simulated sequence of 48x32 and its truth, written once a process; `off` names effects."""
+    folder = tempfile.mkdtemp(prefix="endotsr-scene-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    settings = SimulatorSettings(width=48, height=32, frames=frames, seed=seed)
+    on = (name for name in effects_on(settings) if name not in off)
+    write_sequence(Path(folder) / "scene", with_effects(settings, *on, *IN_FILES))
+    return str(Path(folder) / "scene")
 
 
 def run_line(capsys, *words: str) -> tuple[int, str]:

@@ -195,10 +195,7 @@ def sequence_changes(bench: Bench) -> tuple[bool, str]:
     out, said = bench.fresh(), bench.said
     shutil.rmtree(bench.scratch / "sequence", ignore_errors=True)
     folder = written_folder(bench.scratch)
-    words = train_words(out, "--no-evaluate")
-    words[1] = str(folder)
-    words = [word for k, word in enumerate(words) if not (word + words[k - 1]).startswith("--simulator")]
-    words = [w for w in words if "simulator" not in w and w not in ("48", "32", "9")]
+    words = train_words(out, "--no-evaluate", source=str(folder))
 
     def work() -> int:
         from endotsr.cli.parts.progress import Progress

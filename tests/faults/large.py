@@ -41,9 +41,11 @@ def trained(words: list[str], **environment: str) -> dict[str, float]:
 
 def many_gaussians(count: int, iterations: int, width: int, height: int, scratch: Path) -> dict[str, Any]:
     """Train from `count` pixels of the first frame."""
+    scene = scratch / "scene"
+    size = ["--width", str(width), "--height", str(height), "--frames", str(FRAMES)]
+    trained(["simulate", "pulling", "--out", str(scene), *size])
     words = [
-        "train", "simulated", "--out", str(scratch / "many"), "--no-evaluate",
-        "--simulator.width", str(width), "--simulator.height", str(height), "--simulator.frames", str(FRAMES),
+        "train", str(scene), "--out", str(scratch / "many"), "--no-evaluate",
         "--iterations", str(iterations), "--training.checkpoint-every", str(iterations),
         "--initialisation.first-frame-points", str(count),
         "--initialisation.other-frame-points", "0", "--density.until", "0",

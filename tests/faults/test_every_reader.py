@@ -90,7 +90,7 @@ SEQUENCE = {
     "device name": ("names", 1, "NUL"),
     "control character": ("names", 1, "a\x1b[2Jb"),
     "number as name": ("names", 1, 7),
-    "name twice": ("names", 1, "simulated-000000"),
+    "name twice": ("names", 1, "000000"),
     "NaN time": ("times", 1, float("nan")),
     "time beyond any number": ("times", 1, 10**400),
     "time outside": ("times", 1, -0.5),

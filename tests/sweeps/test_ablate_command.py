@@ -11,7 +11,7 @@ from endotsr.cli.main import main
 pytestmark = pytest.mark.slow
 WORDS = (
     *("ablate", "simulated", "--preset", "demo", "--iterations", "12", "--seeds", "1", "--workers", "1"),
-    *("--simulator.width", "48", "--simulator.height", "32", "--simulator.frames", "9"),
+    *("--scale", "0.3"),
     *("--configurations", "base", "A", "--measures", "depth"),
 )
 

@@ -4,17 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import msgspec
-
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import Place, check_place, ended, run_spec
 from endotsr.config import PRESETS, with_iterations
 from endotsr.errors import InputError
-from endotsr.simulator.settings import SimulatorSettings
-
-DEMONSTRATION = SimulatorSettings()
 
 
 @dataclass
@@ -62,8 +57,6 @@ class AblateOptions:
     """send the runs to the workers of this Dask scheduler"""
     retry: bool = False
     """also make the runs again that failed before"""
-    simulator: SimulatorSettings = DEMONSTRATION
-    """contents of the `simulated` sequence"""
 
 
 def run(words: list[str]) -> int:
@@ -133,7 +126,6 @@ def spec_data(options: AblateOptions) -> dict[str, Any]:
         fixed_at=min(activation, length - 1) if options.fixed_count else None,
         chosen=options.configurations or CONFIGURATIONS,
         settings={"sequence": {"scale": options.scale}},
-        simulator=msgspec.to_builtins(options.simulator),
         measures=list(options.measures),
         keep_checkpoints=options.keep_checkpoints,
         **keys,

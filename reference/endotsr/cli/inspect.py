@@ -10,9 +10,6 @@ from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
-from endotsr.simulator.settings import SimulatorSettings
-
-DEMONSTRATION = SimulatorSettings()
 
 
 @dataclass
@@ -40,8 +37,6 @@ class InspectOptions:
     masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
     """mask folder (= --sequence.masks)"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
-    simulator: SimulatorSettings = DEMONSTRATION
-    """contents of the `simulated` sequence"""
 
 
 def run(words: list[str]) -> int:
@@ -50,6 +45,7 @@ def run(words: list[str]) -> int:
     from endotsr.effects.plan import make_plan, plan_record
     from endotsr.report.inspection import inspection_text, write_inspection
     from endotsr.runs.sources import load_sequence
+    from endotsr.simulator.settings import SimulatorSettings
 
     base, _ = base_settings(words)
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
@@ -58,7 +54,7 @@ def run(words: list[str]) -> int:
     names = ("scale", "frames", "masks")
     config = with_short_names(options.settings, {name: getattr(options, name) for name in names})
     refuse_unwritable(options.out, options.json)
-    sequence = load_sequence(options.sequence, config, options.simulator)
+    sequence = load_sequence(options.sequence, config, SimulatorSettings())
     inspection = inspect_sequence(sequence, options.frame_rate)
     plan = make_plan(inspection, config)
     print(inspection_text(inspection, plan))

@@ -46,9 +46,9 @@ FORMER = {  # commands of earlier versions, and what does their work
 
 OTHER_PROGRAMS = "end other programs that hold memory"
 LESS_MEMORY = {  # what a user of this command can do; every other command has no option that needs less
-    "train": "a smaller --scale, fewer --frames (of `simulated`: --simulator.frames) or a smaller --density.maximum "
+    "train": "a smaller --scale, fewer --frames or a smaller --density.maximum "
     "needs less; with --resume, " + OTHER_PROGRAMS,
-    "demo": "a smaller --scale or fewer --simulator.frames needs less",
+    "demo": "a smaller --scale needs less",
     "bench": "a smaller size needs less (`endotsr bench --help`)",
 }
 

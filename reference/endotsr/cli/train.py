@@ -19,18 +19,18 @@ from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
-from endotsr.simulator.settings import SimulatorSettings
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
 RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run because they change no result
-DEMONSTRATION = SimulatorSettings()
 
 
 @dataclass
 class TrainOptions:
-    """Train on a sequence folder (or on the word `simulated`), evaluate, and write a run folder.
+    """Train on a sequence folder, evaluate, and write a run folder.
+
+    The word `simulated` is the scene of `endotsr demo`; `endotsr simulate` writes folders with other scenes.
 
     Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
     from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
@@ -73,8 +73,6 @@ class TrainOptions:
     json: JsonFile = None
     """also write the metrics of the evaluation, or the calibration, as JSON"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
-    simulator: SimulatorSettings = DEMONSTRATION
-    """contents of the `simulated` sequence"""
 
 
 def run(words: list[str]) -> int:
@@ -137,6 +135,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     from endotsr.runs.sources import SIMULATED, load_sequence
     from endotsr.runs.training import start_record, train_new_run
     from endotsr.simulator.recorded import recorded_positions
+    from endotsr.simulator.settings import SimulatorSettings
 
     if not options.sequence:
         raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
@@ -145,7 +144,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     refuse_existing(options.out)
     if source != SIMULATED:
         refuse_inside(options.out, Path(source), "the sequence")
-    sequence = load_sequence(source, config, options.simulator)
+    sequence = load_sequence(source, config, SimulatorSettings())
     if options.evaluate and source != SIMULATED:
         recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
     config, schedule_note = _of_length(config, len(sequence.train_index), schedule_note)
@@ -159,7 +158,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     for line in lines:
         print(line)
     print("starting", flush=True)
-    record = start_record(["endotsr", "train", *words], source, sequence, config, options.simulator, threads) | found
+    record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads) | found
     return train_new_run(options.out, record, sequence, config, Progress(config.training.iterations)), sequence
 
 
@@ -172,7 +171,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     folder = open_run(out)
     kept = folder.config()
     remembered, simulator = run_source(folder)
-    options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0], simulator=simulator))
+    options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
     frames = len(folder.sequence_record("train_index")["train_index"])
     asked = asked_settings(TrainOptions, words, lengthened(_settings(options), frames), kept)
     extended = asked.training.iterations > kept.training.iterations
@@ -181,7 +180,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     if refused:
         raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
     source = source or remembered
-    sequence = load_sequence(source, kept, options.simulator)
+    sequence = load_sequence(source, kept, simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
     if extended:

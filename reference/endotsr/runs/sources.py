@@ -54,7 +54,9 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
     """The simulator's settings with the scale of the sequence settings."""
     wanted = config.sequence
     if wanted.frames:
-        raise InputError("simulated: --frames selects files of a folder; here --simulator.frames N says how many")
+        raise InputError(
+            "simulated: --frames selects files of a folder; allowed: a folder of `endotsr simulate SCENE --frames N`"
+        )
     changes = {
         "width": round(simulator.width * wanted.scale),
         "height": round(simulator.height * wanted.scale),

@@ -80,7 +80,7 @@ def asked_settings(options: type, words: list[str], wanted: Config, kept: Config
     for section, _, key in (name.partition(".") for name in named):
         if not key:
             data[section] = new[section]
-        elif key in new.get(section, {}):  # the simulator's sections are no settings of a run
+        elif key in new[section]:  # not so a key of an earlier version in a file
             data[section][key] = new[section][key]
     return config_from_dict(data, str(sources.config or "command line"))
 
