@@ -231,6 +231,14 @@ def test_a_right_sequence_has_no_finding(sequence, tmp_path):
     assert checked.facts["frames"] == FRAMES and checked.facts["cost"]["minutes"] > 0
 
 
+def test_the_time_is_that_of_a_training_on_these_frames(sequence, tmp_path):
+    write_endonerf(sequence, tmp_path / "sequence")
+    training = msgspec.structs.replace(PAPER.training, visits_per_frame=1500)  # 8 training frames: 12000 iterations
+    configs = (PAPER, msgspec.structs.replace(PAPER, training=training))
+    once, twice = (check_sequence(tmp_path / "sequence", config).facts["cost"]["minutes"] for config in configs)
+    assert twice == pytest.approx(2 * once)
+
+
 def test_everything_is_found_in_one_pass(sequence, tmp_path):
     write_endonerf(sequence, tmp_path / "clip")
     for case in ("truncated image", "black frame", "pose jump", "times 256"):

@@ -12,42 +12,16 @@ import os
 import sys
 
 from endotsr import __version__
+from endotsr.cli.parts.commands import COMMANDS, FORMER
 from endotsr.cli.parts.output import saying, split_output
 from endotsr.errors import CalibrationError, InputError
 from endotsr.runs.stopping import signals_stop
 from endotsr.untrusted.names import plain_line
 
-COMMANDS = {
-    "demo": "train and evaluate a simulated sequence, and write a report: the whole method in two minutes",
-    "prepare": "turn a video, pictures or another layout into a folder that `train` reads",
-    "depth": "make the depth of a sequence from its stereo pairs, or take that of another program",
-    "masks": "propose instrument masks for a clip that has none, with an overlay to look at",
-    "check": "find everything that is wrong with a sequence, with remedies",
-    "train": "train on a sequence folder, or on a simulated sequence",
-    "simulate": "write a simulated sequence with exact truth: a folder that `train` reads",
-    "inspect": "test a clip for motion, light, instruments and more, and plan the components that it calls for",
-    "render": "render pictures and films at any time in [0, 1], from any camera",
-    "export": "write .ply files, a point cloud, a slim model, or a page that plays the moving scene in any browser",
-    "evaluate": "measure held-out frames of a run or any pictures beside baselines, and compare methods frame by frame",
-    "sweep": "make many runs from one file, on this machine or on a cluster, with a table of their results",
-    "ablate": "test the paper's claims: components on and off, over seeds, with paired differences",
-    "gradcheck": "check every reverse pass against finite differences",
-    "bench": "measure the time of each stage of an iteration and its lower limit",
-    "tradeoff": "measure error against time, and find the best setting within a budget",
-    "golden": "golden vectors for ports: judge outputs, run a port, answer as the reference",
-}
-
-FORMER = {  # commands of earlier versions, and what does their work
-    "calibrate": "endotsr train --out RUN --calibrate-only",
-    "compare": "endotsr evaluate METHOD METHOD ...",
-    "completion": "endotsr --completion bash|zsh|fish",
-    "view": "endotsr export SCENE --out PAGE.html",
-}
-
 OTHER_PROGRAMS = "end other programs that hold memory"
 LESS_MEMORY = {  # what a user of this command can do; every other command has no option that needs less
-    "train": "a smaller --scale, fewer --frames or a smaller --density.maximum "
-    "needs less; with --resume, " + OTHER_PROGRAMS,
+    "train": "a smaller --scale, fewer --frames or a smaller --density.maximum needs less; with --resume, "
+    + OTHER_PROGRAMS,
     "demo": "a smaller --scale needs less",
     "bench": "a smaller size needs less (`endotsr bench --help`)",
 }

@@ -30,18 +30,12 @@ RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run be
 class TrainOptions:
     """Train on a sequence folder, evaluate, and write a run folder.
 
-    The word `simulated` is the scene of `endotsr demo`; `endotsr simulate` writes folders with other scenes.
-
     Settings come from the preset, then the TOML file, then the command line. `--resume` continues the run in --out
     from its last checkpoint to the same result, bit for bit; with --iterations N it also extends a finished run.
-
-    `--calibrate-only` leaves the run in --out as it is and computes the Laplacian weight of equation (7) on its
-    checkpoint. The settings that equation (7) reads can be replaced: --loss.ssim-weight, --loss.upsampling,
-    --loss.gradient-ratio, --loss.calibration-views and the settings of --raster.
     """
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
-    """sequence folder, or `simulated`; with --resume the default is the sequence of the run"""
+    """sequence folder, or `simulated` for the scene of `demo`; with --resume the default is the sequence of the run"""
     out: Annotated[Path | None, Option("RUN")] = None
     """run folder to create (required)"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
@@ -65,7 +59,8 @@ class TrainOptions:
     resume: bool = False
     """continue the run in --out"""
     calibrate_only: bool = False
-    """train nothing: print the Laplacian weight of equation (7) on the run in --out, with a table of its views"""
+    """train nothing: compute the weight of equation (7) on the run in --out; --loss.ssim-weight and the other settings
+    that it reads may differ from those of the run"""
     evaluate: bool = True
     """measure, render and report when training is done"""
     lpips: Annotated[Path | None, Option("FILE")] = None

@@ -12,7 +12,7 @@ the script of `endotsr --completion SHELL`:
 import importlib
 from typing import Any
 
-from endotsr.cli.main import COMMANDS
+from endotsr.cli.parts.commands import COMMANDS
 from endotsr.cli.parts.fields import fields_of
 from endotsr.cli.parts.mistakes import option_names
 from endotsr.simulator.scenes import SCENES

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Config
+from endotsr.config import Config, lengthened
 from endotsr.errors import InputError
 from endotsr.kernels.machine import memory_of_machine
 from endotsr.kernels.memory import ASSUMED, unknown_memory
@@ -87,6 +87,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
         run.findings += depth_findings(run.depth, str(parts.depth[0].parent), parts.arbitrary, config.raster.near)
     if run.samples:
         _check_masks(parts, run, config)
+    config = _of_length(parts, config, run)
     usual = float(np.median([fact.median for fact in run.depth if fact.median] or [0.0]))
     if size:
         facts |= {"width": size[1], "height": size[0]}
@@ -94,7 +95,6 @@ def check_sequence(path: Path, config: Config) -> Checked:
         if cameras:
             run.findings += camera_findings(cameras, usual, str(parts.camera_file))
         facts["cost"] = _cost(parts, size, config, run)._asdict()
-    _split(parts, config, run)
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
 
@@ -225,9 +225,12 @@ def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Co
     return cost
 
 
-def _split(parts: Parts, config: Config, run: _Pass) -> None:
-    def split() -> None:
-        frames = parse_frame_range(config.sequence.frames, len(parts.images))
-        split_frames(len(frames), config.sequence.split, config.sequence.block_length)
+def _of_length(parts: Parts, config: Config, run: _Pass) -> Config:
+    """The settings with the length of a training on these frames; frames that cannot be split are a finding."""
 
-    run.tried(split, "frames", parts.folder)
+    def training_frames() -> int:
+        frames = parse_frame_range(config.sequence.frames, len(parts.images))
+        return len(split_frames(len(frames), config.sequence.split, config.sequence.block_length)[0])
+
+    count = run.tried(training_frames, "frames", parts.folder)
+    return config if count is None else lengthened(config, count)
