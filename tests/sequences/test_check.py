@@ -105,6 +105,8 @@ WRONG = {
     "soft mask": (lambda p: each(p, "masks", lambda x: x // 2 + 40, [3]), "mask-values", "refusal", 3),
     "polarity": (lambda p: each(p, "masks", lambda x: 255 - x), "polarity", "refusal", None),
     "one mask inverted": (lambda p: each(p, "masks", lambda x: 255 - x, [4]), "single-mask", "refusal", None),
+    "one mask over everything": (lambda p: each(p, "masks", lambda x: x * 0 + 255, [4]), "frame-without-tissue",
+                                 "warning", 4),
     "masks empty": (lambda p: each(p, "masks", lambda x: x * 0), "tissue-fraction", "refusal", None),
     "masks full": (lambda p: each(p, "masks", lambda x: x * 0 + 255), "tissue-fraction", "refusal", None),
     "numbers with a gap": (renamed, "number-gap", "warning", 5),

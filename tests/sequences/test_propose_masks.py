@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, written
+from made_videos import write
 
 from data_folder import data_folder
 from endotsr.cli.main import main
@@ -13,7 +14,7 @@ from endotsr.config import PAPER, SequenceConfig
 from endotsr.opencv import read_png, write_png
 from endotsr.sequences.checks.check import check_sequence
 from endotsr.sequences.common import read_common
-from endotsr.sequences.propose_masks import propose_masks
+from endotsr.sequences.propose_masks import Proposal, _reduced, outside_of_view, propose_masks
 from endotsr.sequences.sequence_file import FILE_NAME, read_sequence_file
 from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.scenes import named_scene
@@ -47,6 +48,58 @@ def test_without_colour_there_is_no_proposal():
     pictures = [np.repeat(picture[..., :1], 3, axis=2) for picture in scene("pulling")[0]]
     assert "does not stand out" in propose_masks(pictures).reason
     assert not propose_masks([]).found
+
+
+def through_a_scope(pictures, seed=7):
+    """The pictures in a round field of view: a dark, noisy border with a bright text in it, as a recorder writes it."""
+    rng, (height, width) = np.random.default_rng(seed), pictures[0].shape[:2]
+    row, column = np.mgrid[:height, :width]
+    inside = (row - height / 2) ** 2 + (column - width / 2) ** 2 < (0.48 * height) ** 2
+    found = []
+    for picture in pictures:
+        made = np.where(inside[..., None], picture, rng.integers(0, 9, (height, width, 1))).astype(np.uint8)
+        made[4:10, 4:30] = 200  # the name of the hospital
+        found.append(made)
+    return found, inside
+
+
+@pytest.mark.parametrize("name", ["pulling", "still"])
+def test_a_round_field_of_view_is_found_and_not_taken_for_an_instrument(name, tmp_path, capsys):
+    """Through a real codec; without the search for the border, whole frames were excluded."""
+    pictures, true = scene(name)
+    shown, inside = through_a_scope(pictures)
+    write(tmp_path / "a.mp4", shown, options={"crf": "20"})
+    assert main(["masks", str(tmp_path / "a.mp4"), "--out", str(tmp_path / "m")]) == 0
+    said = capsys.readouterr().out
+    assert "field of view: " in said and "warning" not in said
+    found = [read_png(file) > 0 for file in sorted((tmp_path / "m/masks").iterdir())]
+    for mask, tool in zip(found, true, strict=True):
+        assert mask[~inside].mean() > 0.99
+        assert mask[inside & ~tool].mean() < 0.25, "the view stays"
+    if name == "pulling":
+        tools = [mask & inside for mask in found]
+        assert iou(tools, [tool & inside for tool in true]) > 0.4
+
+
+def test_a_picture_without_a_border_has_no_field_of_view():
+    pictures, _ = scene("pulling")
+    assert not outside_of_view([_reduced(picture) for picture in pictures]).any()
+    assert propose_masks(pictures).outside == 0
+
+
+def test_a_proposal_that_leaves_no_tissue_is_refused_with_the_frames(tmp_path, capsys, monkeypatch):
+    (tmp_path / "source").mkdir()
+    for i, picture in enumerate(scene("pulling")[0]):
+        write_png(tmp_path / "source" / f"{i}.png", picture)
+    whole = np.ones((128, 160), bool)
+    for count, code in ((3, 2), (2, 0)):
+        masks = [whole if i < count else ~whole for i in range(5)]
+        made = Proposal(masks, "made up", 0.0, tuple(range(count)))
+        monkeypatch.setattr("endotsr.sequences.make_masks.propose_masks", lambda pictures, made=made: made)
+        assert main(["masks", str(tmp_path / "source"), "--out", str(tmp_path / "m")]) == code
+        said = capsys.readouterr()
+        expected = "hardly any tissue in 3 of 5 frames: 0, 1, 2" if code else "tissue is left in 2 frames: 0, 1"
+        assert expected in (said.err if code else said.out)
 
 
 def drifting(offset):

@@ -35,6 +35,7 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
     refuse_unwritable(options.json)
+    from endotsr.sequences.files import shortened
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal
     from endotsr.sequences.source_options import SourceOptions
@@ -47,10 +48,16 @@ def run(words: list[str]) -> int:
         recording = open_recording(options.sequence, SourceOptions(layout=options.layout))
         proposal, place = write_proposal(recording, options.out), options.out
     fraction = sum(float(plane.mean()) for plane in proposal.excluded) / max(len(proposal.excluded), 1)
-    write_result(options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction)
+    write_result(
+        options.json, folder=place, found=proposal.found, reason=proposal.reason, excluded_fraction=fraction,
+        field_of_view=1 - proposal.outside, frames_without_tissue=list(proposal.without_tissue),
+    )  # fmt: skip
     if not proposal.found:
         print(f"{options.sequence}: no masks proposed: {proposal.reason}; nothing was written")
         return 1
     print(f"{options.sequence}: {proposal.reason}; {fraction:.1%} of the pixels are excluded")
+    if proposal.without_tissue:
+        named = shortened([str(i) for i in proposal.without_tissue])
+        print(f"warning: hardly any tissue is left in {len(proposal.without_tissue)} frames: {named}")
     print(f"these masks are proposals: look at {place / OVERLAY} before a training")
     return 0

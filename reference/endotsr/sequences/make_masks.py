@@ -16,6 +16,7 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, write_png
 from endotsr.sequences.common import list_contents, open_common
+from endotsr.sequences.files import shortened
 from endotsr.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.sequences.recording import Picture, Recording
 from endotsr.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
@@ -23,12 +24,30 @@ from endotsr.sequences.sources import PROPOSAL
 from endotsr.sequences.writing import new_folder, replace_text
 
 OVERLAY = "proposed_masks.png"
+MOST_WITHOUT = 0.5  # of the frames: a proposal that leaves more of them without tissue is wrong
 SHOWN, ACROSS, SHOWN_WIDTH = 12, 4, 320  # pictures of the overlay, in a row, and the largest width of one
 
 
 def left_pictures(recording: Recording) -> Iterator[Picture]:
     """The left pictures of all frames, one at a time."""
     return (pair.left for pair in recording.pictures(list(range(recording.count))))
+
+
+def _proposed(recording: Recording) -> Proposal:
+    """The proposal for a recording. Raises InputError if it leaves most frames without tissue."""
+    proposal = propose_masks(left_pictures(recording))
+    empty = without_tissue(recording, proposal)
+    if len(empty) > MOST_WITHOUT * recording.count:
+        raise InputError(
+            f"{recording.where}: the proposed masks leave hardly any tissue in {len(empty)} of {recording.count}"
+            f" frames: {shortened(empty)}; allowed: masks of another program (prepare --masks)"
+        )
+    return proposal
+
+
+def without_tissue(recording: Recording, proposal: Proposal) -> list[str]:
+    """Names of the frames in which a proposal leaves hardly any tissue."""
+    return [recording.names[i] for i in proposal.without_tissue]
 
 
 def enter_masks(folder: Path, replace: bool = False) -> Proposal:
@@ -42,7 +61,7 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     if (contents.file.masks or (folder / MASKS).exists()) and not replace:
         raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
     recording = open_common(folder)
-    proposal = propose_masks(left_pictures(recording))
+    proposal = _proposed(recording)
     if not proposal.found:
         return proposal
     staged = folder / f".new-{MASKS}"
@@ -65,7 +84,7 @@ def write_proposal(recording: Recording, out: Path) -> Proposal:
 
     Raises:  InputError; nothing is left behind then.
     """
-    proposal = propose_masks(left_pictures(recording))
+    proposal = _proposed(recording)
     if not proposal.found:
         return proposal
     with new_folder(out) as place:

@@ -10,6 +10,9 @@ region of that kind is an instrument if it is large and enters from the border o
 tissue around it, or if it lies where the frame before or after has an instrument. Other regions, such as highlights,
 are left to the tissue. Instruments of the colour of tissue and blood-covered ones are not found.
 
+A scope shows tissue in a round or cut-off field of view, and what lies outside of it is dark in all frames. That border
+is found first, from all frames together, and excluded in each; it takes no part in the search.
+
 Comes in: the pictures of a clip; goes out: a `Proposal`, or the reason why there is none. A person has to look at it.
 """
 
@@ -33,6 +36,10 @@ CLOSING, MARGIN = 0.012, 0.02  # of the longer side: gaps that are closed, and t
 RING = 0.05  # of the longer side: tissue around a region, whose motion is that of the tissue there
 UNLIKE = 1.5  # px at the working size: motion relative to the tissue
 OVERLAP = 0.5  # of a region, with the instruments of a neighbouring frame
+DARK = 20.0  # grey levels: pixels that no frame shows brighter are outside of the field of view
+LEAST_OUTSIDE, LEAST_INSIDE = 0.01, 0.05  # of the picture: a smaller border is none, a smaller field of view no view
+SOFT_EDGE = 2  # px at the working size, excluded inside the field of view: its edge is blurred
+LITTLE_TISSUE = 0.05  # of the field of view: a frame that keeps less shows hardly any tissue
 
 
 class Proposal(NamedTuple):
@@ -40,6 +47,8 @@ class Proposal(NamedTuple):
 
     excluded: list[BoolArray]  # (H, W) a frame, True = instrument; empty if nothing was found
     reason: str  # how many frames have an instrument, or why there is no proposal
+    outside: float = 0.0  # fraction of the picture outside of the field of view, excluded in every frame
+    without_tissue: tuple[int, ...] = ()  # frames in which hardly anything else is left
 
     @property
     def found(self) -> bool:
@@ -65,17 +74,69 @@ def propose_masks(pictures: Iterable[Picture]) -> Proposal:
         small.append(_reduced(picture))
     if not small:
         return Proposal([], "there are no pictures")
+    outside = outside_of_view(small)
+    chosen, reason = _instruments(small, outside)
+    if not outside.any():
+        excluded = [_enlarged(_widened(plane), size) for plane, size in zip(chosen, sizes)]
+        return Proposal(excluded, reason, 0.0, _without_tissue(excluded, 1.0))
+    border = _enlarged(outside, sizes[0])
+    widened = [_widened(plane) for plane in chosen] or [np.zeros_like(outside)] * len(sizes)
+    excluded = [_enlarged(plane | outside, size) for plane, size in zip(widened, sizes)]
+    fraction = float(border.mean())
+    said = f"field of view: {1 - fraction:.1%} of the picture, the dark border of all frames is excluded; {reason}"
+    return Proposal(excluded, said, fraction, _without_tissue(excluded, 1 - fraction))
+
+
+def _without_tissue(excluded: list[BoolArray], view: float) -> tuple[int, ...]:
+    """Frames that keep less than `LITTLE_TISSUE` of the field of view, which is the fraction `view` of the picture."""
+    return tuple(i for i, plane in enumerate(excluded) if 1 - plane.mean() < LITTLE_TISSUE * view)
+
+
+def outside_of_view(pictures: list[Picture]) -> BoolArray:
+    """(h, w) True outside of the field of view: dark in all pictures, and joined to the border of the picture.
+
+    What is bright out there, such as a text, is outside too: the field of view is one region without holes.
+
+    Edges:  pictures of several sizes, hardly any border, or hardly any view: False everywhere.
+    """
+    from scipy import ndimage
+
+    shape = pictures[0].shape[:2]
+    nowhere = np.zeros(shape, bool)
+    if any(picture.shape[:2] != shape for picture in pictures):
+        return nowhere
+    brightest = np.max([ndimage.gaussian_filter(p.max(axis=2).astype(np.float32), 1.0) for p in pictures], axis=0)
+    ring = np.ones((shape[0] + 2, shape[1] + 2), bool)
+    ring[1:-1, 1:-1] = brightest < DARK
+    joined = ndimage.binary_propagation(np.pad(nowhere, 1, constant_values=True), mask=ring)[1:-1, 1:-1]
+    labels: Any
+    labels, count = ndimage.label(ndimage.binary_opening(~joined, iterations=2))  # pyright: ignore[reportGeneralTypeIssues]
+    if not count:
+        return nowhere
+    largest = labels == 1 + int(np.bincount(labels.ravel())[1:].argmax())
+    beyond = ~np.asarray(ndimage.binary_fill_holes(largest), bool)
+    outside = np.asarray(ndimage.binary_dilation(beyond, iterations=SOFT_EDGE), bool)
+    if not LEAST_OUTSIDE <= joined.mean() or 1 - outside.mean() < LEAST_INSIDE:
+        return nowhere
+    return outside
+
+
+def _instruments(small: list[Picture], outside: BoolArray) -> tuple[list[BoolArray], str]:
+    """The instruments of every picture, empty without any, and the reason. Outside of the view nothing is searched."""
     redness = [_redness(picture) for picture in small]
-    usual = float(np.median(np.concatenate([plane[::4, ::4].ravel() for plane in redness])))
+    bounded = bool(outside.any())
+    inside = [plane[~outside][::16] if bounded else plane[::4, ::4].ravel() for plane in redness]
+    usual = float(np.median(np.concatenate(inside)))
     if usual < LEAST_REDNESS:
-        return Proposal([], f"the usual redness is {usual:.3f}: grey metal does not stand out from such pictures")
-    regions = [_regions(plane, usual) for plane in redness]
+        return [], f"the usual redness is {usual:.3f}: grey metal does not stand out from such pictures"
+    if bounded:  # towards the edge of the view the pictures are too dark to have a colour
+        redness = [np.where(outside | (p.max(axis=2) < DARK), usual, r) for r, p in zip(redness, small)]
+    regions = [_regions(plane, usual, outside) for plane in redness]
     chosen = _chosen(small, regions)
     frames = sum(plane.any() for plane in chosen)
     if not frames:
-        return Proposal([], "no grey region enters from the border or moves unlike the tissue")
-    excluded = [_enlarged(_widened(plane), size) for plane, size in zip(chosen, sizes)]
-    return Proposal(excluded, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}")
+        return [], "no grey region enters from the border or moves unlike the tissue"
+    return chosen, f"instruments in {frames} of {len(chosen)} frames, usual redness {usual:.3f}"
 
 
 def _reduced(picture: Picture) -> Picture:
@@ -92,8 +153,8 @@ def _redness(picture: Picture) -> FloatArray:
     return (red - np.minimum(green, (green + blue) / 2)) / (red + green + blue + FLOOR)
 
 
-def _regions(redness: FloatArray, usual: float) -> list[_Region]:
-    """Connected grey regions, without the smallest."""
+def _regions(redness: FloatArray, usual: float, outside: BoolArray) -> list[_Region]:
+    """Connected grey regions, without the smallest. One enters at the border of the picture or of the field of view."""
     from scipy import ndimage
 
     reach = max(1, round(CLOSING * max(redness.shape)))
@@ -102,11 +163,13 @@ def _regions(redness: FloatArray, usual: float) -> list[_Region]:
     closed = ndimage.binary_closing(padded, iterations=reach)[reach:-reach, reach:-reach]
     labels: Any
     labels, count = ndimage.label(ndimage.binary_fill_holes(closed))  # pyright: ignore[reportGeneralTypeIssues]
+    border = outside if outside.shape == redness.shape else np.zeros(redness.shape, bool)
+    near_border = np.asarray(ndimage.binary_dilation(border, iterations=2), bool)
     found = []
     for label in range(1, count + 1):
         pixels = labels == label
         if pixels.mean() >= LEAST_AREA:
-            edge = pixels[[0, -1]].any() or pixels[:, [0, -1]].any()
+            edge = pixels[[0, -1]].any() or pixels[:, [0, -1]].any() or (pixels & near_border).any()
             found.append(_Region(pixels, bool(edge) and pixels.mean() >= ENTERING_AREA))
     return found
 

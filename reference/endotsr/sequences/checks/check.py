@@ -148,7 +148,10 @@ def _mask(parts: Parts, run: _Pass, file: Path | None, i: int, size: tuple[int, 
             run.findings.append(_other_size(file, i, plane.shape, size))
         return None
     read = lambda: tissue_masks([plane], [str(file)], parts.excluded_value)[0]
-    return run.tried(read, "mask-values", file, i)
+    tissue = run.tried(read, "mask-values", file, i)
+    if tissue is not None and not tissue.any():
+        run.findings.append(finding("frame-without-tissue", file, "the mask excludes every pixel", i))
+    return tissue
 
 
 def _depth(

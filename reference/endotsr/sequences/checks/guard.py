@@ -17,7 +17,7 @@ from endotsr.sequences.checks.findings import Finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.splatting.camera import Camera
 
-SAID_ALREADY = ("far-from-origin", "frame-without-depth")  # in the notes on the world and on the depth
+SAID_ALREADY = ("far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
 MOST = 5  # notes of one kind
 
 

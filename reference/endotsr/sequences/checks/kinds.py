@@ -55,6 +55,8 @@ KINDS: dict[str, Kind] = {
     "mask-values": Kind("refusal", REFUSED, "store two values"),
     "tissue-fraction": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
     "polarity": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
+    "frame-without-tissue": Kind("warning", "nothing is learnt from it, and its tissue metrics are undefined",
+                                 "look at its mask; leave the frame out if the mask is right"),
     "single-mask": Kind("refusal", REFUSED, "mend this mask"),
     # depth
     "no-depth": Kind("refusal", "nothing can be placed in space", "make it with `endotsr depth`, or check its scale"),
