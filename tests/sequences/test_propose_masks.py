@@ -54,7 +54,7 @@ def through_a_scope(pictures, seed=7):
     """The pictures in a round field of view: a dark, noisy border with a bright text in it, as a recorder writes it."""
     rng, (height, width) = np.random.default_rng(seed), pictures[0].shape[:2]
     row, column = np.mgrid[:height, :width]
-    inside = (row - height / 2) ** 2 + (column - width / 2) ** 2 < (0.48 * height) ** 2
+    inside = (row - height / 2) ** 2 + (column - width / 2) ** 2 < (0.42 * height) ** 2
     found = []
     for picture in pictures:
         made = np.where(inside[..., None], picture, rng.integers(0, 9, (height, width, 1))).astype(np.uint8)

@@ -57,6 +57,8 @@ class PrepareOptions:
     """unit of the depth"""
     depth_scale: float = 1.0
     """length of one step of the stored depth, in its unit"""
+    trust_depth: bool = False
+    """read these files as lengths even if they look like disparity or a relative depth"""
     points: Literal["interpolated", "sparse", "none"] = "interpolated"
     """depth from the points of a reconstruction (COLMAP): between the points, at the points, or none"""
     frames: Annotated[str, Option("A:B[:S]")] = ""
@@ -122,7 +124,7 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
 
     same = (
         "layout", "stereo", "distortion", "calibration", "baseline", "trajectory", "trajectory_unit", "masks",
-        "excluded_value", "depth", "depth_unit", "depth_scale", "orientation",
+        "excluded_value", "depth", "depth_unit", "depth_scale", "trust_depth", "orientation",
     )  # fmt: skip
     return SourceOptions(
         **{name: getattr(options, name) for name in same},

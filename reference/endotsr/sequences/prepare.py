@@ -36,6 +36,7 @@ from endotsr.sequences.sequence_file import (
     write_sequence_file,
 )
 from endotsr.sequences.splits import evenly_spaced, parse_frame_range
+from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
 from endotsr.sequences.writing import new_folder
@@ -69,6 +70,7 @@ def prepare(
     notes = list(recording.notes)
     chosen = select_frames(recording, settings, notes)
     chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
+    refuse_no_lengths(recording, chosen)
     with new_folder(Path(out)) as folder:
         found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)

@@ -63,6 +63,14 @@ class Pair(NamedTuple):
     right: Picture | None = None
 
 
+class StatedDepth(NamedTuple):
+    """Depth files that a user names."""
+
+    path: Path
+    step: float  # length of one step of the stored numbers, in the unit of the recording
+    trusted: bool  # the user says that they hold lengths
+
+
 @dataclass(frozen=True)
 class Recording:
     """Frames of a source and all that is known about them. What the source lacks is None."""
@@ -74,6 +82,7 @@ class Recording:
     masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
     proposed: bool = False  # a program made the masks, and nobody has checked them
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
+    stated_depth: StatedDepth | None = None  # where `depth` comes from, if the user named it
     depth_clipped: bool = False  # to the percentiles of a training, before it was reduced
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions that a frame sees, in `unit`
     unit: str = "mm"

@@ -18,7 +18,14 @@ from endotsr.kernels.memory import ASSUMED, unknown_memory
 from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.cost import Cost, estimated_cost
-from endotsr.sequences.checks.depth import DepthFacts, depth_facts, depth_findings, inverted_finding
+from endotsr.sequences.checks.depth import (
+    DepthFacts,
+    depth_facts,
+    depth_findings,
+    inverted_finding,
+    light_correlation,
+    light_finding,
+)
 from endotsr.sequences.checks.findings import Finding, finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings, time_findings
 from endotsr.sequences.checks.parts import Parts, parts_of
@@ -58,6 +65,7 @@ class _Pass:
         self.depth: list[DepthFacts] = []
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
+        self.light: list[float] = []  # rank correlation of brightness with depth, of the sampled frames
 
     def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
         """The value, or None and a refusal."""
@@ -85,6 +93,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
         run.findings += frame_findings(run.frames, str(parts.images[0].parent))
     if run.depth:
         run.findings += depth_findings(run.depth, str(parts.depth[0].parent), parts.arbitrary, config.raster.near)
+        run.findings += light_finding(run.light, str(parts.depth[0].parent))
     if run.samples:
         _check_masks(parts, run, config)
     config = _of_length(parts, config, run)
@@ -121,6 +130,8 @@ def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
         tissue = _mask(parts, run, masks[i], i, size)
         found = _depth(parts, run, depth[i], i, size, tissue)
         if i in sampled:
+            if found is not None:
+                run.light.append(light_correlation(picture, found, tissue))
             _sample(run, file, picture, tissue, found)
             if i == 0 and parts.right and found is not None:
                 _against_stereo(parts, run, picture, found, depth[i])

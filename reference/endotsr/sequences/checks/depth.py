@@ -16,6 +16,8 @@ FEW_LEVELS = 6  # whole millimetres, as published clips have them, give a dozen 
 LITTLE = 0.2  # of the tissue
 FAR_OFF = 4.0
 FULL_SCALE = (255.0, 65535.0)
+AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
+LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
 
 
 class DepthFacts(NamedTuple):
@@ -62,7 +64,7 @@ def depth_findings(facts: list[DepthFacts], where: str, arbitrary: bool, near: f
     usual = float(np.median([fact.median for fact in with_depth]))
     found = _numbers(with_depth, where)
     if not arbitrary and not found:
-        found += _unit(usual, where)
+        found += unit_finding(usual, where)
     if usual <= near:
         found.append(finding("near-plane", where, f"median depth {usual:.4g} is before the near plane"))
     found += [kind for i, fact in enumerate(facts) for kind in _of_frame(fact, usual, where, i)]
@@ -98,7 +100,8 @@ def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
     return []
 
 
-def _unit(usual: float, where: str) -> list[Finding]:
+def unit_finding(usual: float, where: str) -> list[Finding]:
+    """A warning on a median depth, in millimetres, that no endoscope sees."""
     if NEAREST <= usual <= FARTHEST:
         return []
     guesses = ((256.0, "millimetres times 256"), (1e-3, "metres"), (0.1, "centimetres"), (1000.0, "micrometres"))
@@ -119,3 +122,35 @@ def inverted_finding(
         return []
     what = f"depth falls where the stereo pair says far ({correlation:.2f})"
     return [finding("inverted-depth", where, what, frame)]
+
+
+def light_correlation(
+    picture: NDArray[np.uint8], depth: NDArray[np.float32], tissue: NDArray[np.bool_] | None
+) -> float:
+    """The rank correlation of brightness with depth over the tissue of a frame; not a number with too few pixels.
+
+    picture (H, W, 3), depth (H, W), 0 = none; tissue (H, W) or None. Black and overexposed pixels are left out.
+    """
+    from scipy.stats import rankdata
+
+    step = max(1, min(depth.shape) // 96)
+    small, values = picture[::step, ::step], depth[::step, ::step]
+    brightest = small.max(axis=2)
+    usable = (values > 0) & (brightest > LIT[0]) & (brightest < LIT[1])
+    if tissue is not None:
+        usable &= tissue[::step, ::step]
+    if usable.sum() < FEWEST or np.ptp(values[usable]) == 0:
+        return float("nan")
+    light = small[usable].sum(axis=1, dtype=np.float64)
+    if np.ptp(light) == 0:
+        return float("nan")
+    return float(np.corrcoef(rankdata(light), rankdata(values[usable]))[0, 1])
+
+
+def light_finding(correlations: list[float], where: str) -> list[Finding]:
+    """A warning where brightness grows with depth in every frame that was looked at."""
+    known = [value for value in correlations if np.isfinite(value)]
+    if not known or np.median(known) < AGAINST_LIGHT or min(known) < AGAINST_LIGHT / 2:
+        return []
+    what = f"what the depth calls far is brighter (rank correlation {np.median(known):.2f}; of depth it is negative)"
+    return [finding("depth-against-light", where, what)]

@@ -77,6 +77,9 @@ KINDS: dict[str, Kind] = {
     "coarse-depth": Kind("warning", "surfaces become steps", "store 16 bits with a smaller step"),
     "inverted-depth": Kind("refusal", "near and far are exchanged: the file holds disparity, or an inverted picture",
                            "read it as disparity: endotsr depth --given FOLDER --kind disparity"),
+    "depth-against-light": Kind("warning", "the light is on the scope, so that near tissue is brighter: the file may"
+                                " hold disparity or an inverse depth",
+                                "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
     # cameras
     "cameras": Kind("refusal", REFUSED, "mend the poses"),
     "distortion": Kind("refusal", "the model is a pinhole camera", "straighten them with endotsr prepare"),

@@ -14,10 +14,15 @@ from typing import NamedTuple
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.sequences.recording import Recording
+from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Recording, StatedDepth
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import masks_are_proposed
+
+# What a user may state of a source and only some layouts read; the others follow from these.
+STATEMENTS = (
+    "stereo", "camera", "distortion", "calibration", "baseline", "trajectory", "masks", "depth", "orientation",
+)  # fmt: skip
 
 
 class Layout(NamedTuple):
@@ -28,6 +33,7 @@ class Layout(NamedTuple):
     rank: int  # layouts are tried in ascending order
     recognises: Callable[[Path], bool]
     open: Callable[[Path, SourceOptions], Recording]
+    takes: tuple[str, ...] = ()  # of STATEMENTS: what it reads; anything else that is stated is refused
     read: Callable[[Path, SequenceConfig, float], Sequence] | None = None  # None: `endotsr prepare` comes first
     hashes: Callable[[Path, SequenceConfig], dict[str, str]] | None = None  # of the files that `read` reads
 
@@ -64,8 +70,22 @@ def open_recording(path: Path, options: SourceOptions) -> Recording:
     layout = layout_of(path, options.layout)
     if options.layout != "auto" and not Path(path).exists():
         raise InputError(f"{path}: not found")
+    refuse_unused(layout, Path(path), options)
     recording = layout.open(Path(path), options)
+    if options.depth is not None:
+        factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
+        stated = StatedDepth(options.depth, options.depth_scale * factor, options.trust_depth)
+        recording = replace(recording, stated_depth=stated)
     return replace(recording, proposed=True) if masks_are_proposed(options) else recording
+
+
+def refuse_unused(layout: Layout, path: Path, options: SourceOptions) -> None:
+    """Raises InputError for a statement that this layout does not read: its own files say so, or nothing can."""
+    defaults = SourceOptions()
+    for name in STATEMENTS:
+        if getattr(options, name) != getattr(defaults, name) and name not in layout.takes:
+            taken = ", ".join(f"--{word}" for word in layout.takes) or "none of these"
+            raise InputError(f"{path}: the layout {layout.name} does not read --{name}; allowed: {taken}")
 
 
 def read_sequence(path: Path, config: SequenceConfig, near: float) -> Sequence:

@@ -71,4 +71,5 @@ LAYOUT = Layout(
     rank=2,
     recognises=recognises,
     open=open_colmap,
+    takes=("masks",),
 )

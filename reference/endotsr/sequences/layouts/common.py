@@ -12,4 +12,5 @@ LAYOUT = Layout(
     open=lambda path, options: with_stated(open_common(path), options),
     read=read_common,
     hashes=common_hashes,
+    takes=("masks", "depth"),
 )

@@ -71,4 +71,5 @@ LAYOUT = Layout(
     open=open_endonerf,
     read=read_endonerf,
     hashes=input_hashes,
+    takes=("baseline", "masks", "depth"),
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.files import check_pairing
-from endotsr.sequences.layouts import Layout
+from endotsr.sequences.layouts import STATEMENTS, Layout
 from endotsr.sequences.recording import Pose, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import (
@@ -88,4 +88,5 @@ LAYOUT = Layout(
     rank=9,
     recognises=recognises,
     open=open_pictures,
+    takes=tuple(name for name in STATEMENTS if name != "orientation"),
 )

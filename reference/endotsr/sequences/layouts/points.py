@@ -59,6 +59,8 @@ def open_points(path: Path, options: SourceOptions) -> Recording:
         for i, matrix in enumerate(found["w2c"].astype(np.float64))
     ]
     mask = options.masks or path / "mask.png"
+    if options.masks is not None and not mask.is_file():
+        raise InputError(f"{mask}: no file; allowed: one mask for all frames, white inside the field of view")
     visible, points = found["visible"].astype(bool), found["points"].astype(np.float64)
     return Recording(
         layout="points",
@@ -81,4 +83,5 @@ LAYOUT = Layout(
     rank=2,
     recognises=recognises,
     open=open_points,
+    takes=("masks",),
 )

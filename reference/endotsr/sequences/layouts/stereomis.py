@@ -66,4 +66,5 @@ LAYOUT = Layout(
     rank=2,
     recognises=recognises,
     open=open_stereomis,
+    takes=("stereo", "calibration", "trajectory", "masks", "depth", "orientation"),
 )

@@ -86,4 +86,11 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
     )
 
 
-LAYOUT = Layout(name="tum", about="a folder with rgb.txt and rgb/", rank=3, recognises=recognises, open=open_tum)
+LAYOUT = Layout(
+    name="tum",
+    about="a folder with rgb.txt and rgb/",
+    rank=3,
+    recognises=recognises,
+    open=open_tum,
+    takes=("camera", "distortion", "trajectory", "masks", "depth"),
+)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.sequences.layouts import Layout
+from endotsr.sequences.layouts import STATEMENTS, Layout
 from endotsr.sequences.recording import Pair, Picture, Pose, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import halves, split_pair, stated_camera, stated_depth, stated_masks, unit_of
@@ -87,4 +87,4 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
     return found
 
 
-LAYOUT = Layout(name="video", about="a video file", rank=5, recognises=recognises, open=open_video)
+LAYOUT = Layout(name="video", about="a video file", rank=5, recognises=recognises, open=open_video, takes=STATEMENTS)

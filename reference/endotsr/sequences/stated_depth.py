@@ -1,0 +1,98 @@
+"""Depth files of another program, before they are read as lengths: is it depth at all?
+
+A disparity in pixels and a relative inverse depth look like millimetres by their numbers, and grow where depth falls.
+Five things speak against lengths: a name, numbers stretched to the full range of the file, a median outside of what an
+endoscope sees, the parallax of a stereo pair, and the light. Light comes from the scope, so that near tissue is
+brighter: in measured clips the rank correlation of brightness with depth is -0.55 to -0.84, and +0.55 to +0.84 with an
+inverse depth in its place. Simulated scenes with even light give -0.3 to 0.2.
+
+Comes in: a recording with stated depth; goes out: nothing, or an `InputError` with the evidence and the remedy.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.sequences.checks.depth import (
+    FULL_SCALE,
+    depth_facts,
+    inverted_finding,
+    light_correlation,
+    light_finding,
+    unit_finding,
+)
+from endotsr.sequences.recording import ARBITRARY, Recording
+
+NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
+LOOKED_AT = 8  # frames
+MATCHED = 128  # px: narrower stereo pairs are not matched
+REMEDY = (
+    "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth; a"
+    " relative depth has to become lengths first; --trust-depth reads the files as lengths all the same"
+)
+
+
+def refuse_no_lengths(recording: Recording, chosen: list[int]) -> None:
+    """Raises InputError if the stated depth of a recording is most likely none.
+
+    chosen   the frames that are read; the first `LOOKED_AT` are looked at
+    """
+    stated = recording.stated_depth
+    if stated is None or stated.trusted or recording.depth is None:
+        return
+    found = _of_names(stated.path) or _of_values(recording, chosen[:LOOKED_AT])
+    if found:
+        raise InputError(f"{stated.path}: {found}; {REMEDY}")
+
+
+def _of_names(path: Path) -> str:
+    names = [path.name, *(file.name for file in sorted(path.iterdir())[:1])] if path.is_dir() else [path.name]
+    named = next((name for name in names if NAMES.search(name.lower())), None)
+    return f"the name {named} is that of a disparity or a relative depth" if named else ""
+
+
+def _of_values(recording: Recording, frames: list[int]) -> str:
+    """What speaks against lengths in the numbers and beside the pictures; "" if nothing does."""
+    stated, where = recording.stated_depth, str(recording.where)
+    assert recording.depth is not None and stated is not None
+    planes: list[NDArray[np.float32]] = []
+    light: list[float] = []
+    for i, pair in zip(frames, recording.pictures(frames)):
+        plane = recording.depth(i)
+        if plane is None or not plane.any():
+            continue
+        planes.append(plane)
+        if plane.shape == pair.left.shape[:2]:
+            tissue = recording.masks(i) if recording.masks else None
+            light.append(light_correlation(pair.left, plane, tissue))
+            if len(planes) == 1 and recording.rig is None and pair.right is not None and plane.shape[1] > MATCHED:
+                found = inverted_finding(plane, _disparity(pair.left, pair.right), where, i)
+                if found:
+                    return found[0].what
+    if not planes:
+        return ""
+    if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
+        return full
+    usual = float(np.median([depth_facts("", plane, plane, None).median for plane in planes]))
+    found = ([] if recording.unit == ARBITRARY else unit_finding(usual, where)) or light_finding(light, where)
+    return found[0].what if found else ""
+
+
+def _full_scale(stored: list[NDArray[np.float32]]) -> str:
+    """Numbers that are stretched to the full range in every frame: of whole numbers, or of 0 to 1."""
+    highest = [float(plane.max()) for plane in stored]
+    if len({round(value) for value in highest}) == 1 and round(highest[0]) in FULL_SCALE:
+        return f"the largest number of every frame is {highest[0]:.0f}: the frames are stretched to the full range"
+    if all(0.99 <= value <= 1.0 for value in highest):
+        return "the largest number of every frame is 1: the frames are stretched to the full range"
+    return ""
+
+
+def _disparity(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
+    from endotsr.opencv.stereo import match_pair
+
+    match = match_pair(left, right, 0, 64, smooth=False)
+    return np.where(match.disagreement <= 1, match.raw, np.nan)
