@@ -39,9 +39,10 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
     """A video.
 
     milliseconds  of every frame; None: evenly spaced at `rate`
-    more          `options` of the encoder, `layout` (pixel format), `shape` (of a pixel), `transfer` (function)
+    more          `options` of the encoder, those of the `container`, `layout` (pixel format), `shape` (of a pixel),
+                  `transfer` (function)
     """
-    with av.open(str(path), "w") as container:
+    with av.open(str(path), "w", options=more.get("container") or {}) as container:
         stream = container.add_stream(codec, rate=1000 if milliseconds else rate, options=more.get("options") or {})
         stream.width, stream.height = frames[0].shape[1], frames[0].shape[0]
         stream.pix_fmt = more.get("layout") or "yuv420p"

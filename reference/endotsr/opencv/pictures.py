@@ -22,6 +22,7 @@ TIFF_ENDINGS = (".tif", ".tiff")
 EXR_ENDINGS = (".exr",)
 PICTURE_ENDINGS = (".png", *JPEG_ENDINGS)  # of colour pictures and masks
 JPEG_START, JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"
+ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
 TIFF_STARTS = (b"II*\0", b"MM\0*")
 EXR_START = b"v/1\x01"
 
@@ -49,6 +50,12 @@ def _jpeg(data: bytes, path: Path) -> Array:
 
     try:
         with JpegImageFile(io.BytesIO(data)) as picture:
+            turn = picture.getexif().get(ORIENTATION, 1)
+            if turn not in (0, 1):
+                raise InputError(
+                    f"{path}: its EXIF data turn the picture (orientation {turn}), which a calibration may not know;"
+                    " allowed: pictures that are stored as they are shown"
+                )
             if picture.width * picture.height > MOST_PIXELS:
                 raise InputError(f"{path}: {picture.width}x{picture.height} pixels; allowed: at most {MOST_PIXELS}")
             return np.array(picture if picture.mode == "L" else picture.convert("RGB"))

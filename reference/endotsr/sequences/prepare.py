@@ -177,7 +177,7 @@ def _write_frames(
         _write_pictures(folder, k, new, settings.pictures)
         if recording.masks is not None:
             _write_mask(folder, k, straight.mask(_mask_or_nearest(recording, i, chosen)))
-        depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points)
+        depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
         if depth is not None and depth.any():
             depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
             saturated += _write_depth(folder, k, depth, depth_scale)
@@ -224,10 +224,15 @@ def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray
 
 
 def _depth(
-    recording: Recording, i: int, straight: Straightener, pose: Pose | None, points: str
+    recording: Recording, i: int, straight: Straightener, pose: Pose | None, points: str, size: tuple[int, ...]
 ) -> NDArray[np.float32] | None:
     if recording.depth is not None:
         found = recording.depth(i)
+        if found is not None and found.shape != size:
+            raise InputError(
+                f"{recording.where}: frame {recording.names[i]}: depth of {found.shape[1]}x{found.shape[0]} pixels, the"
+                f" picture has {size[1]}x{size[0]}; allowed: one size (`endotsr depth --given` takes proportional ones)"
+            )
         return None if found is None else straight.depth(found)
     if recording.points is None or pose is None or points == "none":
         return None

@@ -25,7 +25,7 @@ LARGEST_FILE = 1 << 40  # bytes: a video is decoded picture by picture
 # First bytes of the containers: the ending of a name says nothing of what a decoder would do with a play list.
 STARTS = {
     0: (b"RIFF", b"\x1aE\xdf\xa3", b"\0\0\1", b"G", b"0&\xb2u"),  # avi, mkv and webm, mpeg, ts, wmv
-    4: (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # mp4 and mov
+    4: (b"G", b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"pnot"),  # m2ts; mp4 and mov
 }
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
 HIDDEN = ("vp8",)  # codecs with packets that hold no picture of their own: their pictures are counted by decoding

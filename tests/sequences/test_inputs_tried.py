@@ -1,0 +1,15 @@
+"""Every row of `inputs_tried.py`: nothing is wrong in silence, and each outcome is the expected one."""
+
+import pytest
+from inputs_tried import ROWS, tried
+
+
+def test_the_table_is_long_enough_and_names_every_input_once():
+    assert len(ROWS) >= 60 and len({row.kind for row in ROWS}) == len(ROWS)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=[row.kind for row in ROWS])
+def test_an_input_has_its_outcome(row, tmp_path):
+    found = tried(row, tmp_path)
+    assert found.outcome == row.expected, found
+    assert row.said in found.message or found.outcome == "right", found
