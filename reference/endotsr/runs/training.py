@@ -166,15 +166,14 @@ class _Recorder:
         self._between_iterations = False  # whether the run was stopped after a whole iteration
 
     def on_iteration(self, entry: dict[str, Any]) -> None:
-        """Log one iteration. Raises KeyboardInterrupt after a signal, or where the observer does."""
+        """Log one iteration. Raises KeyboardInterrupt after a signal."""
         tick = time.monotonic()
         self.log.append(entry | {"seconds": round(tick - self._last_tick, 5)})
         self._last_tick = tick
-        self._between_iterations = True  # the observer may end the run too
         self._observer.update(entry)
         if stop_asked():
+            self._between_iterations = True
             raise KeyboardInterrupt
-        self._between_iterations = False
 
     def on_checkpoint(self, state: "TrainingState") -> None:
         """Replace the checkpoint."""

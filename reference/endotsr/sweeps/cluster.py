@@ -48,7 +48,7 @@ def cluster_outcomes(
             yield from _outcomes(client, jobs, sequence_of, out, threads)
         except BaseException:
             with contextlib.suppress(OSError):
-                (out / STOP).touch()  # the runs look for it
+                (out / STOP).touch()  # the runs look for it, and end at their last checkpoint
             raise
 
 

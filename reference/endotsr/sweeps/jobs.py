@@ -20,7 +20,7 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.sweeps.spec import Configuration, Spec, Start, split_name, split_settings
 
 RUNS, SHARED = "runs", "shared"  # folders of the runs and of the checkpoints that several runs begin with
-STOP = "sweep.stop"  # a file: the workers look for it, and end with a checkpoint of their iteration
+STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
 
 
 class Job(NamedTuple):
