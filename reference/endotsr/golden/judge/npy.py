@@ -88,8 +88,11 @@ def _with_open(path: Path, root: Path | None, read: Callable[[int], T]) -> T:
     try:
         if root is not None and not path.resolve().is_relative_to(root.resolve()):
             raise Refused("a link that leaves the folder")
-        if stat.S_ISLNK(os.lstat(path).st_mode):
+        mode = os.lstat(path).st_mode  # before opening: not every system has the flags
+        if stat.S_ISLNK(mode):
             raise Refused("a link; allowed: a regular file")
+        if not stat.S_ISREG(mode):
+            raise Refused("not a regular file")
         handle = os.open(path, FLAGS)
     except FileNotFoundError:
         raise Refused("missing") from None

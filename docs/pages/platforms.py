@@ -1,0 +1,43 @@
+"""Table of docs/guides/platforms.md from docs/results/platforms.json: python docs/pages/platforms.py
+
+docs/results/platforms.json   python tests/platforms.py --json docs/results/platforms.json
+"""
+
+from pathlib import Path
+from typing import Any
+
+from marks import read_json, write_marked
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "guides" / "platforms.md"
+RESULT = ROOT / "docs" / "results" / "platforms.json"
+MADE_BY = "python tests/platforms.py --json docs/results/platforms.json"
+
+
+def parts() -> dict[str, str]:
+    """The generated part of the page."""
+    return {"resolved": resolved(read_json(RESULT, MADE_BY))}
+
+
+def resolved(result: dict[str, Any]) -> str:
+    """One row a system, one column a version of Python; a cell names the versions of Numba, NumPy and OpenCV."""
+    rows = result["rows"]
+    pythons = list(dict.fromkeys(row["python"] for row in rows))
+    lines = [f"| System | {' | '.join(f'Python {version}' for version in pythons)} |", "|---" * (len(pythons) + 1) + "|"]
+    for system in dict.fromkeys(row["system"] for row in rows):
+        cells = [_cell(row) for row in rows if row["system"] == system]
+        lines.append(f"| {system} | {' | '.join(cells)} |")
+    note = "Versions of Numba, NumPy and OpenCV that pip chooses, or the first dependency that has no wheel."
+    return "\n".join([*lines, "", f"{note} Resolved on {result['date'][:10]}."])
+
+
+def _cell(row: dict[str, Any]) -> str:
+    if row["complete"]:
+        found = row["versions"]
+        return ", ".join(found[name] for name in ("numba", "numpy", "opencv-contrib-python-headless"))
+    missing = row["reason"].split("requirement ")[-1] if "requirement" in row["reason"] else row["reason"]
+    return f"no {missing.split('<')[0].split('>')[0].split('=')[0].split(' ')[0]}"
+
+
+if __name__ == "__main__":
+    write_marked(PAGE, parts(), "platforms")
