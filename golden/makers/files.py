@@ -14,18 +14,16 @@ import numpy as np
 
 from endotsr.golden.judge.format import SCHEMAS, FileEntry, FlagNote, Manifest, schema_text, to_json
 from endotsr.golden.judge.npy import header_of, npy_bytes
+from endotsr.kernels.machine import compiled_for
 from makers.solve import Solved
 from makers.wrong import WrongPort
 
 
 def machine_class() -> str:
     """On machines of one class the reference gives the same bits."""
-    import llvmlite.binding
     import numba
 
-    return (
-        f"{platform.machine()} {llvmlite.binding.get_host_cpu_name()} numpy {np.__version__} numba {numba.__version__}"
-    )
+    return f"{platform.machine()} {compiled_for()} numpy {np.__version__} numba {numba.__version__}"
 
 
 def rendered_files(

@@ -10,7 +10,8 @@ import pytest
 
 from endotsr.config import DEMO, PAPER
 from endotsr.fitting import compile_ahead
-from endotsr.kernels.machine import usable_cores
+from makers.files import machine_class
+from endotsr.kernels.machine import compiled_for, usable_cores
 
 COMPILE = """
 from endotsr.fitting import compile_ahead
@@ -68,3 +69,25 @@ def test_settings_that_call_other_kernels_have_another_marker():
     double = msgspec.structs.replace(PAPER, training=msgspec.structs.replace(PAPER.training, precision="float64"))
     static = msgspec.structs.replace(PAPER, model=msgspec.structs.replace(PAPER.model, deformation=False))
     assert len({compile_ahead.done_before(config) for config in (PAPER, double, static)}) == 3
+
+
+def test_what_decides_the_last_bits_is_part_of_the_marker_and_of_the_class_of_a_machine(monkeypatch):
+    here = compiled_for()
+    assert here in machine_class() and here in done_before_name()
+    seen = [here]
+    monkeypatch.setattr("numba.config.CPU_NAME", "x86-64-v3")
+    assert compiled_for().startswith("x86-64-v3")
+    seen.append(compiled_for())
+    for features in ("", "+avx2"):
+        monkeypatch.setattr("numba.config.CPU_FEATURES", features)
+        seen.append(compiled_for())
+    for system, library in (("Windows", ("", "")), ("Darwin", ("", "")), ("Linux", ("", ""))):  # the last: no glibc
+        monkeypatch.setattr("platform.system", lambda system=system: system)
+        monkeypatch.setattr("platform.libc_ver", lambda library=library: library)
+        seen.append(compiled_for())
+        assert compiled_for() in machine_class() and compiled_for() in done_before_name()
+    assert len(set(seen)) == len(seen) and not any(" " in name or "/" in name for name in seen)
+
+
+def done_before_name():
+    return compile_ahead.done_before(PAPER).name

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 
 from endotsr.config import Config
-from endotsr.kernels.machine import usable_cores
+from endotsr.kernels.machine import compiled_for, usable_cores
 
 READY = "ready for the first iteration"
 _helpers: list[subprocess.Popen] = []  # kept until this process ends, which does not wait for their last kernels
@@ -67,13 +67,12 @@ def _second(config: Config) -> subprocess.Popen | None:
 def done_before(config: Config) -> Path:
     """The file that marks all kernels of this source and these components as compiled for this processor."""
     import numba
-    from llvmlite.binding import get_host_cpu_name
 
     from endotsr.kernels.jit import kernel_source_hash
 
     model = config.model
     parts = [name for name in ("deformation", "appearance", "spectral_motion", "laplacian") if getattr(model, name)]
-    words = (kernel_source_hash(), config.training.precision, *parts, config.raster.preset, get_host_cpu_name())
+    words = (kernel_source_hash(), config.training.precision, *parts, config.raster.preset, compiled_for())
     return Path(numba.config.CACHE_DIR) / f"compiled-{'-'.join(words)}"  # type: ignore[attr-defined]
 
 
