@@ -1,8 +1,8 @@
 """Machine code of every kernel of a training for other processors and systems: python tests/kernels/lowering.py
 
 In a process that optimises nothing, a small training calls every kernel. Their LLVM code is then optimised and compiled
-by llvmlite for each of TARGETS. Nothing of it is run: what is shown is that every kernel can be compiled there, and which
-functions of the system it calls.
+by llvmlite for each of TARGETS. Nothing of it is run: what is shown is that every kernel can be compiled there, and
+which functions of the system it calls.
 """
 
 import json
@@ -33,7 +33,8 @@ LIBRARY = {
 }  # fmt: skip
 FLOAT_OF_LIBRARY = re.compile(r"llvm\.(exp|log|log2|pow|sin|cos)\.f(32|64)")
 CALLS_ALL = """
-import gc, json, sys
+import gc, json, sys, warnings
+warnings.simplefilter("ignore")  # without optimisation no kernel can be kept
 from numba.core.dispatcher import Dispatcher
 from endotsr.config import PAPER
 from endotsr.fitting.compile_ahead import rehearse
