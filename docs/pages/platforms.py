@@ -23,7 +23,10 @@ def resolved(result: dict[str, Any]) -> str:
     """One row a system, one column a version of Python; a cell names the versions of Numba, NumPy and OpenCV."""
     rows = result["rows"]
     pythons = list(dict.fromkeys(row["python"] for row in rows))
-    lines = [f"| System | {' | '.join(f'Python {version}' for version in pythons)} |", "|---" * (len(pythons) + 1) + "|"]
+    lines = [
+        f"| System | {' | '.join(f'Python {version}' for version in pythons)} |",
+        "|---" * (len(pythons) + 1) + "|",
+    ]
     for system in dict.fromkeys(row["system"] for row in rows):
         cells = [_cell(row) for row in rows if row["system"] == system]
         lines.append(f"| {system} | {' | '.join(cells)} |")

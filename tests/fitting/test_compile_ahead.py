@@ -10,8 +10,8 @@ import pytest
 
 from endotsr.config import DEMO, PAPER
 from endotsr.fitting import compile_ahead
-from makers.files import machine_class
 from endotsr.kernels.machine import compiled_for, usable_cores
+from makers.files import machine_class
 
 COMPILE = """
 from endotsr.fitting import compile_ahead
