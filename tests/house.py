@@ -147,10 +147,10 @@ def settings(root: Path = ROOT) -> list[str]:
 
 def commands(root: Path = ROOT) -> list[str]:
     """The words that may follow `endotsr`."""
-    for node in modules(root)["cli.main"].body:
+    for node in modules(root)["cli.parts.commands"].body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "COMMANDS":
             return list(ast.literal_eval(node.value))
-    raise ValueError("cli/main.py has no table COMMANDS")
+    raise ValueError("cli/parts/commands.py has no table COMMANDS")
 
 
 def main(root: Path) -> None:
