@@ -24,8 +24,8 @@ GROUPS = (
     ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
     (
         "The method",
-        "Each forward pass has its reverse pass below it.",
-        ("equations", "splatting", "losses", "kernels"),
+        "Each forward pass has its reverse pass below it; first in plain NumPy, then compiled.",
+        ("definition", "equations", "splatting", "losses", "kernels"),
     ),
     ("Checks and ports", "Gradients, stored numbers, and the registry of both.", ("gradcheck", "golden", "stages")),
     ("Time and accuracy", "Measurements of this machine, and many runs.", ("bench", "tradeoff", "sweeps")),

@@ -12,7 +12,11 @@ from package_names import PACKAGE, ROOT
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
+from endotsr.golden.judge.store import read_golden
+from endotsr.golden.judge.twins import golden_requests
 from endotsr.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
+from endotsr.gradcheck.twins import BOUND, BOUNDS, Distance, all_distances
+from endotsr.stages.registry import all_stages
 
 DOCS = ROOT / "docs"
 NOTE = "<!-- Written by docs/_extensions/book_pages.py. Do not edit. -->\n"
@@ -135,6 +139,44 @@ def _report(name: str, function: str, report: PairReport) -> Iterator[str]:
     yield ""
 
 
+def definition_page(found: list[Distance]) -> str:
+    """The worst difference of every output from the definition; a book with a wrong one is not built."""
+    if wrong := [
+        f"{d.stage}.{d.output}: {d.distance:.1e} of {d.bound:.0e}" for d in found if not d.distance <= d.bound
+    ]:
+        raise ExtensionError("compiled functions differ from their definition\n" + "\n".join(wrong))
+    lines = [
+        "# The definition",
+        "",
+        "The room `endotsr.definition` is the method as text: plain NumPy in float64, one file an equation,",
+        "forward and reverse. The pages of the {doc}`specification/index` show it below their displays,",
+        "{doc}`api/definition` lists it, and {doc}`one_iteration` names the files in the order of an iteration.",
+        "`python -m endotsr.definition` trains a small scene with it.",
+        "",
+        "The compiled functions compute the same in another way. The table gives the largest difference of each",
+        "output and gradient in float64, over the made-up inputs of the gradient checks (three seeds) and over",
+        "the inputs of all {doc}`golden_cases`, in units of the largest magnitude of the array. It was measured",
+        "when these pages were built; `python docs/_extensions/book_pages.py` prints the same numbers.",
+        "",
+        f"The bound is {BOUND:g}, except where the last column names another one:",
+        "",
+        *(f"- {name}: {reason} ({bound:g})." for name, (bound, reason) in BOUNDS.items()),
+        "",
+        "| Stage | Equation | Definition | Output | Largest difference | Bound |",
+        "|---|---|---|---|---|---|",
+    ]
+    labels = {name: stage.equation.lower() for name, stage in all_stages().items()}
+    for d in found:
+        equation = f"{{eq}}`eq-{labels[d.stage.split()[0]]}`"
+        cells = (d.stage, equation, function_link(d.function), f"`{d.output}`", f"{d.distance:.1e}", f"{d.bound:g}")
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def differences() -> list[Distance]:
+    return all_distances(golden_requests(read_golden(ROOT / "golden")))
+
+
 def golden_page() -> str:
     lines = [
         "# Golden cases",
@@ -189,11 +231,22 @@ def write(file: Path, text: str) -> None:
 def write_pages(app: Sphinx) -> None:
     write(DOCS / "equations.md", equation_page())
     write(DOCS / "golden_cases.md", NOTE + golden_page())
-    checks, stamp = DOCS / "gradient_checks.md", f"<!-- Sources {source_digest()}. -->\n"
-    if not checks.is_file() or stamp not in checks.read_text(encoding="utf-8"):
-        write(checks, NOTE + stamp + checks_page(gradient_reports()))
+    stamp = f"<!-- Sources {source_digest()}. -->\n"
+    measured = {
+        "gradient_checks": lambda: checks_page(gradient_reports()),
+        "definition": lambda: definition_page(differences()),
+    }
+    for name, page in measured.items():
+        file = DOCS / f"{name}.md"
+        if not file.is_file() or stamp not in file.read_text(encoding="utf-8"):
+            write(file, NOTE + stamp + page())
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", write_pages)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+if __name__ == "__main__":
+    for d in differences():
+        print(f"{d.stage:24} {d.output:30} {d.distance:8.1e} of {d.bound:.0e}  {d.request}")

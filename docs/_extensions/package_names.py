@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "reference" / "endotsr"
 SPECIFICATION = ROOT / "docs" / "specification"
 NOTEBOOKS = ROOT / "notebooks"
+DEFINITION = "endotsr.definition."  # a short name means the compiled function
 LABEL = re.compile(r"^\$\$ \(eq-([\w-]+)\)$", re.MULTILINE)
 
 
@@ -38,8 +39,9 @@ def definitions() -> dict[str, str]:
 @cache
 def linkable() -> dict[str, str]:
     """Text in back quotes -> dotted target: full names, and short names that only one module defines."""
-    count = Counter(definitions().values())
-    short = {name: dotted for dotted, name in definitions().items() if count[name] == 1}
+    compiled = {dotted: name for dotted, name in definitions().items() if not dotted.startswith(DEFINITION)}
+    count = Counter(compiled.values())
+    short = {name: dotted for dotted, name in compiled.items() if count[name] == 1}
     documented = {dotted.rpartition(".")[0] for dotted in definitions()}
     return {**short, **{dotted: dotted for dotted in definitions()}, **{name: name for name in documented}}
 

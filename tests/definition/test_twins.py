@@ -4,26 +4,21 @@ import numpy as np
 import pytest
 
 from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.gradcheck.twins import BOUNDS, Request, distances, made_up, scaled
+from endotsr.golden.judge.twins import golden_requests
+from endotsr.gradcheck.twins import BOUNDS, distances, made_up, scaled
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.registry import all_stages
 
 STAGES, TWINS = all_stages(), definition_stages()
-GOLDEN = read_golden(golden_folder())
+STORED = list(golden_requests(read_golden(golden_folder())))
 REFERENCE_ALONE = {"determinism"}  # asks for the same bits twice, of one program
-
-
-def stored(name):
-    for case in GOLDEN.cases:
-        if case.operation == name:
-            inputs = {key: GOLDEN.array(case, array.file) for key, array in case.inputs.items()}
-            asked = tuple(output for output, o in case.outputs.items() if o.compare.float64 < 1)  # else: any value
-            yield Request(f"golden {case.name}", inputs, case.settings, asked)
 
 
 @pytest.mark.parametrize("name", TWINS)
 def test_the_compiled_function_computes_its_definition(name):
-    found = distances(STAGES[name], TWINS[name], [*made_up(STAGES[name]), *stored(name)])
+    found = distances(
+        STAGES[name], TWINS[name], [*made_up(STAGES[name]), *(request for stage, request in STORED if stage == name)]
+    )
     assert {d.output for d in found} <= STAGES[name].asked.keys() and found
     assert [d for d in found if not d.distance <= d.bound] == []
 

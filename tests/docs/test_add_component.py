@@ -1,4 +1,4 @@
-"""The guide *Add a component* is executed: its code, oracle, stage and notebook cell fit the package."""
+"""The guide *Add a component* is executed: its definition, code, stage, twin and notebook cell fit the package."""
 
 import re
 import sys
@@ -8,42 +8,54 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+import endotsr.definition
+import endotsr.losses  # noqa: F401
 from endotsr.gradcheck import check_pair, check_precision, one_thread, pair_of, pair_stream
+from endotsr.gradcheck.twins import distances, made_up
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
-SQUARED, ORACLE = "reference/endotsr/losses/squared.py", "tests/oracle/losses.py"
-STAGES = "reference/endotsr/stages/losses.py"
+SQUARED, DEFINITION = "reference/endotsr/losses/squared.py", "reference/endotsr/definition/squared.py"
+STAGES, TWINS = "reference/endotsr/stages/losses.py", "reference/endotsr/stages/definition.py"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
 def component(monkeypatch):
-    """Path of every block -> its names; the first block is the module that the others import."""
+    """Path of every block -> its names; the first two blocks are modules that the others import."""
     found = {}
     for path, text in BLOCKS:
         name = path.removeprefix("reference/").removesuffix(".py").replace("/", ".")
         module = ModuleType(name)
-        if name == "endotsr.losses.squared":
+        if name.endswith(".squared"):
             monkeypatch.setitem(sys.modules, name, module)
+            monkeypatch.setattr(sys.modules[name.rpartition(".")[0]], "squared", module, raising=False)
         exec(compile(text, path, "exec"), module.__dict__)
         found[path] = module
     return found
 
 
 def test_the_guide_has_a_block_for_each_step():
-    assert [path for path, _ in BLOCKS] == [SQUARED, ORACLE, STAGES, "notebooks/10_base_losses.py"]
+    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, TWINS, "notebooks/10_base_losses.py"]
     root = GUIDE.parents[2]
-    assert all((root / path).is_file() for path, _ in BLOCKS[1:]), "the guide names files that exist"
+    assert all((root / path).is_file() for path, _ in BLOCKS[2:]), "the guide names files that exist"
 
 
-def test_the_component_agrees_with_its_oracle(component):
+def test_the_component_agrees_with_its_definition(component):
     rng = np.random.default_rng(0)
     rendered, observed = rng.random((2, 3, 5, 7))
     mask = rng.random((5, 7)) > 0.4
     loss, _ = component[SQUARED].masked_squared_forward(rendered, observed, mask)
-    np.testing.assert_allclose(loss, component[ORACLE].masked_squared(rendered, observed, mask), rtol=1e-14)
+    np.testing.assert_allclose(
+        loss, component[DEFINITION].masked_squared_forward(rendered, observed, mask)[0], rtol=1e-14
+    )
     rendered[:, ~mask] = np.nan
     assert component[SQUARED].masked_squared_forward(rendered, observed, mask)[0] == loss
+
+
+def test_the_stage_agrees_with_its_twin(component):
+    (stage,), twin = component[STAGES].STAGES, component[TWINS].TWINS["masked_squared"]
+    found = distances(stage, stage._replace(forward=twin.forward, reverse=twin.reverse), made_up(stage))
+    assert {d.output for d in found} == {"loss", "d_rendered"} and all(d.distance <= d.bound for d in found)
 
 
 def test_the_stage_passes_the_gradient_check(component):

@@ -22,7 +22,7 @@ def calibrate(views, gradient_ratio):
 
     Raises: ValueError where no view is left, or where the median is 0.
     """
-    ratios = np.array([lap / rgb for _, rgb, lap in views if rgb > 0 and np.isfinite(lap / rgb)])
+    ratios = np.array([laplacian / rgb for _, rgb, laplacian in views if rgb > 0 and np.isfinite(laplacian / rgb)])
     if ratios.size == 0 or np.median(ratios) == 0:
         raise ValueError("calibration: no view has a ratio, or their median is 0")
     return Calibration(gradient_ratio / np.median(ratios), ratios)

@@ -13,7 +13,7 @@ def residuals_active(iteration, config):
 
 def learning_rates(iteration, config):
     """Equation (B10): rates by array; parts of the leading axis as ((slice, rate), ...)."""
-    o, total, born = config.optimiser, config.training.iterations, config.training.residual_activation
+    o, total, activated = config.optimiser, config.training.iterations, config.training.residual_activation
     falling = decay(iteration, total, o.final_factor)
     constant = decay(iteration - o.annealing_from, total - o.annealing_from, o.annealed_factor)
     fdm = o.deformation * falling
@@ -28,7 +28,7 @@ def learning_rates(iteration, config):
         "fdm_width": fdm,
     }
     if residuals_active(iteration, config):
-        start = born if o.restart_residual_schedule else 0
+        start = activated if o.restart_residual_schedule else 0
         residual = o.deformation * decay(iteration - start, total - start, o.final_factor)
         rates["appearance_coefficients"] = residual * o.appearance_factor
         rates["motion_coefficients"] = residual * o.spectral_motion_factor

@@ -102,7 +102,7 @@ def appearance_forward(
     Edges:   A = 0 gives exactly 0, so the base colour is bitwise unchanged; a saturated residual is finite and
              its derivative keeps its digits up to |A phi_bar| = 350 (float64) and 43 (float32).
     Raises:  ValueError if the shapes do not fit or beta is not finite and positive.
-    Oracle:  tests/oracle/residuals_oracle.py
+    Oracle:  `endotsr.definition.appearance`
     """
     if not (math.isfinite(beta) and beta > 0):
         raise ValueError(f"beta {beta}; allowed: finite, > 0")

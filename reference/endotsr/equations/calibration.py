@@ -73,7 +73,7 @@ def calibrate(views: Iterable[ViewRms | tuple[str, float, float]], gradient_rati
     Edges:          a view with g_rgb = 0 or a gradient that is not finite is dropped; an even number of views
                     takes the mean of the middle two.
     Raises:         CalibrationError with the table if no view is valid or the median is 0; ValueError for r <= 0.
-    Oracle:         tests/oracle/calibration_oracle.py
+    Oracle:         `endotsr.definition.calibration`
     """
     if not (math.isfinite(gradient_ratio) and gradient_ratio > 0):
         raise ValueError(f"gradient ratio {gradient_ratio}; allowed: finite, > 0")

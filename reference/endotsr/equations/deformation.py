@@ -65,7 +65,7 @@ def deformation_forward(
     Edges:   all weights 0 -> offsets exactly 0; B = 0 -> 0; N = 0 -> empty; width 0 is finite. A basis of initial
              width 0.01 reaches 0.014 in time: at first it hardly moves the frames between two of 17 centres.
     Raises:  ValueError if shapes or dtypes disagree or the basis is not known.
-    Oracle:  tests/oracle/deformation.py.
+    Oracle:  `endotsr.definition.deformation`.
     """
     _check(fdm_weight, fdm_centre, fdm_width, basis)
     offsets = np.empty((CHANNELS, fdm_weight.shape[2]), fdm_weight.dtype)

@@ -111,7 +111,7 @@ def dictionary_forward(t: float, omega: FloatArray) -> tuple[FloatArray, Diction
     Reverse: dictionary_reverse, below.
     Edges:   the phase is folded before the sine, so sin(2 pi 16 i/32) is exactly 0.
     Raises:  ValueError if t is not finite or omega is not one-dimensional.
-    Oracle:  tests/oracle/fourier_oracle.py, extended precision.
+    Oracle:  `endotsr.definition.dictionary`; tests/oracle/fourier_oracle.py, extended precision.
     """
     if omega.ndim != 1:
         raise ValueError(f"omega has shape {omega.shape}; expected (F,)")
@@ -154,7 +154,7 @@ def atom_statistics(times: FloatArray, omega: FloatArray) -> AtomStatistics:
     Reverse: none (constant in training).
     Edges:   one stamp -> all atoms dead. An atom that is constant over the stamps is dead.
     Raises:  ValueError without stamps or with a stamp that is not finite.
-    Oracle:  tests/oracle/fourier_oracle.py
+    Oracle:  `endotsr.definition.dictionary`; tests/oracle/fourier_oracle.py
     """
     atoms = _atoms_over(times, omega)
     n = atoms.shape[0]
@@ -170,7 +170,7 @@ def normalise_forward(phi: FloatArray, statistics: AtomStatistics) -> tuple[Floa
     returns  (2F,) phi_bar, mean 0 and RMS 1 over the training stamps, dtype of phi; and the saved tuple
     Reverse: normalise_reverse, below.
     Edges:   a dead atom is 0 in value and gradient.
-    Oracle:  tests/oracle/fourier_oracle.py
+    Oracle:  `endotsr.definition.dictionary`; tests/oracle/fourier_oracle.py
     """
     if phi.shape != statistics.mean.shape:
         raise ValueError(f"phi has shape {phi.shape}; the statistics are of {statistics.mean.shape}")

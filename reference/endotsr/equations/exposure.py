@@ -39,7 +39,7 @@ def exposure_forward(colour: FloatArray, log_gain: FloatArray, bias: FloatArray)
     Reverse: exposure_reverse, below.
     Edges:   log_gain = 0 and bias = 0 return equal colours; H W = 0 works.
     Raises:  ValueError if the parameters have not one number for each channel.
-    Oracle:  tests/oracle/exposure_oracle.py
+    Oracle:  `endotsr.definition.exposure`
     """
     channels = colour.shape[0]
     if log_gain.shape != (channels,) or bias.shape != (channels,):

@@ -77,7 +77,7 @@ def laplacian_levels(image: FloatArray, levels: int = LEVELS, upsampling: Upsamp
     upsampling  `co_sited` (a unit ramp has bands 0) or `half_pixel` (0.5, 1, 2)
     returns     the bands and the coarsest image, dtype of the image
     Edges:      the next size is ceil(n/2); a 1x1 image has bands 0.
-    Oracle:     tests/oracle/laplacian_oracle.py; scipy.ndimage.correlate1d(mode="mirror") for the filter.
+    Oracle:     `endotsr.definition.laplacian`; scipy.ndimage.correlate1d(mode="mirror") for the filter.
     """
     bands = []
     for _ in range(levels):
@@ -120,7 +120,7 @@ def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling 
     returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
              tissue: 5-7, 13-17, 29-37 pixels an axis for `co_sited`, 7, 17, 37 for `half_pixel`
     Edges:   a level may be empty; it then adds 0 to the loss. Raises ValueError for an unknown `upsampling`.
-    Oracle:  the impulse response of the pyramid, tests/oracle/laplacian_oracle.py.
+    Oracle:  `endotsr.definition.laplacian`; impulse responses of the pyramid, tests/oracle/laplacian_oracle.py.
     """
     expand_weights(upsampling)  # refuses an unknown name also where nothing is propagated
     mask = np.ascontiguousarray(mask, dtype=np.bool_)
@@ -230,7 +230,7 @@ def laplacian_loss_forward(
     Edges:      an empty level adds 0 and the factor 1/levels stays; pixels outside the mask may hold anything;
                 equal images have loss 0 and gradient exactly 0 (subgradient of |.| at 0 is 0).
     Raises:     ValueError if the shapes do not fit or the masks were made for another rule.
-    Oracle:     tests/oracle/laplacian_oracle.py, the difference of two separate pyramids.
+    Oracle:     `endotsr.definition.laplacian`, the difference of two separate pyramids.
     """
     if rendered.shape != observed.shape or rendered.shape[1:] != masks.image.shape:
         raise ValueError(f"rendered {rendered.shape}, observed {observed.shape}, mask {masks.image.shape} do not fit")

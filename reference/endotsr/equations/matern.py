@@ -96,7 +96,7 @@ def matern_penalty_forward(motion_coefficients: FloatArray, rho: FloatArray) -> 
     Reverse: matern_penalty_reverse, below.
     Edges:   N = 0 gives 0.
     Raises:  ValueError if the shapes do not fit.
-    Oracle:  tests/oracle/matern_oracle.py
+    Oracle:  `endotsr.definition.matern`
     """
     axes, atoms, n = motion_coefficients.shape
     count = rho.size

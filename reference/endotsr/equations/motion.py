@@ -34,7 +34,7 @@ def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[Fl
     Reverse: motion_reverse, below.
     Edges:   C = 0 gives exactly 0; N = 0 works.
     Raises:  ValueError if the shapes do not fit.
-    Oracle:  tests/oracle/residuals_oracle.py
+    Oracle:  `endotsr.definition.motion`
     """
     return combine(motion_coefficients, phi), MotionSaved(motion_coefficients, phi)
 

@@ -60,7 +60,7 @@ def pose_forward(
 
     Reverse: pose_reverse, below.
     Edges:   rotation_vector = 0 and offset = 0 return equal numbers.
-    Oracle:  tests/oracle/pose_oracle.py
+    Oracle:  `endotsr.definition.pose`; scipy.linalg.expm, tests/oracle/pose_oracle.py
     """
     w, d, vector = (np.asarray(array, np.float64) for array in (rotation, translation, rotation_vector))
     a, b, _, _ = _factors(float(vector @ vector))

@@ -41,7 +41,7 @@ def ssim_full(render: FloatArray, truth: FloatArray, mask: BoolArray) -> float:
     """SSIM (M2): mean over all pixels of the map of the images with excluded pixels 0.
 
     11 x 11 Gaussian window, sigma 1.5, zero padding, C1 = 0.01^2, C2 = 0.03^2; other variants differ by up to 0.07.
-    Edges:   no tissue: nan. Raises as `psnr`. Oracle: tests/oracle/losses.py.
+    Edges:   no tissue: nan. Raises as `psnr`. Oracle: `endotsr.definition.metrics`.
     """
     if not mask.any():
         return math.nan

@@ -118,7 +118,7 @@ def adam_step(
     Edges:  empty arrays pass; gradient and moments 0 -> the parameter keeps its bits. A first moment below
             SMALLEST_MOMENT becomes 0 (it would decay into subnormal numbers, which are slow, and moves nothing).
     Raises: ValueError on unequal shapes or dtypes, arrays that are not contiguous, step < 1.
-    Oracle: tests/oracle/adam.py.
+    Oracle: `endotsr.definition.adam`; tests/oracle/adam.py.
     """
     check_layout(parameter, {"parameter": parameter, "gradient": gradient, "first": first, "second": second})
     rate, root = step_factors(step, learning_rate, beta1, beta2)

@@ -60,7 +60,7 @@ def normalised_depth_forward(rendered_depth: FloatArray, target: DepthTarget) ->
     Edges:   fewer than 10 valid pixels, or a render without any positive depth: loss 0, gradient 0 (D3, D4).
              A value that is not finite never becomes the maximum.
     Raises:  ValueError for shapes that do not match.
-    Oracle:  tests/oracle/losses.py.
+    Oracle:  `endotsr.definition.depth`.
     Source:  SurgicalGS's depth loss.
     """
     rendered_depth = check_plane("rendered_depth", rendered_depth, target.valid.shape)

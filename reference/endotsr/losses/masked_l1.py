@@ -34,7 +34,7 @@ def masked_l1_forward(rendered: FloatArray, observed: FloatArray, mask: BoolArra
     Reverse: `masked_l1_reverse`.
     Edges:   no tissue: loss 0, gradient 0. Values under False are never read into the result (NaN, Inf allowed).
     Raises:  ValueError for shapes that do not match or a mask that is not boolean.
-    Oracle:  tests/oracle/losses.py; numpy mean of the selected differences.
+    Oracle:  `endotsr.definition.masked_l1`; numpy mean of the selected differences.
     """
     rendered = check_image("rendered", rendered, mask)
     observed = check_image("observed", observed, mask).astype(rendered.dtype, copy=False)

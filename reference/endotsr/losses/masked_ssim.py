@@ -70,7 +70,7 @@ def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float
     Edges:   no tissue: 1 with zero gradient. Images smaller than the window are padded by zeros like any other.
              The step at the mask border belongs to both images and is part of the map.
     Raises:  ValueError for shapes that do not match.
-    Oracle:  tests/oracle/losses.py (direct double sum); scipy.ndimage.correlate with zero padding.
+    Oracle:  `endotsr.definition.masked_ssim`; scipy.ndimage.correlate with zero padding.
     Source:  Wang et al. 2004; window, constants and padding as in 3-D Gaussian splatting code.
     """
     rendered = check_image("rendered", rendered, target.mask)

@@ -57,7 +57,7 @@ def smoothness_forward(
     Reverse: `smoothness_reverse`; subgradient 0 where a TV pair is equal.
     Edges:   all tissue: TV is 0; no tissue: S is 0; one pixel: no pairs, 0.
     Raises:  ValueError for shapes that do not match.
-    Oracle:  tests/oracle/losses.py; skimage's total variation is isotropic and not comparable.
+    Oracle:  `endotsr.definition.smoothness`; skimage's total variation is isotropic and not comparable.
     Source:  SurgicalGS's depth smoothness and masked total variation.
     """
     rendered = check_image("rendered", rendered, mask)

@@ -214,7 +214,7 @@ def composite_forward(
 
     Reverse: `composite_reverse`.
     Edges:   n = 0 gives the background; alpha = 1 ends a pixel with T = 0.
-    Oracle:  tests/oracle/splatting_oracle.py.
+    Oracle:  `endotsr.definition.compositing`.
     """
     dtype = records.dtype
     out = empty_composite(width, height, dtype)

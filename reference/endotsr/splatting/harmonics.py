@@ -159,7 +159,7 @@ def harmonics_forward(
 
     Reverse: `harmonics_reverse`; the gradient is zero for a channel whose value before the clamp is < 0.
     Edges:   a Gaussian at the camera centre uses degree 0 only.
-    Oracle:  tests/oracle/splatting_oracle.py; rotation invariance of every degree.
+    Oracle:  `endotsr.definition.harmonics`; rotation invariance of every degree.
     """
     dtype = position.dtype
     if not 0 <= degree <= 3 or harmonics.shape[0] < (degree + 1) ** 2:

@@ -82,7 +82,7 @@ def projection_forward(
     Reverse: `projection_reverse`, through the mean, the Jacobian, the rotation and the pose.
     Edges:   a projected semi-axis above 1e8 px (float32; 1e60 in float64) is clipped with zero gradient; a centre
              farther out than that, and a Gaussian with a number that is not finite, are invisible.
-    Oracle:  tests/oracle/splatting_oracle.py; determinant against mpmath.
+    Oracle:  `endotsr.definition.projection`; determinant against mpmath.
     """
     dtype = position.dtype
     n = position.shape[1]

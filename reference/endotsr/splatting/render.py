@@ -122,7 +122,7 @@ def render_forward(
 
     Reverse: `render_reverse`.
     Edges:   N = 0 or nothing visible gives the background and zero depth.
-    Oracle:  tests/oracle/splatting_oracle.py.
+    Oracle:  `endotsr.definition.render`.
     """
     width, height = camera.width, camera.height
     back = np.ascontiguousarray(np.zeros(3) if background is None else background, scene.position.dtype)
