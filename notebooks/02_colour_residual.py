@@ -20,9 +20,12 @@
 # The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` introduces the atoms.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import appearance as definition
 from endotsr.equations.appearance import Y00, appearance_forward, appearance_reverse
 from endotsr.equations.dictionary import atom_statistics, frequencies, normalised_atoms
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
@@ -48,22 +51,16 @@ statistics = atom_statistics(stamps, omega)
 
 
 # %% tags=["transcription"]
-def residual_text(A, phi_bar, beta):
-    """Equation (2) as printed, one Gaussian and channel at a time."""
-    x = np.zeros((3, A.shape[2]))
-    for c in range(3):
-        for i in range(A.shape[2]):
-            x[c, i] = sum(A[c, k, i] * phi_bar[k] for k in range(2 * F))
-    Y_00 = 1 / np.sqrt(4 * np.pi)
-    return beta / Y_00 * np.tanh(x)
-
+print(inspect.getsource(definition.appearance_forward))
 
 # %%
 A = rng.normal(0, 0.4, (3, 2 * F, N))
 for t in (0.0, 0.2, 0.77):
     phi_bar = normalised_atoms(t, omega, statistics)
     residual, saved = appearance_forward(A, phi_bar, beta)
-    np.testing.assert_allclose(residual, residual_text(A, phi_bar, beta), rtol=1e-13)
+    np.testing.assert_allclose(
+        residual, definition.appearance_forward(A, phi_bar, beta)[0], rtol=1e-13
+    )
 assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta * (1 + 1e-15)
 
 # %% [markdown]
@@ -172,19 +169,12 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def reverse_text(g_h, A, phi_bar, beta):
-    x = np.einsum("cki,k->ci", A, phi_bar)
-    e = np.exp(-2 * np.abs(x))
-    g_x = beta * np.sqrt(4 * np.pi) * 4 * e / (1 + e) ** 2 * g_h
-    g_A = g_x[:, None, :] * phi_bar[None, :, None]
-    g_phi_bar = np.einsum("ci,cki->k", g_x, A)
-    return g_A, g_phi_bar
-
+print(inspect.getsource(definition.appearance_reverse))
 
 # %%
 g_h = rng.normal(size=(3, N))
 grads = appearance_reverse(g_h, appearance_forward(A, phi_bar, beta)[1])
-g_A, g_phi_bar = reverse_text(g_h, A, phi_bar, beta)
+g_A, g_phi_bar = definition.appearance_reverse(g_h, (A, phi_bar, beta))
 np.testing.assert_allclose(grads.d_appearance_coefficients, g_A, rtol=1e-12)
 np.testing.assert_allclose(grads.d_phi_bar, g_phi_bar, rtol=1e-11)
 
@@ -193,7 +183,10 @@ saturated = appearance_reverse(
 ).d_appearance_coefficients
 # Finite far out.
 np.testing.assert_allclose(
-    saturated, reverse_text(g_h, 1e3 * A, phi_bar, beta)[0], rtol=1e-9, atol=1e-290
+    saturated,
+    definition.appearance_reverse(g_h, (1e3 * A, phi_bar, beta))[0],
+    rtol=1e-9,
+    atol=1e-290,
 )
 
 start = appearance_reverse(

@@ -19,9 +19,12 @@
 # The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import deformation as definition
 from endotsr.equations.deformation import deformation_forward, deformation_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 
@@ -54,18 +57,8 @@ B, N = 17, 4
 
 
 # %% tags=["transcription"]
-def basis_text(t, theta, sigma, basis):
-    Delta = t - theta
-    Sigma = sigma**2 + 1e-4
-    if basis == "quartic":
-        u = Delta**2 / Sigma
-        return np.exp(-(u**2))
-    return np.exp(-(Delta**2) / (2 * Sigma))
-
-
-def offsets_text(w, theta, sigma, t, basis):
-    return (w * basis_text(t, theta, sigma, basis)).sum(axis=1)
-
+print(inspect.getsource(definition.bell))
+print(inspect.getsource(definition.deformation_forward))
 
 # %%
 w = rng.normal(size=(10, B, N))
@@ -74,9 +67,8 @@ sigma = rng.uniform(-0.1, 0.1, (10, B, N))  # the sign does not matter: only its
 for basis in ("quartic", "gaussian"):
     for t in (0.0, 0.4, 0.93):
         psi, saved = deformation_forward(w, theta, sigma, t, basis)
-        np.testing.assert_allclose(
-            psi, offsets_text(w, theta, sigma, t, basis), rtol=1e-12, atol=1e-15
-        )
+        text, _ = definition.deformation_forward(w, theta, sigma, t, basis)
+        np.testing.assert_allclose(psi, text, rtol=1e-12, atol=1e-15)
 
 for basis, value in (("quartic", 0.0183), ("gaussian", 0.3679)):
     one = np.ones((10, 1, 1))
@@ -103,7 +95,7 @@ for panel, width in ((axes[0], 0.01), (axes[1], 0.05)):
         [deformation_forward(unit, spread, np.full(unit.shape, width), t)[0][0] for t in fine]
     )
     np.testing.assert_allclose(
-        values, basis_text(fine[:, None], centres, width, "quartic"), atol=1e-15
+        values, definition.bell(centres, width, fine[:, None], "quartic")[2], atol=1e-15
     )
     highest = values.max(axis=1)
     panel.plot(fine, values, lw=0.8, color="tab:blue")
@@ -151,26 +143,15 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def reverse_text(g_psi, w, theta, sigma, t, basis):
-    g = g_psi[:, None, :]  # broadcast over the bases j
-    e = basis_text(t, theta, sigma, basis)
-    Delta, Sigma = t - theta, sigma**2 + 1e-4
-    u = Delta**2 / Sigma
-    if basis == "quartic":
-        g_theta = 4 * w * e * u * Delta / Sigma * g
-        g_sigma = 4 * w * e * u**2 * sigma / Sigma * g
-    else:
-        g_theta = w * e * Delta / Sigma * g
-        g_sigma = w * e * Delta**2 * sigma / Sigma**2 * g
-    return e * g, g_theta, g_sigma, -g_theta.sum()
-
+print(inspect.getsource(definition.deformation_reverse))
 
 # %%
 g_psi = rng.normal(size=(10, N))
 for basis in ("quartic", "gaussian"):
     _, saved = deformation_forward(w, theta, sigma, 0.4, basis)
     grads = deformation_reverse(g_psi, saved)
-    for found, text in zip(grads, reverse_text(g_psi, w, theta, sigma, 0.4, basis)):
+    texts = definition.deformation_reverse(g_psi, (w, theta, sigma, 0.4, basis))
+    for found, text in zip(grads, texts):
         np.testing.assert_allclose(found, text, rtol=1e-10, atol=1e-13)
 
 # %% [markdown]

@@ -14,12 +14,18 @@ from endotsr.config import (
     ModelConfig,
     OptimiserConfig,
     TrainingConfig,
+    config_from_dict,
 )
+from endotsr.definition import schedules as definition_schedules
 from endotsr.definition import train
+from endotsr.definition.calibration import calibration_views as calibration_views_by_definition
 from endotsr.definition.initialisation import initialise as initialise_by_definition
 from endotsr.definition.scene import spectral_from
 from endotsr.definition.settings import PAPER, PAPER_CONFIG, SMALL
 from endotsr.definition.simulate import simulate
+from endotsr.equations.calibration import calibration_views
+from endotsr.fitting import schedules
+from endotsr.fitting.adam import rate_parts
 from endotsr.fitting.state import fresh_state, workshop
 from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck.twins import scaled
@@ -79,6 +85,24 @@ def test_the_settings_of_the_definition_are_those_of_paper():
     fast = fast_config(PAPER_CONFIG)
     assert fast == Config(training=TrainingConfig(precision="float64"))
     assert PAPER[:7] == FAST_PAPER[:7] and not any(PAPER.deviations)
+
+
+@pytest.mark.parametrize("preset", ["paper", "sharp", "demo"])
+def test_the_schedules_of_every_preset_are_the_same(preset):
+    config = config_from_dict({"preset": preset})
+    for i in range(1, config.training.iterations + 100, 7):
+        fast, written = schedules.learning_rates(i, config), definition_schedules.learning_rates(i, config)
+        for name in written:
+            assert np.ravel([r for _, r in rate_parts(written[name])]) == pytest.approx(
+                [r for _, r in rate_parts(fast[name])], rel=1e-14
+            ), (i, name)
+        assert fast.keys() - written.keys() <= {"motion_coefficients"}, "(B15) trains it from the first iteration on"
+        assert schedules.laplacian_ramp(i, config) == definition_schedules.laplacian_ramp(i, config)
+
+
+def test_the_views_of_the_calibration_are_the_same():
+    for n_train in (1, 2, 5, 16, 17, 55, 138):
+        np.testing.assert_array_equal(calibration_views(n_train, 16), calibration_views_by_definition(n_train, 16))
 
 
 def test_the_fast_path_starts_with_the_same_gaussians():
