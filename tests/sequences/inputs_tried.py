@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from common_folder import written
 from made_videos import CAMERA, HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven, write
 from raw_sources import colmap, stereomis
@@ -409,12 +411,8 @@ def tried(row: Row, folder: Path) -> Outcome:
     printed = out.getvalue() + err.getvalue()
     lines = [line.strip() for line in printed.replace(str(folder) + "/", "").splitlines() if line.strip()]
     named = next((line for line in lines if row.said and row.said in line), "")
-    if code:
-        outcome = "refused"
-    elif not row.check(folder):
-        outcome = WRONG
-    else:
-        outcome = "told" if row.expected == "told" and named else "right"
+    silent = row.expected == "refused" or (row.expected == "told" and not named)
+    outcome = "refused" if code else WRONG if silent or not row.check(folder) else row.expected
     command = " ".join(["endotsr", *(word.replace(str(folder) + "/", "") for word in words)])
     return Outcome(row, command, outcome, named or (lines[-1] if lines else ""))
 
@@ -437,5 +435,4 @@ def table(word: str = "") -> str:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[1]))
     print(table(*sys.argv[1:2]))

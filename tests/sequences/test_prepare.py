@@ -369,3 +369,23 @@ def test_the_command(tmp_path, capsys):
     assert main(["prepare", str(tmp_path / "none"), "--out", str(tmp_path / "x")]) == 2
     assert main(["prepare", str(tmp_path), "--out", str(tmp_path / "x"), "--camera", "1", "2"]) == 2
     assert "--camera: 2 numbers; allowed: 4" in capsys.readouterr().err
+
+
+def test_a_pair_without_a_baseline_is_told_which_number_is_missing(tmp_path, capsys):
+    for side in ("left", "right"):
+        (tmp_path / "clip" / side).mkdir(parents=True)
+        for i in range(3):
+            write_png(tmp_path / "clip" / side / f"{i}.png", scene_picture(i))
+    words = ["--camera", *map(str, CAMERA)]
+    assert main(["prepare", str(tmp_path / "clip"), "--out", str(tmp_path / "o"), *words]) == 0
+    assert "next: state the distance of the two cameras, [camera] baseline" in capsys.readouterr().out
+    with pytest.raises(InputError, match="once \\[camera\\] baseline, the distance of the two cameras"):
+        read_sequence(tmp_path / "o", WHOLE, 0.2)
+    assert main(["depth", str(tmp_path / "o")]) == 2 and "allowed: the distance of the two" in capsys.readouterr().err
+
+
+def test_a_pipe_gets_no_carriage_returns(tmp_path, capsys):
+    written(tmp_path / "a", right=True)
+    main(["depth", str(tmp_path / "a"), "--given", str(tmp_path / "a/depth"), "--kind", "depth", "--replace"])
+    said = capsys.readouterr().out
+    assert "depth of 5 frames" in said and "\r" not in said and "\n\n" not in said

@@ -142,6 +142,23 @@ def test_masks_are_entered_as_proposals(tmp_path, capsys):
     assert main(["masks", str(clip), "--replace"]) == 0
 
 
+def test_a_mask_of_all_frames_is_united_with_the_proposal(tmp_path, capsys):
+    """A stated field of view stays; it is not a reason to refuse, and not replaced."""
+    pictures, true = scene("pulling")
+    (tmp_path / "source").mkdir()
+    for i, picture in enumerate(pictures):
+        write_png(tmp_path / "source" / f"{i}.png", picture)
+    static = np.zeros(pictures[0].shape[:2], bool)
+    static[-20:] = True
+    write_png(tmp_path / "view.png", np.where(static, 255, 0).astype(np.uint8))
+    words = ["--camera", "140", "140", "80", "64", "--masks", str(tmp_path / "view.png")]
+    assert main(["prepare", str(tmp_path / "source"), "--out", str(tmp_path / "clip"), *words]) == 0
+    assert main(["masks", str(tmp_path / "clip")]) == 0 and "united" in capsys.readouterr().out
+    found = [read_png(file) > 0 for file in sorted((tmp_path / "clip/masks").iterdir())]
+    assert all(mask[static].all() for mask in found)
+    assert iou([mask & ~static for mask in found], [tool & ~static for tool in true]) > 0.6
+
+
 def test_masks_of_any_source_keep_their_mark(tmp_path):
     (tmp_path / "source").mkdir()
     for i, picture in enumerate(scene("pulling")[0]):

@@ -1,5 +1,6 @@
 """`endotsr depth`: depth of a sequence, from its stereo pairs or from files of another program."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -59,7 +60,6 @@ def run(words: list[str]) -> int:
             key = name.replace("_", "-")
             raise InputError(f"--{key} {getattr(options, name):g} is not allowed; allowed: a number > 0")
     report = _made(options)
-    print()
     assert report.file.depth is not None
     coverage, unit, step = report.coverage, report.file.depth.unit, report.file.depth.scale
     lowest = min(range(len(coverage)), key=lambda i: coverage[i])
@@ -87,4 +87,6 @@ def _made(options: DepthOptions) -> "DepthReport":
 
 
 def _said(done: int, total: int) -> None:
-    print(f"\rframe {done} of {total}", end="", flush=True)
+    """A line that counts on a terminal; a pipe or a file gets none."""
+    if sys.stdout.isatty():
+        print(f"\rframe {done} of {total}", end="\n" if done == total else "", flush=True)

@@ -84,6 +84,7 @@ def run(words: list[str]) -> int:
     options = parse(PrepareOptions, words, "prepare")
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.prepare import PrepareSettings, prepare
+    from endotsr.sequences.sequence_file import RIGHT
     from endotsr.sequences.writing import refuse_existing
 
     refuse_existing(options.out)
@@ -99,7 +100,8 @@ def run(words: list[str]) -> int:
         print(f"  {note}")
     camera = found.camera
     print(f"written: {options.out}, {found.frames} frames of {camera.width}x{camera.height}")
-    print(_next_step(options.out, found.depth is not None, camera.baseline > 0))
+    pair = (options.out / RIGHT).is_dir()
+    print(_next_step(options.out, found.depth is not None, camera.baseline > 0, pair))
     write_result(
         options.json, source=options.source, layout=recording.layout, folder=options.out, frames=found.frames,
         width=camera.width, height=camera.height, stereo=camera.baseline > 0, depth=found.depth is not None,
@@ -135,7 +137,14 @@ def _stated(options: PrepareOptions) -> "SourceOptions":
     )
 
 
-def _next_step(out: Path, depth: bool, stereo: bool) -> str:
+def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
     if depth:
         return f"next: endotsr train {out} --out RUN"
+    if pair and not stereo:
+        from endotsr.sequences.sequence_file import FILE_NAME
+
+        return (
+            "next: state the distance of the two cameras, [camera] baseline in"
+            f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {out}"
+        )
     return f"next: endotsr depth {out}" if stereo else f"next: add depth/ to {out}; training needs it"

@@ -73,6 +73,8 @@ def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, ran
         )
     if not contents.depth:
         remedy = "`endotsr depth` makes it from the stereo pair" if contents.right else "allowed: depth of every frame"
+        if contents.right and not contents.file.camera.baseline:
+            remedy += f", once [camera] baseline, the distance of the two cameras, is stated in {FILE_NAME}"
         raise InputError(f"{folder}: no depth: [depth] is missing in {FILE_NAME}; {remedy}")
     if config.masks == "gt_masks":
         raise InputError(

@@ -47,7 +47,10 @@ class DepthReport(NamedTuple):
 def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[DepthFrame]:
     """Depth of every frame from its stereo pair. Raises InputError without right pictures or baseline."""
     if recording.lens is None or not recording.baseline:
-        raise InputError(f"{recording.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME}")
+        raise InputError(
+            f"{recording.where}: the baseline is unknown: [camera] baseline is 0 in {FILE_NAME};"
+            " allowed: the distance of the two cameras in the unit of the file"
+        )
     lens, baseline = recording.lens, recording.baseline
     disparity_range(settings, lens, baseline)
     pairs: list[Pair] = []

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.opencv import area_resize, write_png
-from endotsr.sequences.common import list_contents, open_common
+from endotsr.sequences.common import Contents, list_contents, open_common
 from endotsr.sequences.files import shortened
 from endotsr.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.sequences.recording import Picture, Recording
@@ -45,6 +46,18 @@ def _proposed(recording: Recording) -> Proposal:
     return proposal
 
 
+def _static_mask(contents: Contents, recording: Recording) -> NDArray[np.bool_] | None:
+    """The excluded pixels (H, W) of masks that no program proposed and that are the same for all frames; else None."""
+    if recording.masks is None or recording.proposed:
+        return None
+    first = recording.masks(0)
+    assert first is not None
+    for i in range(1, len(contents.masks)):
+        if not np.array_equal(recording.masks(i), first):  # pyright: ignore[reportArgumentType]
+            return None
+    return ~first
+
+
 def without_tissue(recording: Recording, proposal: Proposal) -> list[str]:
     """Names of the frames in which a proposal leaves hardly any tissue."""
     return [recording.names[i] for i in proposal.without_tissue]
@@ -53,15 +66,21 @@ def without_tissue(recording: Recording, proposal: Proposal) -> list[str]:
 def enter_masks(folder: Path, replace: bool = False) -> Proposal:
     """Propose masks for a folder in the common format and enter them; without a proposal nothing changes.
 
+    A mask that is the same for all frames, such as a field of view, stays and is united with the proposal.
+
     replace   whether masks that exist may be replaced
 
     Raises:  InputError; the folder is as before then.
     """
     contents = list_contents(folder)
-    if (contents.file.masks or (folder / MASKS).exists()) and not replace:
-        raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
     recording = open_common(folder)
+    static = None if replace else _static_mask(contents, recording)
+    if (contents.file.masks or (folder / MASKS).exists()) and not replace and static is None:
+        raise InputError(f"{folder}: has masks already; allowed: --replace, or --out FOLDER")
     proposal = _proposed(recording)
+    if proposal.found and static is not None:
+        united = [plane | static for plane in proposal.excluded]
+        proposal = proposal._replace(excluded=united, reason=f"{proposal.reason}; united with the mask of all frames")
     if not proposal.found:
         return proposal
     staged = folder / f".new-{MASKS}"
