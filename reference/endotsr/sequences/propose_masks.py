@@ -108,7 +108,9 @@ def outside_of_view(pictures: list[Picture]) -> BoolArray:
     brightest = np.max([ndimage.gaussian_filter(p.max(axis=2).astype(np.float32), 1.0) for p in pictures], axis=0)
     ring = np.ones((shape[0] + 2, shape[1] + 2), bool)
     ring[1:-1, 1:-1] = brightest < DARK
-    joined = ndimage.binary_propagation(np.pad(nowhere, 1, constant_values=True), mask=ring)[1:-1, 1:-1]
+    joined = np.asarray(ndimage.binary_propagation(np.pad(nowhere, 1, constant_values=True), mask=ring), bool)[
+        1:-1, 1:-1
+    ]
     labels: Any
     labels, count = ndimage.label(ndimage.binary_opening(~joined, iterations=2))  # pyright: ignore[reportGeneralTypeIssues]
     if not count:

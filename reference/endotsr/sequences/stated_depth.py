@@ -57,16 +57,17 @@ def _of_names(path: Path) -> str:
 def _of_values(recording: Recording, frames: list[int]) -> str:
     """What speaks against lengths in the numbers and beside the pictures; "" if nothing does."""
     stated, where = recording.stated_depth, str(recording.where)
-    assert recording.depth is not None and stated is not None
+    read, masks = recording.depth, recording.masks
+    assert read is not None and stated is not None
     planes: list[NDArray[np.float32]] = []
     light: list[float] = []
     for i, pair in zip(frames, recording.pictures(frames)):
-        plane = recording.depth(i)
+        plane = read(i)
         if plane is None or not plane.any():
             continue
         planes.append(plane)
         if plane.shape == pair.left.shape[:2]:
-            tissue = recording.masks(i) if recording.masks else None
+            tissue = masks(i) if masks else None
             light.append(light_correlation(pair.left, plane, tissue))
             if len(planes) == 1 and recording.rig is None and pair.right is not None and plane.shape[1] > MATCHED:
                 found = inverted_finding(plane, _disparity(pair.left, pair.right), where, i)

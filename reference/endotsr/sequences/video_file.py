@@ -152,20 +152,20 @@ def _deinterlacer(frame: Any) -> Any:
     import av.filter
 
     graph = av.filter.Graph()
-    names = graph.add_buffer(
+    source = graph.add_buffer(
         width=frame.width, height=frame.height, format=frame.format.name, time_base=frame.time_base
     )
-    weaver = graph.add("bwdif", "mode=send_frame:parity=auto:deint=interlaced")
+    filter_ = graph.add("bwdif", "mode=send_frame:parity=auto:deint=interlaced")
     sink = graph.add("buffersink")
-    names.link_to(weaver)
-    weaver.link_to(sink)
+    source.link_to(filter_)
+    filter_.link_to(sink)
     graph.configure()
     return graph
 
 
 def _pulled(graph: Any) -> Iterator[Any]:
     """All frames that a filter graph has ready."""
-    import av
+    import av.error
 
     while True:
         try:
@@ -176,7 +176,7 @@ def _pulled(graph: Any) -> Iterator[Any]:
 
 def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
     """The items of a decoder; its errors become an InputError that names the picture."""
-    import av
+    import av.error
 
     position = 0
     try:
@@ -193,6 +193,7 @@ def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """The container and its best video stream; the decoder opens no other file. Raises InputError."""
     import av
+    import av.error
 
     path = Path(path)
     with open_regular(path, LARGEST_FILE) as file:
@@ -205,7 +206,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None
         with container:
-            stream = container.streams.best("video")
+            stream: Any = container.streams.best("video")
             if stream is None or stream.codec_context is None:
                 raise InputError(f"{path}: holds no pictures, or those of a codec that is not known")
             if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
