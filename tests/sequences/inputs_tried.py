@@ -365,6 +365,7 @@ ROWS = [
     Row("pictures, png", folder_of(pictures()), "right", "", close(pictures(), 0.01)),
     Row("pictures, jpg", folder_of(pictures(), ending="jpg"), "right", "", close(pictures())),
     Row("pictures, jpg turned by EXIF", folder_of(pictures(), ending="jpg", change=exif), "refused", "orientation 6"),
+    Row("pictures, interlaced", folder_of(woven()), "told", "interlaced-pictures"),
     Row("pictures, 16 bit", folder_of([p.astype(np.uint16) * 257 for p in pictures()]), "refused", "16-bit picture"),
     Row("pictures, grey", folder_of([p[..., 0] for p in pictures()]), "refused", "grey picture"),
     Row("pictures of two sizes", folder_of([*pictures(3), picture(3)[:80]]), "refused", "128x80 pixels, others 128x96"),

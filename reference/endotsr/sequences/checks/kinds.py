@@ -40,6 +40,8 @@ KINDS: dict[str, Kind] = {
                           "look at the pictures: a frozen video, or one picture under many names"),
     "black-frame": Kind("warning", "a black frame teaches the model a black scene at its time", LEAVE_OUT),
     "white-frame": Kind("warning", "a white frame teaches the model a white scene at its time", LEAVE_OUT),
+    "interlaced-pictures": Kind("warning", "each picture seems woven of two moments, as interlaced video is",
+                                "prepare the video itself, or deinterlace it before pictures are exported"),
     "clipped-frame": Kind("warning", "colour is lost there", LEAVE_OUT),
     "duplicated-frame": Kind("warning", "a held-out frame that repeats a training frame makes the metrics too good, and"
                              " time stands still there", LEAVE_OUT),
