@@ -1,4 +1,4 @@
-"""Table of docs/guides/platforms.md from docs/results/platforms.json: python docs/pages/platforms.py
+"""Table of docs/guides/platforms.md from docs/results/platforms.json: python docs/pages/systems.py
 
 docs/results/platforms.json   python tests/platforms.py --json docs/results/platforms.json
 """
@@ -23,23 +23,19 @@ def resolved(result: dict[str, Any]) -> str:
     """One row a system, one column a version of Python; a cell names the versions of Numba, NumPy and OpenCV."""
     rows = result["rows"]
     pythons = list(dict.fromkeys(row["python"] for row in rows))
-    lines = [
-        f"| System | {' | '.join(f'Python {version}' for version in pythons)} |",
-        "|---" * (len(pythons) + 1) + "|",
-    ]
+    heads = ["System", *(f"Python {version}" for version in pythons)]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for system in dict.fromkeys(row["system"] for row in rows):
         cells = [_cell(row) for row in rows if row["system"] == system]
         lines.append(f"| {system} | {' | '.join(cells)} |")
-    note = "Versions of Numba, NumPy and OpenCV that pip chooses, or the first dependency that has no wheel."
+    note = "Versions of Numba, NumPy and OpenCV that are chosen, or a dependency that has no wheel."
     return "\n".join([*lines, "", f"{note} Resolved on {result['date'][:10]}."])
 
 
 def _cell(row: dict[str, Any]) -> str:
-    if row["complete"]:
-        found = row["versions"]
-        return ", ".join(found[name] for name in ("numba", "numpy", "opencv-contrib-python-headless"))
-    missing = row["reason"].split("requirement ")[-1] if "requirement" in row["reason"] else row["reason"]
-    return f"no {missing.split('<')[0].split('>')[0].split('=')[0].split(' ')[0]}"
+    if not row["complete"]:
+        return f"no wheel of {row['lacks']}"
+    return ", ".join(row["versions"][name] for name in ("numba", "numpy", "opencv-contrib-python-headless"))
 
 
 if __name__ == "__main__":
