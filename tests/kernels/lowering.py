@@ -28,7 +28,7 @@ TARGETS = {  # triple, processor
 # Numba supplies what begins with NRT, numba or Py; the others are of the C library, on every system.
 SUPPLIED = re.compile(r"(NRT_|numba_|Py|_Py|\.numba|_ZN)")
 LIBRARY = {
-    "acos", "acosf", "atan2", "atan2f", "ceil", "ceilf", "floor", "floorf", "cos", "cosf", "exp", "expf", "fmod", "fmodf", "log", "logf", "log2", "log2f",
+    "ceil", "ceilf", "floor", "floorf", "cos", "cosf", "exp", "expf", "fmod", "fmodf", "log", "logf", "log2", "log2f",
     "pow", "powf", "sin", "sinf", "sqrt", "sqrtf", "memset", "memcpy", "memmove", "memcmp", "free", "malloc", "abort",
 }  # fmt: skip
 FLOAT_OF_LIBRARY = re.compile(r"llvm\.(exp|log|log2|pow|sin|cos)\.f(32|64)")

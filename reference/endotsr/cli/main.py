@@ -52,8 +52,7 @@ def _main(words: list[str]) -> int:
     try:
         with signals_stop():
             code = _command(words[0])(words[1:])
-            if sys.stdout is not None:
-                sys.stdout.flush()  # a pipe that was closed is noticed here at the latest
+            print(end="", flush=True)  # a pipe that was closed is noticed here at the latest
             return code
     except CalibrationError as error:
         line, _, table = str(error).partition("\n")
