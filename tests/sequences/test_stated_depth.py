@@ -58,7 +58,12 @@ WRONG = {  # what the files hold: values, name of the folder, ending, what the m
     "stretched to 16 bits": (lambda i: scaled(true_depth(i), 65535, np.uint16), "depth", "png", "frame is 65535"),
     "stretched to 0 to 1": (lambda i: scaled(disparity(i), 1.0, np.float32), "depth", "npy", "of every frame is 1"),
     "disparity times 256": (lambda i: (disparity(i) * 256).astype(np.uint16), "depth", "png", "the median depth is"),
-    "metres": (lambda i: true_depth(i) / 1000, "depth", "npy", "it looks like metres"),
+    "metres": (
+        lambda i: true_depth(i) / 1000,
+        "depth",
+        "npy",
+        "it looks like metres; another unit is stated with --depth-unit",
+    ),
 }
 
 

@@ -78,7 +78,10 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
     if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
         return full
     usual = float(np.median([depth_facts("", plane, plane, None).median for plane in planes]))
-    found = ([] if recording.unit == ARBITRARY else unit_finding(usual, where)) or light_finding(light, where)
+    unit = [] if recording.unit == ARBITRARY else unit_finding(usual, where)
+    if unit:
+        return f"{unit[0].what}; another unit is stated with --depth-unit and --depth-scale"
+    found = light_finding(light, where)
     return found[0].what if found else ""
 
 
