@@ -62,7 +62,7 @@ WRONG = {  # what the files hold: values, name of the folder, ending, what the m
         lambda i: true_depth(i) / 1000,
         "depth",
         "npy",
-        "it looks like metres; another unit is stated with --depth-unit",
+        "like metres; another unit is stated with --depth-unit",
     ),
 }
 
