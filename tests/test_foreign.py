@@ -54,6 +54,7 @@ def test_the_foreign_system_is_foreign_to_the_package_alone():
     assert foreign.python([sys.executable, "-c", SEEN]).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_part_of_the_tests_passes_on_a_foreign_system():
     done = foreign.run(*CHOSEN, kept=True)
