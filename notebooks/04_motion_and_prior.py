@@ -19,10 +19,14 @@
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 
+from endotsr.definition import matern as definition_of_prior
+from endotsr.definition import motion as definition
 from endotsr.equations.dictionary import dictionary_forward, frequencies
 from endotsr.equations.matern import (
     matern_penalty_forward,
@@ -52,19 +56,13 @@ C = rng.normal(0, 0.5, (3, 2 * F, N))
 
 
 # %% tags=["transcription"]
-def translation_text(C, phi):
-    Delta_mu = np.zeros((3, C.shape[2]))
-    for d in range(3):
-        for i in range(C.shape[2]):
-            Delta_mu[d, i] = sum(C[d, k, i] * phi[k] for k in range(2 * F))
-    return Delta_mu
-
+print(inspect.getsource(definition.motion_forward))
 
 # %%
 for t in (0.0, 0.37, 0.9):
     phi, _ = dictionary_forward(t, omega)
     translation, saved = motion_forward(C, phi)
-    np.testing.assert_allclose(translation, translation_text(C, phi), rtol=1e-12)
+    np.testing.assert_allclose(translation, definition.motion_forward(C, phi)[0], rtol=1e-12)
 
 # %% [markdown]
 # ## The weights: from a covariance to a spectrum
@@ -101,28 +99,19 @@ assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 
 
 # %% tags=["transcription"]
-def rho_text(omega, ell):
-    rho_tilde = (5 / ell**2 + (2 * np.pi * omega) ** 2) ** 3
-    return rho_tilde / (rho_tilde.sum() / len(omega))
-
-
-def penalty_text(C, rho):
-    N = C.shape[2]
-    total = 0.0
-    for i in range(N):
-        for f in range(F):
-            total += rho[f] * sum(C[d, f, i] ** 2 + C[d, F + f, i] ** 2 for d in range(3))
-    return total / (6 * N * F)
-
+print(inspect.getsource(definition_of_prior.matern_weights))
+print(inspect.getsource(definition_of_prior.matern_penalty_forward))
 
 # %%
 rho = matern_weights(omega, length)
-np.testing.assert_allclose(rho, rho_text(omega, length), rtol=1e-14)
+np.testing.assert_allclose(rho, definition_of_prior.matern_weights(omega, length), rtol=1e-14)
 for ell in (0.001, 0.01, 0.02, 0.05, 1.0):  # the stable form has two branches
-    np.testing.assert_allclose(matern_weights(omega, ell), rho_text(omega, ell), rtol=1e-13)
+    text = definition_of_prior.matern_weights(omega, ell)
+    np.testing.assert_allclose(matern_weights(omega, ell), text, rtol=1e-13)
 print("rho:", " ".join(f"{value:.3g}" for value in rho))
 penalty, saved_penalty = matern_penalty_forward(C, rho)
-np.testing.assert_allclose(penalty, penalty_text(C, rho), rtol=1e-13)
+text, _ = definition_of_prior.matern_penalty_forward(C, rho)
+np.testing.assert_allclose(penalty, text, rtol=1e-13)
 
 # %% [markdown]
 # **What does not follow.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are no uniform
@@ -260,24 +249,15 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def motion_reverse_text(g, C, phi):
-    g_C = g[:, None, :] * phi[None, :, None]
-    g_phi = np.einsum("di,dki->k", g, C)
-    return g_C, g_phi
-
-
-def penalty_reverse_text(g, C, rho):
-    rho_of_atom = np.concatenate([rho, rho])
-    return rho_of_atom[None, :, None] / (3 * C.shape[2] * F) * C * g
-
+print(inspect.getsource(definition.motion_reverse))
+print(inspect.getsource(definition_of_prior.matern_penalty_reverse))
 
 # %%
 g = rng.normal(size=(3, N))
-for found, text in zip(motion_reverse(g, saved), motion_reverse_text(g, C, phi)):
+for found, text in zip(motion_reverse(g, saved), definition.motion_reverse(g, (C, phi))):
     np.testing.assert_allclose(found, text, rtol=1e-11)
-np.testing.assert_allclose(
-    matern_penalty_reverse(0.7, saved_penalty), penalty_reverse_text(0.7, C, rho), rtol=1e-13
-)
+text = definition_of_prior.matern_penalty_reverse(0.7, (C, rho))
+np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rtol=1e-13)
 
 # %% [markdown]
 # ## The gradient check

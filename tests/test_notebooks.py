@@ -16,7 +16,11 @@ ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
-SHOWS_THE_DEFINITION = {"02_colour_residual", "03_deformation"}  # in place of a transcription of its own
+SHOWS_THE_DEFINITION = {
+    "02_colour_residual",
+    "03_deformation",
+    "04_motion_and_prior",
+}  # in place of a transcription of its own
 WITHOUT_DERIVATIVE = {"16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")

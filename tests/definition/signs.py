@@ -29,6 +29,10 @@ FILES = sorted(file.stem for file in FOLDER.glob("*.py") if file.stem not in NOT
 NOTICED_BY_NOBODY = {
     "half = half + 1e-5": "the margin of the box: the cutoff decides",
     "constant = decay(": "rates are not annealed in `paper`; test_training.py compares the schedules of every preset",
+    "centres = np.array([-camera": "the extent is made of distances, which keep no sign",
+    "return np.sort(squared": "the cases have one point or many; test_training.py compares two and three",
+    "if k > first and count > 150": "the first frame of the cases is 0; test_training.py has another",
+    "matrix[row, k if": "both axes change sign; tests/equations/test_laplacian.py compares the matrix with SciPy",
     "return np.unique(np.round": "the cases have few frames; test_training.py compares the positions",
 }
 

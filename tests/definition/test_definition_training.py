@@ -19,6 +19,7 @@ from endotsr.config import (
 from endotsr.definition import schedules as definition_schedules
 from endotsr.definition import train
 from endotsr.definition.calibration import calibration_views as calibration_views_by_definition
+from endotsr.definition.initialisation import drawn_pixels, neighbour_distance
 from endotsr.definition.initialisation import initialise as initialise_by_definition
 from endotsr.definition.scene import spectral_from
 from endotsr.definition.settings import PAPER, PAPER_CONFIG, SMALL
@@ -31,7 +32,7 @@ from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck.twins import scaled
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.scene.initialisation import initialise
+from endotsr.scene.initialisation import initialise, squared_neighbour_distance, training_points
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.settings import PAPER as FAST_PAPER
@@ -103,6 +104,25 @@ def test_the_schedules_of_every_preset_are_the_same(preset):
 def test_the_views_of_the_calibration_are_the_same():
     for n_train in (1, 2, 5, 16, 17, 55, 138):
         np.testing.assert_array_equal(calibration_views(n_train, 16), calibration_views_by_definition(n_train, 16))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 30])
+def test_the_distance_to_the_neighbours_is_the_same(count):
+    position = np.random.default_rng(count).normal(size=(3, count))
+    wanted = squared_neighbour_distance(position)
+    np.testing.assert_allclose(neighbour_distance(position), wanted, rtol=1e-13, atol=0)
+
+
+def test_the_same_frames_of_a_long_clip_are_visited():
+    """152 frames, the first of them held out: every second one counts from the first training frame."""
+    small = simulate(width=4, height=3, frames=152)
+    small = small._replace(train_index=np.arange(1, 152, 3), test_index=np.zeros(1, int))
+    settings = SMALL.initialisation._replace(motion_threshold=1e-9, other_frame_points=152)
+    written = drawn_pixels(small, settings, np.random.default_rng(0))
+    visited = {int(k) for k, pixels in written if pixels.size}
+    config = fast_config(SMALL._replace(initialisation=settings))
+    fast = training_points(fast_sequence(small), config.initialisation, np.random.default_rng(0))
+    assert visited == set(small.train_index[np.unique(fast.start)].tolist()) and 10 < len(visited) < 51
 
 
 def test_the_fast_path_starts_with_the_same_gaussians():
