@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from endotsr.cli.main import main
 from endotsr.errors import InputError
 from endotsr.gradcheck import Pair, registry
 from endotsr.gradcheck import command as command_module
@@ -38,6 +39,15 @@ def test_exit_code_table_and_json(two_pairs, capsys, tmp_path):
     data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert [pair["passed"] for pair in data["pairs"]] == [True, False]
     assert all(pair["float32"]["passed"] for pair in data["pairs"])
+
+
+def test_the_definition_is_checked_in_place_of_the_compiled_functions(monkeypatch, capsys):
+    monkeypatch.setattr(registry, "all_pairs", lambda: {"one": square("one", 1.001)})
+    monkeypatch.setattr(registry, "definition_pairs", lambda: {"one": square("one", 1.0)})
+    assert run(None, 0, None) == 1 and "float32" in capsys.readouterr().out
+    assert run(None, 0, None, definition=True) == 0
+    assert "float32" not in capsys.readouterr().out
+    assert main(["gradcheck", "one", "--definition"]) == 0
 
 
 def test_same_seed_same_report(two_pairs, capsys):
