@@ -17,9 +17,9 @@ PAGES = sorted((ROOT / "docs" / "pages").glob("*.py"))
 ORACLES = sorted((ROOT / "tests" / "oracle").rglob("*.py"))
 WORD = "grad" + "check"  # spelled apart, so that no test here is selected by it
 MAXIMUM_LINES = 500
-CONTRACTING = {  # the fast compositing, and measurements that compare with it
+CONTRACTING = {  # the fast compositing, and the peak of the machine beside it
     *("splatting/fast/blocks.py", "splatting/fast/tiles.py"),
-    *("bench/peaks.py", "tradeoff/kernels.py"),
+    "bench/peaks.py",
 }
 PEERS = [
     ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")

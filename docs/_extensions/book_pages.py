@@ -13,7 +13,7 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
 from endotsr.golden.judge.store import read_golden
-from endotsr.golden.judge.twins import golden_requests
+from endotsr.golden.twins import golden_requests
 from endotsr.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
 from endotsr.gradcheck.twins import BOUND, BOUNDS, Distance, all_distances
 from endotsr.stages.registry import all_stages

@@ -32,7 +32,8 @@ def test_another_size_shows_the_same_scene(finished_run, tmp_path):
     a, b = (np.load(tmp_path / name / "colour" / "00000.npy") for name in "ab")
     assert b.shape == (3, 64, 96)
     halved = b.reshape(3, 32, 2, 48, 2).mean(axis=(2, 4))
-    assert np.abs(halved - a).mean() < 0.5 * np.abs(halved - a[:, ::-1]).mean()
+    alike, shifted = (np.corrcoef(halved.ravel(), picture.ravel())[0, 1] for picture in (a, np.roll(a, 1, axis=2)))
+    assert alike > 0.95 > 0.9 > shifted  # small Gaussians are wider at the smaller size, and not elsewhere
 
 
 def test_normalised_depth_is_the_accumulated_one_over_the_opacity(finished_run, tmp_path):

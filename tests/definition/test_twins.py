@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.golden.judge.twins import golden_requests
+from endotsr.golden.twins import golden_requests
 from endotsr.gradcheck.twins import BOUNDS, distances, made_up, scaled
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.registry import all_stages

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Config, DensityConfig, InitialisationConfig, LossConfig
+from endotsr.config import Config, DensityConfig, LossConfig
 from endotsr.definition import (
     adam,
     appearance,
@@ -44,7 +44,7 @@ from endotsr.fitting.model import raster_settings
 from endotsr.opencv import canny_edges
 from endotsr.stages.optimiser import CONSTANT_LENS, RESIDUAL_RATES, SERIES
 from endotsr.stages.registry import all_stages
-from endotsr.stages.requests import Tape, camera_of, config_of, model_of, raster_of, sequence_of
+from endotsr.stages.requests import Tape, camera_of, config_of, initialisation_of, model_of, raster_of, sequence_of
 from endotsr.stages.stage import Found, Inputs, Settings, Stage
 
 IMAGES = ("colour_image", "depth_image", "opacity_image")
@@ -365,7 +365,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    config = msgspec.convert(settings["initialisation"], InitialisationConfig)
+    config = initialisation_of(settings)
     sequence = sequence_of(inputs, settings["camera"])
     found = initialisation.initialise(sequence, config, model_of(settings), None)
     return {"count": np.array(found.opacity_logit.size), **moving.arrays(found)}, None

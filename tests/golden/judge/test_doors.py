@@ -230,7 +230,7 @@ def test_a_trajectory_says_where_it_leaves_the_path(golden, answered, tmp_path):
 
 COMMANDS = {  # words of a command line on Windows, and on the other systems
     r"C:\ports\x.exe {requests} {outputs}": ([r"C:\ports\x.exe", "{requests}", "{outputs}"], "C:portsx.exe"),
-    r'"C:\my ports\x.exe" -n \'a b\' {requests}': (
+    "\"C:\\my ports\\x.exe\" -n 'a b' {requests}": (
         [r"C:\my ports\x.exe", "-n", "a b", "{requests}"],
         r"C:\my ports\x.exe",
     ),
