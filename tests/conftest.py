@@ -31,3 +31,13 @@ def pytest_xdist_auto_num_workers(config):
         return 0
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(cores, LARGEST_CREW) if cores > 1 else 0
+
+
+def pytest_xdist_setupnodes(config):
+    """Before the workers of a whole run start: compile the kernels of a training once, which each would compile."""
+    if config.args == config.getini("testpaths") and not config.option.keyword:
+        from endotsr.config import config_from_dict
+        from endotsr.fitting.compile_ahead import compile_ahead
+
+        for precision in ("float32", "float64"):
+            compile_ahead(config_from_dict({"training": {"precision": precision}}))

@@ -53,7 +53,12 @@ def _drawn_to_nowhere(monkeypatch):
     plt.close("all")
 
 
-@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+SLOW = {"14_full_sequence": pytest.mark.slow}  # trains
+
+
+@pytest.mark.parametrize(
+    "file", [pytest.param(file, marks=SLOW.get(file.stem, ()), id=file.stem) for file in NOTEBOOKS]
+)
 def test_notebook_runs(file, capsys):
     runpy.run_path(str(file), run_name="__main__")
 

@@ -39,6 +39,7 @@ def both_passes(pair, inputs, cotangents):
     return dict(pair.forward(inputs)) | {f"gradient of {k}": v for k, v in pair.reverse(inputs, cotangents).items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(PAIRS))
 def test_tasks_in_any_ranges_and_order_give_the_same_bits(name, monkeypatch):
     chosen = case(name)

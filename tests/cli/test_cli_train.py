@@ -266,6 +266,7 @@ def test_a_reader_that_left_is_no_success(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="closes the standard output")
 @pytest.mark.parametrize("how", ["closed", "ascii"])
 def test_output_that_takes_no_text_does_not_stop_a_run(how, tmp_path):

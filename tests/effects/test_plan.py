@@ -29,6 +29,7 @@ def test_a_still_clip_keeps_no_component_of_time():
     assert {change.key for change in plan.changes} >= {"model.deformation", "model.appearance", "model.spectral_motion"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names, kept",
     [
@@ -85,6 +86,7 @@ def test_a_plan_never_switches_on_and_never_enlarges():
     assert planned("noise", "exposure", config=small)[1].model.exposure
 
 
+@pytest.mark.slow
 def test_moving_tissue_keeps_the_harmonics():
     assert planned("noise", "breathing")[1].model.harmonics_degree == 3
     assert planned("noise", "breathing")[1].optimiser == PAPER.optimiser

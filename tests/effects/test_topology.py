@@ -36,6 +36,7 @@ def _cut(opening):
     return msgspec.structs.replace(settings, cutting=cutting)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [["pull"], ["instrument", "breathing"], ["brightening", "highlights"]])
 def test_motion_light_and_instruments_change_no_topology(names):
     found = inspected("noise", *names).verdicts["topology change"]
@@ -58,6 +59,7 @@ def test_ends_that_show_different_places_leave_it_open():
     assert found.kind == "unknown" and not found.present and "in common" in found.reason
 
 
+@pytest.mark.slow
 def test_a_moving_camera_leaves_a_new_region_open():
     cut = simulate(_cut(4.0)).sequence
     cameras = clip("noise", "camera_motion", amplitude=1.0).cameras
@@ -85,6 +87,7 @@ def test_correlation_is_one_with_the_frame_itself_and_nan_off_tissue():
     assert np.nanmin(score) > 1 - 1e-5 and np.nanmax(score) <= 1 + 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil, strength", [(blurred, 0.5), (blurred, 2.0), (smoky, 0.4)])
 def test_spoiled_frames_in_the_middle_are_no_motion(spoil, strength):
     """The middle frame is the usual reference; compared with a blurred one, every other frame seems to move."""

@@ -53,6 +53,7 @@ def whole(tmp_path_factory):
     return spec, folder / "out", rows, told
 
 
+@pytest.mark.slow
 def test_every_run_is_trained_measured_and_told(whole):
     _, out, rows, told = whole
     assert [row["configuration"] for row in rows] == ["base", "A", "A from base"]

@@ -42,6 +42,7 @@ def figures(result):
     yield dials_figure(result, "both", "gradient")
 
 
+@pytest.mark.slow
 def test_no_word_covers_another(result):
     for figure in figures(result):
         assert sum(len(axes.texts) for axes in figure.axes) > 10

@@ -35,6 +35,7 @@ def test_a_wrong_port_is_explained():
     assert answered(golden, golden.cases[0], half, "float32", 1) is None
 
 
+@pytest.mark.slow
 def test_known_failures_are_strict(tmp_path):
     listed = tmp_path / "known.txt"
     listed.write_text("motion/generic  # a factor 2\n")

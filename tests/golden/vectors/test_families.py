@@ -39,6 +39,7 @@ def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
         all_wrong_ports()
 
 
+@pytest.mark.slow
 def test_what_is_published_keeps_its_place_and_what_is_new_follows():
     """Files, flags and mistakes, for a manifest that lists one of two cases of `laplacian` and two flags."""
     three = ("motion/generic", "laplacian/co_sited", "laplacian/tiny")

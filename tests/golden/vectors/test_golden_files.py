@@ -31,6 +31,7 @@ def golden():
     return read_golden(FOLDER)
 
 
+@pytest.mark.slow
 def test_the_folder_equals_a_fresh_computation():
     lines, summary = check(FOLDER, bitwise=False)
     assert not lines, (summary, lines[:10])
