@@ -41,3 +41,12 @@ def pytest_xdist_setupnodes(config):
 
         for precision in ("float32", "float64"):
             compile_ahead(config_from_dict({"training": {"precision": precision}}))
+
+
+WORD = "gradcheck"
+
+
+def pytest_ignore_collect(collection_path, config):
+    """`-k` with this word imports the one file that it selects: to import all others takes longer than its tests."""
+    other = collection_path.name.startswith("test_") and collection_path.name != f"test_{WORD}.py"
+    return True if config.option.keyword == WORD and collection_path.is_file() and other else None

@@ -32,7 +32,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import Exposure, Pose
 from endotsr.splatting.camera import Camera
-from endotsr.splatting.render import Compositor, RenderOut, render_forward, render_reverse
+from endotsr.splatting.render import Compositor, RenderOut, RenderSaved, render_forward, render_reverse
 from endotsr.splatting.settings import RasterSettings
 
 
@@ -45,6 +45,7 @@ class ViewGradients(NamedTuple):
     d_exposure: Exposure | None  # gradients by the exposure of this frame
     d_pose: Pose | None  # gradients by the correction of its pose
     rendered: RenderOut  # the images that were compared
+    render_saved: RenderSaved  # holds the decisions of the render: order, contributors, clamps
 
 
 def view_gradients(
@@ -95,4 +96,4 @@ def view_gradients(
         penalty, penalty_saved = matern_penalty_forward(gaussians.motion_coefficients, spectral.rho)
         loss, terms = loss + config.loss.lambda_msp * penalty, terms | {"matern_penalty": penalty}
         gradients["motion_coefficients"] += matern_penalty_reverse(config.loss.lambda_msp, penalty_saved)
-    return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered)
+    return ViewGradients(loss, terms, gradients, d_exposure, d_pose, rendered, render_saved)

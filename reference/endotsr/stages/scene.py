@@ -15,7 +15,6 @@ from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import Exposure
 from endotsr.sequences.sequence import Frame
-from endotsr.splatting.render import render_forward
 from endotsr.stages.compositing import POSE_UNITS, RAW_UNITS, render_decisions
 from endotsr.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
 from endotsr.stages.requests import (
@@ -92,11 +91,6 @@ def _images_and_terms(inputs: Inputs, settings: Settings, saved: ObjectiveSaved)
 def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) -> dict[str, NDArray]:
     """Signs of every absolute value, the depth maximum and the edges, beside the decisions of the render."""
     (colour, depth, _), targets = saved.view.rendered, saved.targets
-    scene, _ = scene_at(gaussians_of(inputs), spectral_of(inputs, settings), model_of(settings), settings["t"])
-    _, render = render_forward(
-        scene, camera_of(inputs, settings), raster_of(settings), degree=settings["degree"],
-        compositor=compositor_of(settings),
-    )  # fmt: skip
     assert targets.depth is not None
     difference = np.where(targets.mask, colour - targets.image, 0)
     residual = np.where(targets.depth.valid, depth / depth.max() - targets.depth.normalised, 0)
@@ -104,7 +98,7 @@ def _objective_trace(inputs: Inputs, settings: Settings, saved: ObjectiveSaved) 
     signed = {"l1": difference, "depth": residual}
     signed |= {f"band {j}": band for j, band in enumerate(laplacian_levels(difference).bands)}
     signed |= {f"steps {axis}": np.diff(outside, axis=axis) for axis in (1, 2)}
-    return render_decisions(render) | {
+    return render_decisions(saved.view.render_saved) | {
         "edges": canny_edges(depth).astype(int),
         "peak": np.array(depth.argmax()),
         **{name: np.sign(array).astype(int) for name, array in signed.items()},
