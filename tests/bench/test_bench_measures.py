@@ -26,6 +26,8 @@ from endotsr.splatting import render
 from endotsr.splatting.render import Scene
 from endotsr.splatting.settings import PAPER as PAPER_RULES
 
+pytestmark = pytest.mark.slow
+
 TINY = Case(gaussians=60, width=48, height=32, repeats=2, threads=1, densifications=1)
 PEAKS = {"flop_per_second": {"float32": 1e11, "float64": 5e10}, "bytes_per_second": {"triad": 1e10, "update": 2e10}}
 

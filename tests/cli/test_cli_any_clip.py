@@ -12,6 +12,8 @@ from endotsr.sequences.endonerf import read_endonerf
 from endotsr.simulator.truth import read_truth
 from film_reader import read_video
 
+pytestmark = pytest.mark.slow
+
 SCENE = ["moving-camera", "--instrument.on", "--width", "96", "--height", "80", "--frames", "9", "--noise.on", "false"]
 
 

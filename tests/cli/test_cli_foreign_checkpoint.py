@@ -9,6 +9,8 @@ from tiny import assert_refused, assert_same_run, train_words
 
 from endotsr.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def run(finished_run, tmp_path):

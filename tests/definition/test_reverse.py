@@ -11,6 +11,8 @@ from endotsr.definition import compositing, laplacian, masked_ssim, pose
 from endotsr.gradcheck import check_pair, definition_pairs, one_thread, pair_stream, table
 from oracle.complex_step import derivative
 
+pytestmark = pytest.mark.slow
+
 PAIRS = definition_pairs()
 # Whole renders, which take minutes: `endotsr gradcheck --definition` checks them too; here by complex steps and golden.
 LONG = {"render_exact", "render_paper", "objective", "composite_exact", "composite_paper"}

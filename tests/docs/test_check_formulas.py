@@ -8,7 +8,7 @@ from check_formulas import formulas, main
 from page_visits import found_browser
 
 mathjax = pytest.importorskip("mathjax")
-pytestmark = pytest.mark.skipif(found_browser() is None, reason="no browser found")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(found_browser() is None, reason="no browser found")]
 BUNDLES = Path(mathjax.__path__[0]) / "static" / "mathjax" / "es5"
 BUNDLE, FONTS = "tex-chtml.js", Path("output") / "chtml" / "fonts" / "woff-v2"
 EXTENSIONS = Path("input") / "tex" / "extensions"

@@ -12,6 +12,8 @@ from endotsr.effects.savings import memory_fraction, numbers_of_a_gaussian, time
 from endotsr.equations.dictionary import frequencies, report_atoms
 from endotsr.runs.files import finite
 
+pytestmark = pytest.mark.slow
+
 
 def planned(*names, config=PAPER, explicit=frozenset(), **more):
     """The plan of a simulated clip and the settings that follow."""
@@ -29,7 +31,6 @@ def test_a_still_clip_keeps_no_component_of_time():
     assert {change.key for change in plan.changes} >= {"model.deformation", "model.appearance", "model.spectral_motion"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "names, kept",
     [
@@ -86,7 +87,6 @@ def test_a_plan_never_switches_on_and_never_enlarges():
     assert planned("noise", "exposure", config=small)[1].model.exposure
 
 
-@pytest.mark.slow
 def test_moving_tissue_keeps_the_harmonics():
     assert planned("noise", "breathing")[1].model.harmonics_degree == 3
     assert planned("noise", "breathing")[1].optimiser == PAPER.optimiser

@@ -16,6 +16,8 @@ from endotsr.effects.rigid import fit_rigid, inverse_depth, predicted_flow
 from endotsr.effects.tracks import make_tracks
 from endotsr.simulator.simulate import simulate
 
+pytestmark = pytest.mark.slow
+
 SWING = 3.0  # mm
 
 

@@ -15,6 +15,8 @@ from endotsr.effects.topology import local_correlation, topology_verdict
 from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("opening", [1.0, 4.0])
 def test_a_slit_is_found_where_the_wound_is(opening):
@@ -36,7 +38,6 @@ def _cut(opening):
     return msgspec.structs.replace(settings, cutting=cutting)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("names", [["pull"], ["instrument", "breathing"], ["brightening", "highlights"]])
 def test_motion_light_and_instruments_change_no_topology(names):
     found = inspected("noise", *names).verdicts["topology change"]
@@ -59,7 +60,6 @@ def test_ends_that_show_different_places_leave_it_open():
     assert found.kind == "unknown" and not found.present and "in common" in found.reason
 
 
-@pytest.mark.slow
 def test_a_moving_camera_leaves_a_new_region_open():
     cut = simulate(_cut(4.0)).sequence
     cameras = clip("noise", "camera_motion", amplitude=1.0).cameras
@@ -87,7 +87,6 @@ def test_correlation_is_one_with_the_frame_itself_and_nan_off_tissue():
     assert np.nanmin(score) > 1 - 1e-5 and np.nanmax(score) <= 1 + 1e-5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("spoil, strength", [(blurred, 0.5), (blurred, 2.0), (smoky, 0.4)])
 def test_spoiled_frames_in_the_middle_are_no_motion(spoil, strength):
     """The middle frame is the usual reference; compared with a blurred one, every other frame seems to move."""

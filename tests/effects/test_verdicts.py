@@ -18,6 +18,8 @@ from endotsr.simulator.cameras import make_cameras
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
+pytestmark = pytest.mark.slow
+
 ALONE = ("breathing", "pulsation", "pull", "exposure", "brightening", "highlights", "instrument", "depth_errors")
 
 

@@ -12,7 +12,10 @@ from endotsr.evaluation.lpips import CHANNELS, KERNELS
 from endotsr.untrusted.arrays import LONGEST_HEADER
 from special_files import DAMAGE, NO_FILES
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes"),
+]
 
 
 LARGE = b"{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 17), }"

@@ -18,6 +18,8 @@ from endotsr.sweeps.locks import file_lock, run_lock
 from endotsr.sweeps.spec import read_spec
 from endotsr.sweeps.sweep import Inputs, planned, run_sweep
 
+pytestmark = pytest.mark.slow
+
 ONE = BASE.replace("seeds = [0, 1]", "seeds = [0]")
 START = '[configurations."A from base"]\nstart = { configuration = "base", iteration = 15 }\ndensity = { until = 0 }\n'
 
@@ -53,7 +55,6 @@ def whole(tmp_path_factory):
     return spec, folder / "out", rows, told
 
 
-@pytest.mark.slow
 def test_every_run_is_trained_measured_and_told(whole):
     _, out, rows, told = whole
     assert [row["configuration"] for row in rows] == ["base", "A", "A from base"]
@@ -215,7 +216,6 @@ def test_errors_are_outcomes_of_one_line(tmp_path, monkeypatch, error, said):
     assert not outcome.ends_sweep
 
 
-@pytest.mark.slow
 def test_the_lock_of_a_run_is_waited_for_as_long_as_its_log_grows(whole):
     _, out, rows, _ = whole
     run = open_run(out / "runs" / rows[0]["name"])

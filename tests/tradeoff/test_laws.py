@@ -16,6 +16,8 @@ from endotsr.tradeoff.measure import errors, frame, prepare
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
 from endotsr.tradeoff.study import reference_setting
 
+pytestmark = pytest.mark.slow
+
 CUTOFFS = sorted(settings.CUTOFFS.values())
 STOPS = sorted(settings.STOPS.values())
 
@@ -110,7 +112,6 @@ def test_visits_grow_like_the_logarithm_of_one_over_the_cutoff():
     np.testing.assert_allclose(slopes, expected, rtol=0.05)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, *EXPONENTIALS])
 def test_the_image_errs_no_more_than_the_exponential(scene, reference, degree):
     """An error of alpha by a factor 1 + d changes the image by less than d times the sum of alpha T, which is < 1."""

@@ -20,6 +20,8 @@ from endotsr.tradeoff.measure import _upsampling, errors, forward, frame, prepar
 from endotsr.tradeoff.settings import ACCURATE, CLOSE
 from endotsr.tradeoff.study import cost_of, described
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):

@@ -12,6 +12,8 @@ from endotsr.tradeoff.settings import CUTOFFS
 from endotsr.tradeoff.study import described
 from endotsr.tradeoff.text import advice, error_over_cutoff
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 COMMITTED = sorted((ROOT / "docs" / "results").glob("tradeoff*.json"))
 
@@ -42,14 +44,12 @@ def figures(result):
     yield dials_figure(result, "both", "gradient")
 
 
-@pytest.mark.slow
 def test_no_word_covers_another(result):
     for figure in figures(result):
         assert sum(len(axes.texts) for axes in figure.axes) > 10
         assert overlaps(figure) == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("file", COMMITTED, ids=lambda file: file.stem)
 def test_no_word_covers_another_in_the_committed_pictures(file):
     committed = json.loads(file.read_text(encoding="utf-8"))
@@ -57,7 +57,6 @@ def test_no_word_covers_another_in_the_committed_pictures(file):
         assert all(overlaps(figure) == [] for figure in figures(committed))
 
 
-@pytest.mark.slow
 def test_pictures_are_drawn(result, tmp_path):
     """Of the whole study, and of the measurement of the command, which has no dials."""
     stems = draw(result, tmp_path)
@@ -68,7 +67,6 @@ def test_pictures_are_drawn(result, tmp_path):
     assert draw({key: value for key, value in result.items() if key != "dials"}, tmp_path) == ["tradeoff"]
 
 
-@pytest.mark.slow
 def test_equal_results_give_equal_pictures(result, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()

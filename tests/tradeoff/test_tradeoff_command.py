@@ -9,6 +9,8 @@ from test_splat_file import write_npz
 from endotsr.cli.main import main
 from endotsr.tradeoff.results import Measurement, Trainings, read_result
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
@@ -93,7 +95,6 @@ def test_a_measurement_without_its_keys_is_refused(name, budget, key, tmp_path, 
     assert f"{name}.json: not a whole measurement" in said and f"missing required field `{key}`" in said
 
 
-@pytest.mark.slow
 def test_keys_that_are_missing_deeper_are_named_too(measured, tmp_path, capsys):
     whole = json.loads((measured / "out" / "tradeoff.json").read_text())
     without = {key: value for key, value in whole["points"][0].items() if key != "both"}

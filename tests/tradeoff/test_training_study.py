@@ -19,6 +19,8 @@ from endotsr.tradeoff import training
 from endotsr.tradeoff.training import changed, configurations, measured, run_training_study
 from endotsr.tradeoff.training_text import best_by_time, gain_by_minute, summary, training_lines, training_rows
 
+pytestmark = pytest.mark.slow
+
 SMALL = SimulatorSettings(width=64, height=64, frames=9)
 BASE = msgspec.structs.replace(
     DEMO, initialisation=InitialisationConfig(first_frame_points=60, other_frame_points=10)

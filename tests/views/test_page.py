@@ -26,6 +26,8 @@ from endotsr.views.trajectories import _signed, key_times, packed, trajectories
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 from made_up_model import CAMERA, moving_scene
 
+pytestmark = pytest.mark.slow
+
 AT_A_KEY, BETWEEN_KEYS = 45.0, 35.0  # dB of the page against the reference renderer, least
 
 
