@@ -77,7 +77,20 @@ def main(count: int) -> int:
     plugin = Plugin(count)
     result = json.loads(RESULT.read_text(encoding="utf-8"))
     files = {name.split("::")[0] for name in result["checks"] if name.startswith("tests/")}
-    quiet = ["-q", "-s", "-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings", "-n", "0"]
+    quiet = [
+        "-q",
+        "-s",
+        "-p",
+        "no:timeout",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:warnings",
+        "-n",
+        "0",
+        "-m",
+        "not faults and not nightly",
+    ]
     pytest.main([f"--rootdir={ROOT}", *quiet, *(str(ROOT / f) for f in sorted(files))], plugins=[plugin])
     print("\n".join(plugin.missed))
     return len(plugin.missed)

@@ -207,7 +207,20 @@ def main(words: list[str]) -> int:
         options.keep.mkdir(parents=True, exist_ok=True)  # now, not after the first quarter of an hour
     plugin = Plugin(options)
     folders = [str(ROOT / "tests" / name) for name in options.tests if (ROOT / "tests" / name).exists()]
-    quiet = ["-q", "-s", "-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings", "-n", "0"]
+    quiet = [
+        "-q",
+        "-s",
+        "-p",
+        "no:timeout",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:warnings",
+        "-n",
+        "0",
+        "-m",
+        "not faults and not nightly",
+    ]
     pytest.main([f"--rootdir={ROOT}", *quiet, *folders], plugins=[plugin])
     if not plugin.result:
         return 1
