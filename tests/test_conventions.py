@@ -176,5 +176,5 @@ def test_selection_by_word_is_the_registry():
     ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     collected = {line.strip() for line in done.stdout.splitlines() if "::" in line}
-    wanted = {f"tests/test_{WORD}.py::test_{WORD}[{name}-{seed}]" for name in all_pairs() for seed in (0, 1)}
+    wanted = {f"tests/test_{WORD}.py::test_{WORD}[{seed}-{name}]" for name in all_pairs() for seed in (0, 1)}
     assert collected == wanted, done.stdout[-2000:]
