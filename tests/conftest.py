@@ -29,7 +29,9 @@ def pytest_xdist_auto_num_workers(config):
     """Workers of `-n auto`: one a core for folders of tests, none for files and tests that are named one by one."""
     if all(Path(word.partition("::")[0]).suffix == ".py" for word in config.args):
         return 0
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    from endotsr.kernels.machine import usable_cores
+
+    cores = usable_cores()
     return min(cores, LARGEST_CREW) if cores > 1 else 0
 
 

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import pytest  # noqa: E402
 
 from endotsr.golden.judge.store import golden_folder, read_golden  # noqa: E402
-from mutation.checks import SLOW, SUITES, Check, of_case, of_item, run  # noqa: E402
+from mutation.checks import COLLECTING, SLOW, SUITES, Check, of_case, of_item, run  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
 from mutation.mutator import Mutant, in_place, mutants  # noqa: E402
 from mutation.processes import Outcome, in_processes  # noqa: E402
@@ -77,21 +77,7 @@ def main(count: int) -> int:
     plugin = Plugin(count)
     result = json.loads(RESULT.read_text(encoding="utf-8"))
     files = {name.split("::")[0] for name in result["checks"] if name.startswith("tests/")}
-    quiet = [
-        "-q",
-        "-s",
-        "-p",
-        "no:timeout",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:warnings",
-        "-n",
-        "0",
-        "-m",
-        "not faults and not nightly",
-    ]
-    pytest.main([f"--rootdir={ROOT}", *quiet, *(str(ROOT / f) for f in sorted(files))], plugins=[plugin])
+    pytest.main([f"--rootdir={ROOT}", *COLLECTING, *(str(ROOT / f) for f in sorted(files))], plugins=[plugin])
     print("\n".join(plugin.missed))
     return len(plugin.missed)
 

@@ -28,6 +28,10 @@ from endotsr.gradcheck import Pair
 from mutation.gradients import Recorded, live, replay
 
 SUITES: tuple[str, ...] = ("gradcheck", "oracle", "golden", "hard", "properties")
+COLLECTING = (  # options of pytest, in this process: slow tests are among the checks
+    *("-q", "-s", "-n", "0", "-m", "not faults and not nightly"),
+    *("-p", "no:timeout", "-p", "no:cacheprovider", "-p", "no:warnings"),
+)
 SLOW = 1.0  # s of processor time; a check that takes longer without the compiler is left out
 INDEPENDENT = re.compile(r"oracle|mpmath|scipy|skimage|cv2|definition\.|by_definition|(the|its|their)_definition")
 BLOCKS = 0.01  # s; a forward pass as quick as this is also differentiated block by block

@@ -30,7 +30,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import pytest  # noqa: E402
 
 from endotsr.runs.machine import machine, now, versions  # noqa: E402
-from mutation.checks import SLOW, SUITES, Check, run  # noqa: E402
+from mutation.checks import COLLECTING, SLOW, SUITES, Check, run  # noqa: E402
 from mutation.equivalents import reasons  # noqa: E402
 from mutation.kernels import kernels, planted  # noqa: E402
 from mutation.merge import added, names, of_today, survivors, whole  # noqa: E402
@@ -207,21 +207,7 @@ def main(words: list[str]) -> int:
         options.keep.mkdir(parents=True, exist_ok=True)  # now, not after the first quarter of an hour
     plugin = Plugin(options)
     folders = [str(ROOT / "tests" / name) for name in options.tests if (ROOT / "tests" / name).exists()]
-    quiet = [
-        "-q",
-        "-s",
-        "-p",
-        "no:timeout",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:warnings",
-        "-n",
-        "0",
-        "-m",
-        "not faults and not nightly",
-    ]
-    pytest.main([f"--rootdir={ROOT}", *quiet, *folders], plugins=[plugin])
+    pytest.main([f"--rootdir={ROOT}", *COLLECTING, *folders], plugins=[plugin])
     if not plugin.result:
         return 1
     options.json.write_text(written(plugin.result), encoding="utf-8")
