@@ -10,6 +10,7 @@ import pytest
 from endotsr.config import DEMO, TrainingConfig
 from endotsr.fitting import moments as module
 from endotsr.fitting.moments import STEPS, Moments
+from endotsr.fitting.objective import frame_targets
 from endotsr.fitting.sampling import Moment, draw_view
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
@@ -40,24 +41,37 @@ def test_every_moment_of_every_gap_is_drawn_alike(sequence):
                                         view.moment.earlier)) / sequence.count)  # fmt: skip
 
 
-def test_the_frame_of_a_moment_is_that_of_the_equation(sequence):
-    kept = Moments(sequence)
-    moment = Moment(0, 2, 0.75)
-    wanted = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
-    found = kept.frame(moment)
-    assert np.abs(found.image - wanted.image).max() <= 0.51 / STEPS
-    assert np.array_equal(found.mask, wanted.mask) and np.array_equal(found.depth, wanted.depth)
-    assert (found.time, found.camera) == (wanted.time, wanted.camera)
-    assert found.image.dtype == np.float32 and kept.frame(moment, "float64").image.dtype == np.float64
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_the_targets_of_a_moment_are_those_of_the_equation(sequence, precision):
+    config = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, precision=precision))
+    made = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
+    stored = np.divide(np.rint(made.image * STEPS), STEPS, dtype=precision)
+    wanted = frame_targets(made._replace(image=stored, depth=made.depth.astype(precision)), config)
+    found, camera = Moments(sequence, config).observed(Moment(0, 2, 0.75))
+    assert np.abs(found.image - np.where(made.mask, made.image, 0)).max() <= 0.51 / STEPS
+    assert camera == made.camera and found.image.dtype == precision
+    for a, b in zip(flat(found), flat(wanted), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_the_targets_of_a_frame_are_those_of_its_picture(sequence):
+    shop = workshop(sequence, DEMO)
+    for a, b in zip(flat(shop.targets_of(3)), flat(frame_targets(sequence.frame(3), DEMO)), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def flat(value):
+    """The arrays and numbers in nested tuples."""
+    return [leaf for part in value for leaf in flat(part)] if isinstance(value, tuple) else [value]
 
 
 def test_the_flows_of_a_gap_are_computed_once(sequence, monkeypatch):
     asked = []
     real = module.flows_between
     monkeypatch.setattr(module, "flows_between", lambda *rest: asked.append(rest[1:]) or real(*rest))
-    kept = Moments(sequence)
+    kept = Moments(sequence, DEMO)
     for fraction in (0.25, 0.5, 0.75, 0.5):
-        kept.frame(Moment(0, 2, fraction))
+        kept.observed(Moment(0, 2, fraction))
     assert asked == [(0, 2)]
 
 
@@ -69,7 +83,7 @@ def test_a_training_compares_with_the_moments(sequence):
     )
     shop, state = workshop(sequence, config), new_training(sequence, config)
     entries = [training_step(state, shop) for _ in range(4)]
-    assert not len(shop.targets) and len(shop.moments.stored)  # no frame was looked at
+    assert not len(shop.parts) and len(shop.moments.stored)  # no frame was looked at
     assert all(np.isfinite(entry["loss"]) for entry in entries)
 
 

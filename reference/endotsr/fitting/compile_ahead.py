@@ -112,7 +112,10 @@ def rehearse_picture(shop: Any, state: Any) -> None:
 
 def rehearse_losses(shop: Any, everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule switches on later."""
-    from endotsr.fitting.objective import LossWeights, frame_targets, image_loss
+    import numpy as np
+
+    from endotsr.fitting.objective import LossWeights, image_loss
+    from endotsr.losses.masked_ssim import stored_target
     from endotsr.splatting.render import RenderOut
 
     config, loss = shop.config, shop.config.loss
@@ -120,7 +123,9 @@ def rehearse_losses(shop: Any, everything: bool) -> None:
     later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
     seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no loss term is zero, so every kernel runs
-    image_loss(seen, frame_targets(frame, config), weights, config.loss)
+    image_loss(seen, shop.targets_of(0), weights, config.loss)
+    if config.training.bridge_fraction > 0:  # the pictures between the frames are stored in finer steps
+        stored_target(np.zeros(frame.image.shape, np.uint16), 1, frame.mask, config.training.precision)
 
 
 def rehearse_optimiser(shop: Any, state: Any) -> None:

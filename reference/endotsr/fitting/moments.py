@@ -1,6 +1,6 @@
-"""Frames at the moments between the training frames (B14), made once and kept in half the memory.
+"""What the renders at the moments between the training frames (B14) are compared with, made once and kept.
 
-In: a sequence and a moment between two of its training frames. Out: the `Frame` that its render is compared with. All
+In: a sequence and a moment between two of its training frames. Out: the targets of its losses and its camera. All
 moments of a gap are made at the first visit, because they need the same two flows. This module computes no loss.
 """
 
@@ -9,47 +9,50 @@ from typing import NamedTuple
 
 import numpy as np
 
+from endotsr.config import Config
+from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
 from endotsr.fitting.sampling import Moment
 from endotsr.kernels.arrays import Array, BoolArray
 from endotsr.kernels.memory import Kept
+from endotsr.losses.masked_ssim import stored_target
 from endotsr.sequences.between import flows_between, frame_between
-from endotsr.sequences.sequence import Frame, Sequence
+from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 
 STEPS = 65535  # of an image value in [0, 1]; 8-bit steps would be as large as the error of a good fit
 
 
 class Stored(NamedTuple):
-    """A frame in whole numbers and half precision: 11 bytes a pixel in place of 17."""
+    """The targets of a moment; the picture is in whole numbers: 14 bytes a pixel in place of 20."""
 
     image: Array  # (3, H, W) uint16, steps of 1 / STEPS
     mask: BoolArray  # (H, W)
-    depth: Array  # (H, W) float32, scene units
-    time: float
+    parts: TargetParts
     camera: Camera
 
 
 @dataclass(eq=False)
 class Moments:
-    """The frames between the training frames of a sequence, by moment."""
+    """The targets between the training frames of a sequence, by moment."""
 
     sequence: Sequence
+    config: Config
     stored: Kept[tuple[int, int], dict[Moment, Stored]] = field(default_factory=Kept)  # by gap
 
-    def frame(self, moment: Moment, dtype: np.dtype | str = "float32") -> Frame:
-        """The frame at a moment, with image and depth in `dtype`."""
-        gap = self.stored.get((moment.earlier, moment.later), lambda: self._made(moment))
-        image, mask, depth, time, camera = gap[moment]
-        return Frame(np.divide(image, STEPS, dtype=dtype), mask, depth.astype(dtype), time, camera)
+    def observed(self, moment: Moment) -> tuple[Targets, Camera]:
+        """The targets at a moment, in the precision of the training, and the camera there."""
+        made = self.stored.get((moment.earlier, moment.later), lambda: self._made(moment))[moment]
+        target = stored_target(made.image, STEPS, made.mask, self.config.training.precision)
+        return targets_of(target, made.parts, self.config), made.camera
 
     def _made(self, wanted: Moment) -> dict[Moment, Stored]:
         """All moments of the gap in which `wanted` lies."""
         earlier, later, _ = wanted
-        found = {}
+        found, precision = {}, self.config.training.precision
         flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
         for place in range(1, count):
             made = frame_between(self.sequence, earlier, later, place / count, flows)
             image = np.rint(made.image * STEPS).astype(np.uint16)
-            moment = Moment(earlier, later, place / count)
-            found[moment] = Stored(image, made.mask, made.depth, made.time, made.camera)
+            parts = target_parts(made.mask, made.depth.astype(precision), self.config)
+            found[Moment(earlier, later, place / count)] = Stored(image, made.mask, parts, made.camera)
         return found

@@ -19,9 +19,10 @@ from endotsr.fitting.adam import AdamState, Rate, adam_state
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.fitting.moments import Moments
-from endotsr.fitting.objective import Targets, frame_targets
+from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
 from endotsr.fitting.sampling import Drawn, View
 from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
+from endotsr.losses.masked_ssim import stored_target
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
@@ -60,16 +61,15 @@ class Workshop:
     config: Config
     spectral: Spectral
     extent: float
-    targets: Kept[int, Targets]  # by frame, filled at first use
+    parts: Kept[int, TargetParts]  # of the targets, by frame, filled at first use
     moments: Moments  # between the frames, filled at first use
     depth: float = 1.0  # median depth of the tissue, scene units; known where poses are corrected
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
         """What the render of a view is compared with, and the camera that it is seen by."""
-        if view.moment is None:
-            return self.targets_of(view.index), self.sequence.cameras[view.index]
-        frame = self.moments.frame(view.moment, self.config.training.precision)
-        return frame_targets(frame, self.config), frame.camera
+        if view.moment is not None:
+            return self.moments.observed(view.moment)
+        return self.targets_of(view.index), self.sequence.cameras[view.index]
 
     def column(self, view: View) -> int:
         """The place of the compared frame among the training frames."""
@@ -81,9 +81,11 @@ class Workshop:
         return rates if given is None else rates | {"pose_translation": cast(float, given) * self.depth}
 
     def targets_of(self, index: int) -> Targets:
-        """The loss targets of a frame, computed once, or again where they were dropped."""
-        precision = self.config.training.precision
-        return self.targets.get(index, lambda: frame_targets(self.sequence.frame(index, precision), self.config))
+        """The targets of a frame. All but its picture is computed once, or again where it was dropped."""
+        sequence, precision = self.sequence, self.config.training.precision
+        mask = sequence.masks[index]
+        parts = self.parts.get(index, lambda: target_parts(mask, sequence.depth[index].astype(precision), self.config))
+        return targets_of(stored_target(sequence.images[index], 255, mask, precision), parts, self.config)
 
 
 def workshop(sequence: Sequence, config: Config) -> Workshop:
@@ -95,7 +97,7 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     limit = memory_limit(config.sequence.memory) / 4
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    moments = Moments(sequence, Kept(limit))
+    moments = Moments(sequence, config, Kept(limit))
     depth = _depth_of_tissue(sequence) if config.model.pose_correction else 1.0
     return Workshop(sequence, config, spectral, extent, Kept(limit), moments, depth)
 

@@ -22,6 +22,7 @@ weight w0 = 0.27 bounds the cancellation: sigma^2 >= w0 sum w (x - c)^2 in eithe
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.jit import jit
@@ -57,6 +58,18 @@ def ssim_target(observed: FloatArray, mask: BoolArray) -> SsimTarget:
     observed = check_image("observed", observed, mask)
     image = np.where(mask, observed, observed.dtype.type(0))
     return SsimTarget(image, np.ascontiguousarray(mask), observed.shape[0] * int(np.count_nonzero(mask)))
+
+
+def stored_target(levels: NDArray[np.unsignedinteger], largest: int, mask: BoolArray, dtype: DTypeLike) -> SsimTarget:
+    """`ssim_target` of levels / largest in `dtype`, for a picture that is stored in whole numbers.
+
+    levels   (C, H, W) uint8 or uint16 in [0, largest]
+    """
+    levels, real = check_image("levels", levels, mask), np.dtype(dtype).type
+    image = np.empty(levels.shape, dtype)
+    rows = levels.shape[0] * levels.shape[1]
+    parallel_for(_unit_image_kernel, rows, levels, real(largest), np.ascontiguousarray(mask), image)
+    return SsimTarget(image, np.ascontiguousarray(mask), levels.shape[0] * int(np.count_nonzero(mask)))
 
 
 def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float, SsimSaved]:
@@ -111,6 +124,18 @@ def window(dtype: np.dtype) -> FloatArray:
     offset = np.arange(-RADIUS, RADIUS + 1)
     weights = np.exp(-(offset**2) / (2 * WINDOW_SIGMA**2))
     return (weights / weights.sum()).astype(dtype)
+
+
+def _unit_image(first, stop, levels, largest, mask, image):
+    """levels / largest on tissue, 0 elsewhere."""
+    height, width = mask.shape
+    real = image.dtype.type
+    for index in range(first, stop):
+        channel, y = index // height, index % height
+        source, tissue, target = levels[channel, y], mask[y], image[channel, y]
+        for i in range(width):
+            value = real(source[i]) / largest
+            target[i] = value if tissue[i] else real(0)
 
 
 def _clear_border(padded: FloatArray) -> None:
@@ -239,6 +264,7 @@ def _smooth_row(line, weights, out):
 
 _column_moments, _row_moments = jit(_column_moments), jit(_row_moments)
 _smooth_columns, _smooth_row = jit(_smooth_columns), jit(_smooth_row)
+_unit_image_kernel = jit(_unit_image)
 _difference_and_sum_kernel = jit(_difference_and_sum)
 _similarity_kernel = jit(_similarity)
 _similarity_reverse_kernel = jit(_similarity_reverse)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 from endotsr.kernels.memory import memory_limit
 from endotsr.sequences.frame_store import PIXEL_BYTES
 
-TARGET_BYTES = 20.3  # a pixel: what the losses keep of a training frame
-BETWEEN_BYTES = 2 * 11  # a pixel: the two moments between neighbouring training frames, where they are targets too
+TARGET_BYTES = 7.3  # a pixel: what the losses keep of a training frame
+BETWEEN_BYTES = 2 * 14.3  # a pixel: the two moments between neighbouring training frames, where they are targets too
 WORKING = 1.2e9  # bytes of a training beside the frames, for 640x512 pixels
 PIXELS = 640 * 512
 SECONDS = 0.1  # an iteration of 640x512 pixels on two cores
