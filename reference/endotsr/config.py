@@ -186,8 +186,10 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     """iterations between two densifications"""
     until: Count = 4000
     """densify at iterations < until"""
+    growth: Literal["threshold", "budget"] = "threshold"
+    """what is cloned or split: all above `gradient_threshold`, or the steepest, up to `maximum` at the end"""
     gradient_threshold: Positive = 2e-4
-    """mean screen gradient from which a Gaussian is cloned or split, NDC units"""
+    """mean screen gradient from which a Gaussian is cloned or split, NDC units; without effect on a budget"""
     extent: Positive | Literal["cameras"] = 10.0
     """scene extent, scene units; `cameras` = 1.1 x the largest camera distance from their mean"""
     dense_fraction: Positive = 0.01
@@ -195,7 +197,7 @@ class DensityConfig(Section, frozen=True, kw_only=True):
     prune_opacity: Fraction = 0.005
     """remove Gaussians with a lower opacity"""
     maximum: PositiveCount = 400_000
-    """no clone or split beyond this count"""
+    """no clone or split beyond this count; as a budget, the count that the last densification reaches"""
 
 
 class InitialisationConfig(Section, frozen=True, kw_only=True):

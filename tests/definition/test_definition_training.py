@@ -99,6 +99,7 @@ def test_the_schedules_of_every_preset_are_the_same(preset):
             ), (i, name)
         assert fast.keys() - written.keys() <= {"motion_coefficients"}, "(B15) trains it from the first iteration on"
         assert schedules.laplacian_ramp(i, config) == definition_schedules.laplacian_ramp(i, config)
+        assert schedules.densifications_left(i, config) == definition_schedules.densifications_left(i, config)
 
 
 def test_the_views_of_the_calibration_are_the_same():
@@ -136,26 +137,29 @@ def test_the_fast_path_starts_with_the_same_gaussians():
         np.testing.assert_allclose(getattr(made, name), array, rtol=0, atol=1e-14, err_msg=name)
 
 
-def test_the_fast_path_takes_the_same_steps(start):
+@pytest.mark.parametrize("growth, maximum", [("threshold", 300), ("budget", 220)])
+def test_the_fast_path_takes_the_same_steps(start, growth, maximum):
     """Fifty iterations with the same draws, through density control and the activation of the residuals."""
     sequence, made = start
-    config = fast_config(SHORT)
+    settings = SHORT._replace(density=SHORT.density._replace(growth=growth, maximum=maximum))
+    config = fast_config(settings)
     shop = workshop(fast_sequence(sequence), config)
     fast = Gaussians(
         **{name: np.array(array, order="C") for name, array in made._asdict().items() if array is not None}
     )
     fast_state = fresh_state(fast, None, np.random.default_rng(7), lambda_lap=config.loss.lambda_lap)
     state, rng = train.start(made), np.random.default_rng(7)
-    spectral = spectral_from(SHORT.model, sequence.times[sequence.train_index])
+    spectral = spectral_from(settings.model, sequence.times[sequence.train_index])
     counts = set()
     for iteration in range(1, STEPS + 1):
-        state, view = train.iterate(state, sequence, spectral, SHORT, rng, edges=canny_edges)
+        state, view = train.iterate(state, sequence, spectral, settings, rng, edges=canny_edges)
         entry = training_step(fast_state, shop)
         counts.add(entry["gaussians"])
         print(f"iteration {iteration:2d}  definition {view.loss:.16f}  fast path {entry['loss']:.16f}")
         assert entry["loss"] == pytest.approx(view.loss, rel=LOSS_BOUND), iteration
         assert set(view.terms) <= set(entry)
     assert len(counts) > 1, "no density control"
+    assert growth == "threshold" or max(counts) == maximum
     found, wanted = arrays(fast_state.gaussians), train.arrays(state.gaussians)
     assert found.keys() == wanted.keys() and {"appearance_coefficients", "motion_coefficients"} <= found.keys()
     off = {name: scaled(found[name], wanted[name], "max") for name in wanted}

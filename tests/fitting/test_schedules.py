@@ -128,6 +128,12 @@ def test_densify_iterations():
     assert not schedules.statistics_active(4000, PAPER)
 
 
+def test_densifications_that_are_left():
+    left = [schedules.densifications_left(i, PAPER) for i in range(1, 6001) if schedules.densify_now(i, PAPER)]
+    assert left == list(range(34, 0, -1))
+    assert schedules.densifications_left(6000, PAPER) == 1
+
+
 def test_stretched_run_keeps_its_shares():
     short = with_iterations(PAPER, 600)
     assert schedules.residuals_activate(301, short)

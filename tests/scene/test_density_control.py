@@ -74,15 +74,15 @@ class Round(NamedTuple):
     pruned: int
 
 
-def densified(gaussians, adam, statistics, config, rng, extent) -> Round:
+def densified(gaussians, adam, statistics, config, rng, extent, remaining=1) -> Round:
     """As a training does it; `adam` is left as it is."""
-    result, moved = densify(gaussians, statistics, config, rng, extent), copy.deepcopy(adam)
+    result, moved = densify(gaussians, statistics, config, rng, extent, remaining), copy.deepcopy(adam)
     regather(moved, arrays(gaussians), result.plan.source, result.plan.survivors)
     return Round(result.gaussians, moved, *result[2:])
 
 
-def run(gaussians, adam, statistics, config=CONFIG, seed=0, extent=EXTENT):
-    result = densified(gaussians, adam, statistics, config, np.random.default_rng(seed), extent)
+def run(gaussians, adam, statistics, config=CONFIG, seed=0, extent=EXTENT, remaining=1):
+    result = densified(gaussians, adam, statistics, config, np.random.default_rng(seed), extent, remaining)
     check_lengths(result.gaussians, result.adam)
     assert result.statistics.visits.shape == (result.gaussians.count,)
     assert not result.statistics.visits.any() and not result.statistics.gradient_sum.any()
@@ -190,6 +190,22 @@ def test_maximum_breaks_ties_by_index(rng):
     statistics.gradient_sum[1::2] *= 2
     result = run(gaussians, adam, statistics, msgspec.structs.replace(CONFIG, maximum=21))
     np.testing.assert_array_equal(result.gaussians.position[:, 16:], gaussians.position[:, 1:11:2])
+
+
+def test_a_budget_takes_the_steepest_in_equal_steps(rng):
+    """15 places are left for three densifications: five now, whatever the threshold says; one was pruned."""
+    gaussians, adam = make(rng, 16)
+    gaussians.opacity_logit[:] = 0.0
+    gaussians.opacity_logit[4] = -9.0
+    statistics = empty_statistics(16)
+    statistics.visits[:] = 1
+    statistics.gradient_sum[:] = 1e-9 * np.arange(16)
+    budget = msgspec.structs.replace(CONFIG, growth="budget", maximum=30)
+    result = run(gaussians, adam, statistics, budget, remaining=3)
+    assert (result.cloned, result.pruned, result.gaussians.count) == (5, 1, 20)
+    np.testing.assert_array_equal(result.gaussians.position[:, 15:], gaussians.position[:, 11:])
+    assert run(gaussians, adam, statistics, budget, remaining=1).gaussians.count == 15 + 14, "gradient 0 adds nothing"
+    assert run(gaussians, adam, statistics, msgspec.structs.replace(budget, maximum=3)).gaussians.count == 15
 
 
 def test_statistics_are_in_NDC_units_and_count_visible_views():

@@ -10,9 +10,8 @@ from endotsr.definition.train import evaluate, train
 def report(state, view):
     """One line every 20 iterations."""
     if state.iteration % 20 == 0 or state.iteration == 1:
-        terms = "  ".join(f"{name} {value:.4f}" for name, value in view.terms.items())
-        count = state.gaussians.opacity_logit.size
-        print(f"iteration {state.iteration:4d}  loss {view.loss:.4f}  Gaussians {count}  {terms}", flush=True)
+        count, terms = state.gaussians.opacity_logit.size, (f"{name} {value:.4f}" for name, value in view.terms.items())
+        print(f"iteration {state.iteration:4d}  loss {view.loss:.4f}  Gaussians {count}", *terms, sep="  ", flush=True)
 
 
 if __name__ == "__main__":

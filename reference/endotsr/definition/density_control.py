@@ -32,12 +32,13 @@ def scene_extent(config, cameras):
     return 1.1 * np.sqrt(((centres - centres.mean(axis=0)) ** 2).sum(axis=1)).max()
 
 
-def densify(gaussians, statistics, config, rng, extent):
-    """Equation (B11): prune, clone and split; one draw (2, 3, splits) of normal numbers."""
+def densify(gaussians, statistics, config, rng, extent, remaining=1):
+    """Equation (B11): prune, clone and split, `remaining` times; one draw (2, 3, splits) of normal numbers."""
     alive = opacity_of(gaussians.opacity_logit) >= config.prune_opacity
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
-    candidates = np.flatnonzero(alive & (steepness >= config.gradient_threshold))
-    room = max(0, config.maximum - alive.sum())
+    least, calls = (config.gradient_threshold, 1) if config.growth == "threshold" else (0, remaining)
+    candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
+    room = -(-max(0, config.maximum - alive.sum()) // calls)
     candidates = np.sort(candidates[np.argsort(-steepness[candidates], kind="stable")[:room]])
     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
     clone, split = candidates[~large], candidates[large]

@@ -24,8 +24,7 @@ def learning_rates(iteration, config):
         "opacity_logit": o.opacity * constant,
         "harmonics": ((slice(0, 1), o.harmonics_base * constant), (slice(1, None), o.harmonics_rest * constant)),
         "fdm_weight": ((slice(0, 3), fdm * o.deformation_position_factor), (slice(3, 10), fdm)),
-        "fdm_centre": fdm,
-        "fdm_width": fdm,
+        **dict.fromkeys(("fdm_centre", "fdm_width"), fdm),
     }
     if residuals_active(iteration, config):
         start = activated if o.restart_residual_schedule else 0
@@ -38,9 +37,7 @@ def learning_rates(iteration, config):
 def laplacian_ramp(iteration, config):
     """Equation (6): fraction of lambda_lap in force."""
     first, full = config.loss.laplacian_from, config.loss.laplacian_full
-    if iteration <= first or not config.model.laplacian:
-        return 0.0
-    return min(1.0, (iteration - first) / max(full - first, 1))
+    return min(1.0, max(0, iteration - first) / max(full - first, 1)) if config.model.laplacian else 0.0
 
 
 def smoothness_active(iteration, config):
@@ -56,6 +53,12 @@ def active_degree(iteration, config):
 def statistics_active(iteration, config):
     """Equation (B11): whether screen gradients are gathered."""
     return iteration < config.density.until
+
+
+def densifications_left(iteration, config):
+    """Equation (B11): runs of density control from this iteration on, at least 1."""
+    d = config.density
+    return max(1, (d.until - 1) // d.interval - (iteration - 1) // d.interval)
 
 
 def densify_now(iteration, config):

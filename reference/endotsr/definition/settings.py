@@ -13,8 +13,6 @@ EXACT = RasterSettings(0.0, 0.0, 1.0, "everywhere", 0.0, 0.3, 0.2, LegacyDeviati
 LEGACY = PAPER._replace(support="three_sigma_tiles", deviations=LegacyDeviations(*[True] * 4))
 
 Config = namedtuple("Config", "model loss optimiser density initialisation training")
-
-
 section = lambda **values: namedtuple("Section", values)(**values)  # settings by name
 
 PAPER_CONFIG = Config(
@@ -35,8 +33,8 @@ PAPER_CONFIG = Config(
         restart_residual_schedule=True, beta1=0.9, beta2=0.999, epsilon=1e-15, legacy_skip=False,
     ),
     density=section(
-        start=500, interval=100, until=4000, gradient_threshold=2e-4, extent=10.0, dense_fraction=0.01,
-        prune_opacity=0.005, maximum=400_000,
+        start=500, interval=100, until=4000, growth="threshold", gradient_threshold=2e-4, extent=10.0,
+        dense_fraction=0.01, prune_opacity=0.005, maximum=400_000,
     ),
     initialisation=section(first_frame_points=35_000, other_frame_points=5_000, motion_threshold=40.0),
     training=section(iterations=6000, residual_activation=3000, harmonics_interval=500),

@@ -23,6 +23,5 @@ def simulate(width=32, height=24, frames=16, seed=0):
         masks.append((x - 0.7 - 0.1 * t) ** 2 + (y - 0.7) ** 2 > 0.05)
     masks, index = np.array(masks), np.arange(frames)
     camera = Camera(np.eye(3), np.zeros(3), 1.0 * width, 1.0 * width, width / 2, height / 2, width, height)
-    test = index % 8 == 1
-    depth = np.where(masks, depth, 0).astype(np.float32)
+    test, depth = index % 8 == 1, np.where(masks, depth, 0).astype(np.float32)
     return Sequence(np.array(images), masks, depth, index / frames, [camera] * frames, index[~test], index[test])

@@ -57,8 +57,7 @@ def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges
     )  # fmt: skip
     statistics, adam, gaussians = state.statistics, state.adam, state.gaussians
     if schedules.statistics_active(i, config):
-        size = frame.camera.width, frame.camera.height
-        statistics = gather_statistics(statistics, view.d_mean2d, view.visible, *size)
+        statistics = gather_statistics(statistics, view.d_mean2d, view.visible, frame.camera.width, frame.camera.height)
     if not (schedules.densify_now(i, config) and o.legacy_skip):
         rates, numbers = schedules.learning_rates(i, config), (o.beta1, o.beta2, o.epsilon)
         adam, parameters = adam_update(adam, arrays(gaussians), view.gradients, rates, *numbers)
@@ -70,7 +69,8 @@ def iterate(state, sequence, spectral, config, rng, raster=PAPER, edges=no_edges
 def controlled(state, sequence, config, rng):
     """The state after density control: new Gaussians have moments 0, all statistics are 0."""
     cameras = [sequence.cameras[k] for k in sequence.train_index]
-    made = densify(state.gaussians, state.statistics, config.density, rng, scene_extent(config.density, cameras))
+    extent, left = scene_extent(config.density, cameras), schedules.densifications_left(state.iteration, config)
+    made = densify(state.gaussians, state.statistics, config.density, rng, extent, left)
     new = np.arange(made.plan.source.size) >= made.plan.survivors
     adam = {
         name: (*(np.where(new, 0, moment[..., made.plan.source]) for moment in (m, v)), k)

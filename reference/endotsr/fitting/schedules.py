@@ -117,6 +117,13 @@ def statistics_active(iteration: int, config: Config) -> bool:
     return iteration < config.density.until
 
 
+def densifications_left(iteration: int, config: Config) -> int:
+    """Densifications from this iteration to the last one, both included; at least 1."""
+    density = config.density
+    last = (density.until - 1) // density.interval
+    return max(1, last - (iteration - 1) // density.interval)
+
+
 def densify_now(iteration: int, config: Config) -> bool:
     """Whether Gaussians are cloned, split and pruned at this iteration: start < iteration < until, every `interval`."""
     density = config.density

@@ -32,6 +32,7 @@ from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate
 from endotsr.fitting.sampling import View, drawn_view
 from endotsr.fitting.schedules import (
     active_degree,
+    densifications_left,
     densify_now,
     laplacian_ramp,
     learning_rates,
@@ -135,7 +136,7 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
         _optimise_frames(state, shop, view, d_exposure, d_pose, iteration)
     if dense:
         with timer.stage("density control"):
-            _control_density(state, shop)
+            _control_density(state, shop, iteration)
     state.iteration = iteration
     return entry
 
@@ -206,9 +207,10 @@ def _optimise_frames(
     adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
 
 
-def _control_density(state: TrainingState, shop: Workshop) -> None:
+def _control_density(state: TrainingState, shop: Workshop, iteration: int) -> None:
     """Clone, split and prune. Moments are gathered too; those of clones and children, and all statistics, are zero."""
-    result = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
+    left = densifications_left(iteration, shop.config)
+    result = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent, left)
     regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
     state.gaussians, state.statistics = result.gaussians, result.statistics
 

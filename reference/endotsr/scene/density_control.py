@@ -7,8 +7,9 @@ optimiser, renderer and iteration number.
 Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
 gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
 `dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
-removed. Scales are canonical, not deformed. Children inherit every other array. Optimiser moments start at zero for
-clones and children (`GatherPlan`).
+removed. With `growth = "budget"` the Gaussians with the largest gradients are taken in place of those above the
+threshold: as many as lead to `maximum` in equal steps over the densifications that remain. Scales are canonical, not
+deformed. Children inherit every other array. Optimiser moments start at zero for clones and children (`GatherPlan`).
 Clones are not split in the same call.
 """
 
@@ -97,18 +98,20 @@ def densify(
     config: DensityConfig,
     rng: np.random.Generator,
     extent: float,
+    remaining: int = 1,
 ) -> Densified:
     """Clone, split and prune in one gather; the inputs are not changed.
 
     extent   scene units, see `scene_extent`
+    remaining  densifications from this one to the last, by which a budget is divided
     returns  survivors in their old order, then clones, then first children, then second children, the last three
              in the order of their parents; the plan of this order; statistics of zeros
 
-    Edges: never visited -> gradient 0; N = 0 and pruning down to 0 are allowed; when `maximum` leaves no room for
-    all, the candidates with the largest gradients are taken first (ties by index).
+    Edges: never visited -> gradient 0, and a budget passes it over; N = 0 and pruning down to 0 are allowed; when
+           `maximum` leaves no room for all, the candidates with the largest gradients are taken first (ties by index).
     Draws: one `rng.standard_normal((2, 3, S))` for S split parents, none if S = 0.
     """
-    alive, clone, split = _choose(gaussians, statistics, config, extent)
+    alive, clone, split = _choose(gaussians, statistics, config, extent, remaining)
     keep = alive.copy()
     keep[split] = False
     survivors = np.flatnonzero(keep)
@@ -123,15 +126,18 @@ def densify(
 
 
 def _choose(
-    gaussians: Gaussians, statistics: DensityStatistics, config: DensityConfig, extent: float
+    gaussians: Gaussians, statistics: DensityStatistics, config: DensityConfig, extent: float, remaining: int
 ) -> tuple[NDArray[np.bool_], IndexArray, IndexArray]:
     """Which Gaussians stay (N,) bool, and the indices of those to clone and to split, ascending."""
     if statistics.visits.size != gaussians.count:
         raise ValueError(f"statistics of {statistics.visits.size} for {gaussians.count} Gaussians")
     alive = ~_fainter_than(gaussians.opacity_logit, config.prune_opacity)
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
-    candidates = np.flatnonzero(alive & (steepness >= config.gradient_threshold))
     room = max(0, config.maximum - int(alive.sum()))  # a clone and a split both add one
+    if config.growth == "budget":
+        candidates, room = np.flatnonzero(alive & (steepness > 0)), -(-room // remaining)
+    else:
+        candidates = np.flatnonzero(alive & (steepness >= config.gradient_threshold))
     if candidates.size > room:
         steepest = np.argsort(-steepness[candidates], kind="stable")[:room]
         candidates = np.sort(candidates[steepest])
