@@ -3,10 +3,10 @@
     python tests/golden/injected/inject.py [PORT ...] [--json docs/results/injected.json]
 
 PORT is c99, reference or torch; all of them by default. The port in PyTorch is run by the interpreter that
-ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. Every mistake is made
-alone. It is named rightly if the first mistake that the report names is this one. The right ports are judged as well:
-they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16 are named. The result is a table of
-docs/guides/port.md, which docs/pages/injected.py writes.
+ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. The mistakes are those
+of `mistakes.toml`, and each is made alone. It is named rightly if the first mistake that the report names is this one.
+The right ports are judged as well: they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16
+are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -31,16 +32,28 @@ from endotsr.golden.reference import stored
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import dated
 
-sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[3] / "golden"))
-import autodiff
-import c99
-import in_reference
-
-from makers.copies import changed_copy
+from makers.copies import Edit, changed_copy
 from makers.registry import all_wrong_ports
 
-SOURCES = golden_folder() / "ports" / "c99"
+PORTED = golden_folder() / "ports"
+
+
+class Mistake(NamedTuple):
+    """A mistake that is put into a port."""
+
+    flag: str  # the name that the judge has to give
+    edits: tuple[Edit, ...]  # of files of the port; of the reference, of its modules
+    operations: tuple[str, ...]  # on which a mistake in the reference is examined
+
+
+def mistakes(port: str) -> list[Mistake]:
+    """The mistakes that `mistakes.toml` lists for a port."""
+    table = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))[port]
+    return [
+        Mistake(flag, tuple(Edit(*change) for change in entry["changes"]), tuple(entry.get("operations", "").split()))
+        for flag, entry in table.items()
+    ]
 
 
 class Outcome(NamedTuple):
@@ -76,21 +89,21 @@ class CPort:
     def __init__(self, folder: Path, golden: Golden) -> None:
         self.folder, self.golden, self.requests = folder, golden, folder / "requests"
         write_requests(golden, self.requests, "float64", 2)
-        self.objects = {file.name: self._compiled(file, file.stem) for file in sorted(SOURCES.glob("*.c"))}
+        self.objects = {file.name: self._compiled(file, file.stem) for file in sorted((PORTED / "c99").glob("*.c"))}
 
     def _compiled(self, file: Path, name: str) -> str:
         target = str(self.folder / f"{name}.o")
-        words = ["cc", "-std=c99", "-O0", "-DREAL=double", "-I", str(SOURCES), "-c", str(file), "-o", target]
+        words = ["cc", "-std=c99", "-O0", "-DREAL=double", "-I", str(PORTED / "c99"), "-c", str(file), "-o", target]
         subprocess.run(words, check=True)
         return target
 
-    def report(self, mistake: c99.Injected | None) -> Report:
+    def report(self, mistake: Mistake | None) -> Report:
         """The judge's report on the port with a mistake, or on the right one."""
         objects = dict(self.objects)
         if mistake:
             file = self.folder / "wrong.c"
-            file.write_text(changed((SOURCES / mistake.file).read_text(), mistake))
-            objects[mistake.file] = self._compiled(file, "wrong")
+            file.write_text(changed("c99", mistake))
+            objects[mistake.edits[0].module] = self._compiled(file, "wrong")
         subprocess.run(["cc", *objects.values(), "-lm", "-o", str(self.folder / "port")], check=True)
         outputs = self.folder / "outputs"
         shutil.rmtree(outputs, ignore_errors=True)
@@ -98,27 +111,28 @@ class CPort:
         return judge(self.golden, outputs, "float64", level=2)
 
 
-def changed(text: str, mistake: c99.Injected) -> str:
-    """The text with the mistake. Raises ValueError where an old text does not occur exactly once."""
-    for old, new in mistake.changes:
-        if text.count(old) != 1:
-            raise ValueError(f"{mistake.flag}: {old!r} occurs {text.count(old)} times in {mistake.file}")
-        text = text.replace(old, new)
+def changed(port: str, mistake: Mistake) -> str:
+    """The file with the mistake. Raises ValueError where an old text does not occur exactly once."""
+    text = (PORTED / port / mistake.edits[0].module).read_text(encoding="utf-8")
+    for edit in mistake.edits:
+        if text.count(edit.old) != 1 or edit.module != mistake.edits[0].module:
+            raise ValueError(f"{mistake.flag}: {edit.old!r} occurs {text.count(edit.old)} times in {edit.module}")
+        text = text.replace(edit.old, edit.new)
     return text
 
 
 def in_c(golden: Golden) -> Iterator[Outcome]:
-    """The mistakes of `c99`, one by one, and first the right port."""
+    """The mistakes in the port in C99, one by one, and first the right port."""
     with tempfile.TemporaryDirectory() as scratch:
         port = CPort(Path(scratch), golden)
         yield said("c99", "", port.report(None))
-        for mistake in c99.MISTAKES:
+        for mistake in mistakes("c99"):
             yield said("c99", mistake.flag, port.report(mistake))
 
 
 def in_copies(golden: Golden) -> Iterator[Outcome]:
-    """The mistakes of `in_reference`: a case that the mistake is not examined on is taken as passed."""
-    for mistake in in_reference.MISTAKES:
+    """The mistakes in the reference: a case that the mistake is not examined on is taken as passed."""
+    for mistake in mistakes("reference"):
         with tempfile.TemporaryDirectory() as scratch:
             folder, verdicts = Path(scratch), []
             with changed_copy(mistake.edits) as operation, np.errstate(all="ignore"):
@@ -134,22 +148,23 @@ def in_copies(golden: Golden) -> Iterator[Outcome]:
 
 
 def in_torch(golden: Golden) -> Iterator[Outcome]:
-    """The mistakes of `autodiff`, on the operations on which they are known; first the right port on all of its own."""
+    """The mistakes in the port in PyTorch, on the operations on which they are known; first the right one on all."""
     python = os.environ.get("ENDOTSR_TORCH_PYTHON", sys.executable)
     if subprocess.run([python, "-c", "import torch"], capture_output=True, check=False).returncode:
         print("torch: no PyTorch here, this port is left out")
         return
-    known = all_wrong_ports()
+    known, wrong = all_wrong_ports(), mistakes("torch")
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_requests(golden, folder / "requests", "float64", 3)
-        jobs = [{"changes": [], "operations": [case.operation for case in golden.cases]}]
-        jobs += [{"changes": c, "operations": _first_two(known[flag].operations)} for flag, c in autodiff.MISTAKES]
+        right = (PORTED / "torch" / "port.py").read_text(encoding="utf-8")
+        jobs = [{"source": right, "operations": [case.operation for case in golden.cases]}]
+        jobs += [{"source": changed("torch", m), "operations": _first_two(known[m.flag].operations)} for m in wrong]
         (folder / "jobs.json").write_text(json.dumps(jobs))
-        driver = str(Path(__file__).with_name("autodiff_driver.py"))
+        driver = str(Path(__file__).with_name("torch_driver.py"))
         subprocess.run([python, driver, str(folder / "jobs.json"), *(str(folder / n) for n in ("requests", "outputs"))],
                        check=True)  # fmt: skip
-        for k, flag in enumerate(["", *(flag for flag, _ in autodiff.MISTAKES)]):
+        for k, flag in enumerate(["", *(m.flag for m in wrong)]):
             answered = folder / "outputs" / str(k)
             cases = [case for case in golden.cases if (answered / case.name).is_dir()]
             verdicts = [judge_case(golden, case, answered, "float64") for case in cases]
@@ -179,15 +194,15 @@ def main(words: list[str]) -> int:
             elif not outcome.right:
                 named = ", ".join(outcome.named[:3]) or f"none; {outcome.likeliest} comes first"
                 print(f"{name}: {outcome.flag}: {outcome.refused} outputs refused, named: {named}", flush=True)
-    mistakes = [outcome for outcome in outcomes if outcome.flag]
-    right = sum(outcome.right for outcome in mistakes)
-    print(f"{right} of {len(mistakes)} single mistakes named rightly")
+    wrong = [outcome for outcome in outcomes if outcome.flag]
+    right = sum(outcome.right for outcome in wrong)
+    print(f"{right} of {len(wrong)} single mistakes named rightly")
     if options.json:
         rows = [outcome._asdict() for outcome in outcomes]
         version, seconds = golden.manifest.version, time.monotonic() - began
         write_json(options.json, dated({"golden": version, "seconds": seconds, "outcomes": rows}))
     clean = all(not outcome.refused and not outcome.named for outcome in outcomes if not outcome.flag)
-    return 0 if clean and 16 * right >= 15 * len(mistakes) else 1
+    return 0 if clean and 16 * right >= 15 * len(wrong) else 1
 
 
 if __name__ == "__main__":

@@ -15,32 +15,28 @@ from makers.copies import changed_text
 from makers.registry import FAMILIES, all_wrong_ports, families
 
 sys.path.insert(0, str(Path(__file__).parent))
-import autodiff
-import c99
-import in_reference
 import inject
 
 KNOWN = all_wrong_ports()
+MISTAKES = {port: inject.mistakes(port) for port in inject.PORTS}
 
 
 def test_every_mistake_fits_its_source():
-    for mistake in c99.MISTAKES:
-        assert inject.changed((inject.SOURCES / mistake.file).read_text(), mistake)
-    for mistake in in_reference.MISTAKES:
+    for port in ("c99", "torch"):
+        for mistake in MISTAKES[port]:
+            assert inject.changed(port, mistake)
+    for mistake in MISTAKES["reference"]:
         for module in {one.module for one in mistake.edits}:
             assert changed_text(module, [one for one in mistake.edits if one.module == module])
         assert mistake.edits != KNOWN[mistake.flag].edits, f"{mistake.flag} is the wrong port itself"
-    text = autodiff.SOURCE.read_text()
-    for flag, changes in autodiff.MISTAKES:
-        assert [old for old, _ in changes if text.count(old) != 1] == [], flag
 
 
 def test_the_mistakes_are_many_known_and_of_every_family():
-    flags = [m.flag for m in c99.MISTAKES] + [m.flag for m in in_reference.MISTAKES] + [f for f, _ in autodiff.MISTAKES]
+    flags = [m.flag for of in MISTAKES.values() for m in of]
     assert len(flags) >= 80 and set(flags) <= set(KNOWN)
     touched = {name for name, family in zip(FAMILIES, families()) for w in family.WRONG_PORTS if w.flag in flags}
     assert touched == set(FAMILIES)
-    assert sum("training" in m.operations for m in in_reference.MISTAKES) >= 10
+    assert sum("training" in m.operations for m in MISTAKES["reference"]) >= 10
 
 
 @pytest.mark.slow
@@ -49,6 +45,6 @@ def test_the_mistakes_are_many_known_and_of_every_family():
 def test_a_mistake_in_the_c_port_is_named_and_the_right_port_is_not(flag):
     golden = read_golden(golden_folder())
     with tempfile.TemporaryDirectory() as scratch:
-        mistake = next((m for m in c99.MISTAKES if m.flag == flag), None)
+        mistake = next((m for m in MISTAKES["c99"] if m.flag == flag), None)
         outcome = inject.said("c99", flag, inject.CPort(Path(scratch), golden).report(mistake))
     assert outcome.right if flag else outcome.named == () and outcome.refused == 0
