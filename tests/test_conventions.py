@@ -1,6 +1,7 @@
 """Conventions are programs: what the package promises about its own text is checked here."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +25,27 @@ CONTRACTING = {  # the fast compositing, and the peak of the machine beside it
 PEERS = [
     ROOT / "docs" / "pages" / name for name in ("bench_gsplat.py", "bench_peers.py")
 ]  # another program beside ours
+
+# Pieces of the method that tests reach beside its public functions: compiled code that no argument selects.
+PIECES = {
+    "equations.appearance._squash_kernel",
+    "equations.laplacian._expand_support",
+    "equations.laplacian._reduce_support",
+    "kernels.vectors._register_bytes",
+    "losses.masked_ssim._column_moments",
+    "losses.masked_ssim._difference_and_sum_kernel",
+    "losses.masked_ssim._row_moments",
+    "losses.masked_ssim._similarity_kernel",
+    "losses.smoothness._total_variation",
+    "losses.smoothness._variation_reverse_kernel",
+    "scene.density_control._rotations",
+    "splatting.binning._boxes_kernel",
+    "splatting.compositing._composite_kernel",
+    "splatting.fast.blocks._blend_kernel",
+    "splatting.fast.blocks._lane_tables_kernel",
+    "splatting.fast.blocks._visit_kernel",
+    "splatting.fast.blocks._visits_kernel",
+}
 
 # Forward functions whose check runs under the name of another pair, and why.
 ALIASES: dict[str, str] = {}
@@ -51,6 +73,31 @@ def imported(file: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             found.add((node.module or "").split(".")[0] if node.level == 0 else "endotsr")
     return found
+
+
+def private_names(file: Path) -> set[str]:
+    """Private names of the package that a file imports, reads from an imported module or names in a string."""
+    known, found = {module_name(f) for f in SOURCES}, set()
+    modules: dict[str, str] = {}  # word of the file -> module
+    tree = parse(file)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("endotsr"):
+            for alias in node.names:
+                dotted = f"{node.module}.{alias.name}"
+                modules |= {alias.asname or alias.name: dotted} if dotted in known else {}
+                found |= {dotted} if alias.name[0] == "_" else set()
+    for node in ast.walk(tree):
+        reached = []
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            reached = [(node.value.id, node.attr)]
+        elif isinstance(node, ast.Call) and len(node.args) > 1:  # monkeypatch.setattr(module, "_name", ...)
+            first, second = node.args[:2]
+            if isinstance(first, ast.Name) and isinstance(second, ast.Constant):
+                reached = [(first.id, str(second.value))]
+        found |= {f"{modules[word]}.{name}" for word, name in reached if word in modules and name[0] == "_"}
+        if isinstance(node, ast.Constant) and re.fullmatch(r"endotsr(\.\w+)*\._\w+", str(node.value)):
+            found.add(str(node.value))
+    return {name.removeprefix("endotsr.") for name in found if not name.endswith("__")}
 
 
 STAGES = [(file, name) for file in SOURCES for name in public_functions(file) if name.endswith("_forward")]
@@ -102,6 +149,12 @@ def test_contraction_only_in_the_fast_compositing():
 def test_oracles_import_nothing_of_the_package(file):
     assert "endotsr" not in imported(file)
     assert "importlib" not in imported(file)
+
+
+def test_tests_use_what_is_public():
+    """Private names change freely; the pieces of the method that tests reach are listed, and none in vain."""
+    files = [f for f in (ROOT / "tests").rglob("*.py") if "mutation" not in f.parts]
+    assert set().union(*map(private_names, files)) == PIECES
 
 
 def test_text_is_written_with_its_encoding_and_line_end():

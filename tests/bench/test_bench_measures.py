@@ -232,9 +232,9 @@ def test_higher_peaks_are_kept():
 
 def test_memory_kernels_do_what_they_say():
     out, left, right = np.full(5, 2.0), np.arange(5.0), np.arange(5.0) + 1
-    peaks._triad(0, 1, out, left, right, 0.5)
+    peaks.triad(0, 1, out, left, right, 0.5)
     assert np.array_equal(out, left + 0.5 * right)
-    peaks._update(0, 1, out, left, right, 2.0)
+    peaks.update(0, 1, out, left, right, 2.0)
     assert np.array_equal(out, right + 2.0 * (left + 0.5 * right))
 
 

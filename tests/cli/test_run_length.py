@@ -13,7 +13,7 @@ from endotsr.cli.ablate import AblateOptions, spec_data
 from endotsr.cli.main import main
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
-from endotsr.cli.train import TrainOptions, _of_length
+from endotsr.cli.train import TrainOptions, of_length
 from endotsr.config import SHARP, Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.runs.folder import open_run
 from endotsr.sweeps.jobs import jobs_of
@@ -28,7 +28,7 @@ def trained(words: list[str], frames: int) -> Config:
     """The settings that `endotsr train` trains with."""
     line = ["sequence", "--out", "run", *words]
     options = parse(TrainOptions, line, "train", TrainOptions(settings=base_settings(line)[0]))
-    return _of_length(options.settings, frames, "")[0]
+    return of_length(options.settings, frames, "")[0]
 
 
 def swept(text: str, folder, frames: int) -> set[int]:

@@ -48,7 +48,13 @@ def test_a_correction_keeps_a_rotation_a_rotation():
 
 
 def test_series_and_closed_forms_agree_where_they_meet(monkeypatch):
-    near = [pose._factors(square) for square in (0.25, 0.6, 0.999)]
+    def found(angle):
+        *moved, saved = pose_forward(*made_up(angle))
+        return (*moved, *pose_reverse(np.ones((3, 3)), np.ones(3), saved))
+
+    angles = (0.5, 0.8, 0.9995)
+    near = [found(angle) for angle in angles]
     monkeypatch.setattr(pose, "SMALL", 0.0)
-    for series, square in zip(near, (0.25, 0.6, 0.999), strict=True):
-        np.testing.assert_allclose(series, pose._factors(square), rtol=1e-13)
+    for series, angle in zip(near, angles, strict=True):
+        for one, other in zip(series, found(angle), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-14)

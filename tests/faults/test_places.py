@@ -5,7 +5,6 @@ import sys
 import pytest
 from tiny import SETTINGS, assert_refused, run_line, train_words
 
-from endotsr.cli import main as command_line
 from endotsr.runs import folder as runs
 from endotsr.runs import sources
 from endotsr.runs.files import replace_file
@@ -50,7 +49,7 @@ def test_the_advice_on_memory_is_one_that_the_command_can_follow(command, says, 
     def full(words):
         raise MemoryError
 
-    monkeypatch.setattr(command_line, "_command", lambda name: full)
+    monkeypatch.setattr(f"endotsr.cli.{command}.run", full)
     code, said = run_line(capsys, command)
     assert code == 2 and "not enough memory" in said and says in said
     assert ("--scale" in said) == (command == "train")

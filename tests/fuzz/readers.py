@@ -227,7 +227,7 @@ def record_seeds() -> list[bytes]:
 def read_record(path: Path) -> object:
     """As `endotsr evaluate` does."""
     from endotsr.config import DEMO
-    from endotsr.evaluation.run import _about_run
+    from endotsr.evaluation.run import about_run
     from endotsr.report.run_text import facts
     from endotsr.runs.folder import RunFolder
     from endotsr.runs.model import Model, sequence_fingerprint
@@ -238,7 +238,7 @@ def read_record(path: Path) -> object:
     record = folder.record(*REPORTED)
     run_source(folder)
     scene = type("Scene", (), {"count": 3})()
-    return facts({"run": _about_run(record, Model(scene, None, DEMO, 5))}), sequence_fingerprint(record)
+    return facts({"run": about_run(record, Model(scene, None, DEMO, 5))}), sequence_fingerprint(record)
 
 
 @cache

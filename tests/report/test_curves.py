@@ -77,6 +77,6 @@ def test_frame_chart_leaves_out_null_values():
 
 
 def test_similarity_is_drawn_as_what_is_minimised():
-    assert curves._term({"ssim": 0.75}, "ssim") == 0.25
-    assert curves._term({"l1": 0.75}, "l1") == 0.75
-    assert curves._term({"l1": None}, "l1") is None
+    assert curves.minimised({"ssim": 0.75}, "ssim") == 0.25
+    assert curves.minimised({"l1": 0.75}, "l1") == 0.75
+    assert curves.minimised({"l1": None}, "l1") is None

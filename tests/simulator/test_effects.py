@@ -10,13 +10,13 @@ from endotsr.simulator.bleeding import blood_cover
 from endotsr.simulator.blur import moments, open_span
 from endotsr.simulator.cameras import make_cameras
 from endotsr.simulator.coarse import see_coarsely, views_during
-from endotsr.simulator.frames import Eye, _tissue_light, make_scene, simulated_frames
+from endotsr.simulator.frames import Eye, make_scene, simulated_frames, tissue_light
 from endotsr.simulator.gain import auto_exposure_gain, gain_series, gain_spectrum
 from endotsr.simulator.instrument import draw
 from endotsr.simulator.lamps import Blocker, shadow
 from endotsr.simulator.shading import lit_by_all, shade
 from endotsr.simulator.slit import half_width, parting, side_of, slit_coordinates
-from endotsr.simulator.smoke import GREY, smoke_fraction, with_smoke
+from endotsr.simulator.smoke import GREY, clouds, smoke_fraction, with_smoke
 from endotsr.simulator.surface import make_surface, surface_point
 from endotsr.simulator.texture import sample
 from endotsr.simulator.views import see, to_camera
@@ -199,12 +199,10 @@ def test_smoke_replaces_light_by_grey_within_its_time():
 
 
 def test_smoke_drifts_to_the_right_and_does_not_depend_on_the_image_size():
-    from endotsr.simulator.smoke import _clouds
-
     settings = with_effects(SimulatorSettings(width=100, height=80), "smoke")
-    first, later = _clouds(settings, 0.2, 0), _clouds(settings, 0.4, 0)  # drift 0.5: ten pixels in between
+    first, later = clouds(settings, 0.2, 0), clouds(settings, 0.4, 0)  # drift 0.5: ten pixels in between
     np.testing.assert_allclose(later[:, 10:], first[:, :-10], atol=1e-12)
-    large = _clouds(msgspec.structs.replace(settings, width=300, height=240), 0.2, 0)
+    large = clouds(msgspec.structs.replace(settings, width=300, height=240), 0.2, 0)
     np.testing.assert_allclose(large[1::3, 1::3], first, atol=1e-12)
     for drift in (-0.5, 0.0, 2.0):
         assert np.isfinite(smoke_fraction(changed(settings, "smoke", drift=drift), 0.5)).all()
@@ -298,7 +296,7 @@ def test_blur_is_the_mean_over_sharp_moments(effects, bound, right):
 
     cameras = [make_cameras(settings, [t], which)[0] for which in (right, False)]
     eye = Eye(see(scene.surface, cameras[0], t), cameras[0], right)
-    found = _tissue_light(scene, eye, cameras[1], None, t).light
+    found = tissue_light(scene, eye, cameras[1], None, t).light
     expected = np.mean([light(t + moment) for moment in moments(settings)], axis=0)
     assert np.abs(moments(settings)).max() == pytest.approx(0.95 * 0.5 * open_span(settings))
     effect = np.sqrt(np.mean((light(t) - expected) ** 2))

@@ -5,7 +5,7 @@ import json
 import pytest
 from tiny_sweep import rows_of
 
-from endotsr.cli.ablate import _without_folders
+from endotsr.cli.ablate import without_folders
 from endotsr.cli.main import main
 
 pytestmark = pytest.mark.slow
@@ -55,7 +55,7 @@ def test_results_do_not_tell_where_files_lie(done, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "clip").mkdir()
     words = ["../x/none", "clip", "--out=/a/b/c", "--out", "/a/b", "blocks 4", "A+S"]
-    assert [_without_folders(word) for word in words] == [
+    assert [without_folders(word) for word in words] == [
         "../x/none",
         "clip",
         "--out=c",

@@ -11,7 +11,6 @@ from tiny_sweep import BASE, CONFIGURATIONS, iterations, rows_of, write_spec
 from endotsr.cli.main import main
 from endotsr.errors import InputError
 from endotsr.runs.folder import open_run
-from endotsr.sweeps import execute as module
 from endotsr.sweeps.execute import FAILED, FINISHED, INTERRUPTED, Outcome, execute
 from endotsr.sweeps.jobs import jobs_of
 from endotsr.sweeps.locks import file_lock, run_lock
@@ -168,11 +167,15 @@ def test_a_failed_run_is_named_kept_out_and_retried_on_request(tmp_path):
     assert made == ["base", "A", "base", "base", "A"]
 
 
-def test_a_full_disk_ends_the_sweep_in_one_line(tmp_path, monkeypatch):
-    def full(job, sequence, threads, observer):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), job.folder)
+def first_job(folder):
+    return jobs_of(read_spec(write_spec(folder)), folder, lambda job: 8)[0]
 
-    monkeypatch.setattr(module, "_trained", full)
+
+def test_a_full_disk_ends_the_sweep_in_one_line(tmp_path, monkeypatch):
+    def full(folder, *others):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
+
+    monkeypatch.setattr("endotsr.runs.training.train_new_run", full)
     made = []
 
     def make(job):
@@ -185,19 +188,15 @@ def test_a_full_disk_ends_the_sweep_in_one_line(tmp_path, monkeypatch):
     assert str(refused.value).endswith("the disk is full; 0 of 4 runs are finished; the same command continues")
 
 
-def test_a_full_disk_behind_the_error_of_a_training_is_seen():
-    from endotsr.sweeps.execute import _full_disk
-
-    def stopped():
+def test_a_full_disk_behind_the_error_of_a_training_is_seen(tmp_path, monkeypatch):
+    def stopped(*arguments):
         try:
-            try:
-                raise OSError(errno.ENOSPC, "full")
-            except OSError:
-                raise InputError("run stopped") from None
-        except InputError as error:
-            return error
+            raise OSError(errno.ENOSPC, "full")
+        except OSError:
+            raise InputError("run stopped") from None
 
-    assert _full_disk(stopped()) and not _full_disk(InputError("other"))
+    monkeypatch.setattr("endotsr.runs.training.train_new_run", stopped)
+    assert execute(first_job(tmp_path), 1).ends_sweep
 
 
 @pytest.mark.parametrize(
@@ -209,9 +208,8 @@ def test_errors_are_outcomes_of_one_line(tmp_path, monkeypatch, error, said):
     def fails(*arguments):
         raise error
 
-    monkeypatch.setattr(module, "_trained", fails)
-    job = jobs_of(read_spec(write_spec(tmp_path)), tmp_path, lambda job: 8)[0]
-    outcome = execute(job, 1)
+    monkeypatch.setattr("endotsr.runs.training.train_new_run", fails)
+    outcome = execute(first_job(tmp_path), 1)
     assert outcome.status == FAILED and said in outcome.reason and "\n" not in outcome.reason
     assert not outcome.ends_sweep
 

@@ -16,7 +16,7 @@ from endotsr.splatting.fast import blocks as compositing_blocks
 from endotsr.splatting.projection import footprint
 from endotsr.splatting.render import render_forward
 from endotsr.splatting.settings import PRESETS
-from endotsr.tradeoff.measure import _upsampling, errors, forward, frame, prepare, reverse, terms
+from endotsr.tradeoff.measure import errors, forward, frame, prepare, reverse, terms, upsampling
 from endotsr.tradeoff.settings import ACCURATE, CLOSE
 from endotsr.tradeoff.study import cost_of, described
 
@@ -149,7 +149,7 @@ def test_the_strongest_bases_and_the_lowest_frequencies_are_kept():
 
 def test_upsampling_is_linear_interpolation_between_pixel_centres():
     for small, large in ((4, 8), (3, 7), (1, 5), (5, 5)):
-        matrix = _upsampling(small, large)
+        matrix = upsampling(small, large)
         np.testing.assert_allclose(matrix.sum(axis=1), 1)
         centres = (np.arange(small) + 0.5) / small
         wanted = np.clip((np.arange(large) + 0.5) / large, centres[0], centres[-1])

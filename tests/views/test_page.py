@@ -21,7 +21,7 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.views.page import check_page, page, write_page
-from endotsr.views.trajectories import _signed, key_times, packed, trajectories
+from endotsr.views.trajectories import key_times, packed, rotation_levels, trajectories
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 from made_up_model import CAMERA, moving_scene
@@ -59,7 +59,7 @@ def test_no_sign_of_a_quaternion_jumps_between_keys():
     signed = steady.bytes[:4].astype(np.int8).astype(int)
     assert ((signed[:, 1:] * signed[:, :-1]).sum(axis=0) >= 0).all()
     rows = np.random.default_rng(0).normal(size=(4, 1, 9)).repeat(3, axis=1)
-    levels = _signed(rows * np.array([1, -1, 1])[:, None])
+    levels = rotation_levels(rows * np.array([1, -1, 1])[:, None])
     assert np.array_equal(levels[:, 1], levels[:, 0]) and np.array_equal(levels[:, 2], levels[:, 0])
 
 

@@ -45,7 +45,7 @@ def _multiply_add(first, stop, values, f):
             row[i] = ((s + t) + (u + v)) + ((w + x) + (y + z))
 
 
-def _triad(first, stop, out, left, right, factor):
+def triad(first, stop, out, left, right, factor):
     """out = left + factor right."""
     begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, x, y = out[begin:end], left[begin:end], right[begin:end]
@@ -53,7 +53,7 @@ def _triad(first, stop, out, left, right, factor):
         o[i] = x[i] + factor * y[i]
 
 
-def _update(first, stop, out, left, right, factor):
+def update(first, stop, out, left, right, factor):
     """out <- right + factor out, in place, like the step of an optimiser; `left` is not read."""
     begin, end = first * MEMORY_NUMBERS_PER_TASK, min(out.size, stop * MEMORY_NUMBERS_PER_TASK)
     o, y = out[begin:end], right[begin:end]
@@ -62,8 +62,8 @@ def _update(first, stop, out, left, right, factor):
 
 
 _multiply_add_kernel = jit(_multiply_add, contract=True)
-_triad_kernel = jit(_triad, contract=True)
-_update_kernel = jit(_update, contract=True)
+_triad_kernel = jit(triad, contract=True)
+_update_kernel = jit(update, contract=True)
 
 
 def fma_peak(precision: str, repeats: int = 7) -> float:

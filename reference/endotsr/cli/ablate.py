@@ -72,7 +72,7 @@ def run(words: list[str]) -> int:
     if options.out is None:
         raise InputError("ablate: --out DIR is missing: the folder of the sweep")
     spec, record = spec_of(spec_data(options), "ablate", Path.cwd()), {}
-    command = ["endotsr", "ablate", *map(_without_folders, words)]
+    command = ["endotsr", "ablate", *map(without_folders, words)]
 
     def on_rows(rows: list[dict[str, Any]]) -> None:
         nonlocal record
@@ -95,7 +95,7 @@ def run(words: list[str]) -> int:
     return ended(rows, options.out)
 
 
-def _without_folders(word: str) -> str:
+def without_folders(word: str) -> str:
     """A word of the command as results store it: a path shrinks to its last name, as results are passed on."""
     head, equals, value = word.rpartition("=")
     path = Path(value)

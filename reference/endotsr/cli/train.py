@@ -142,7 +142,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     sequence = load_sequence(source, config, SimulatorSettings())
     if options.evaluate and source != SIMULATED:
         recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
-    config, schedule_note = _of_length(config, len(sequence.train_index), schedule_note)
+    config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     threads = use_threads(config.training.threads)
     found: dict[str, Any] = {}
     lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
@@ -185,7 +185,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     return folder, sequence
 
 
-def _of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
+def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
     """The settings with the length of a run on so many training frames, and the line on its schedule."""
     found, (before, visits) = lengthened(config, frames), (config.training.iterations, config.training.visits_per_frame)
     if found.training.iterations > before:

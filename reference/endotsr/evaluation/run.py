@@ -81,7 +81,7 @@ def measure_run(
     """
     metrics, held_out = measure_model(model, sequence, weights, true_positions)
     metrics["published"] = list(published)
-    metrics["run"] = _about_run(record, model)
+    metrics["run"] = about_run(record, model)
     return metrics, held_out
 
 
@@ -171,7 +171,7 @@ def _components(model: Model, sequence: Sequence, render: Render, full: dict[str
     return rows
 
 
-def _about_run(record: dict[str, Any], model: Model) -> dict[str, Any]:
+def about_run(record: dict[str, Any], model: Model) -> dict[str, Any]:
     """What the numbers belong to: enough for metrics.json to stand alone."""
     about = {
         "iteration": model.iteration,

@@ -151,14 +151,16 @@ def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
 
 def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
-        positive = [{**entry, key: value} for entry in log if (value := _term(entry, key)) is not None and value > 0]
+        positive = [
+            {**entry, key: value} for entry in log if (value := minimised(entry, key)) is not None and value > 0
+        ]
         if positive:  # a weight that is still zero cannot be drawn on a logarithmic axis
             label = "1 − ssim" if key == "ssim" else key
             _curve(axes, positive, key, theme.colours[position], label, raw=False)
     _log_scale(axes, log, TERMS)
 
 
-def _term(entry: dict[str, Any], key: str) -> float | None:
+def minimised(entry: dict[str, Any], key: str) -> float | None:
     """The value that is minimised: the log holds SSIM itself."""
     value = entry.get(key)
     if not isinstance(value, int | float):

@@ -90,7 +90,6 @@ def _report_data(
 ) -> ReportData:
     record = folder.record()
     rows = {row["frame"]: row for row in metrics["held_out"]["per_frame"]}
-    worst = sorted(held_out, key=lambda i: _order(rows[i]["psnr_tissue"]))[:MOST_SHOWN]
     frames = tuple(
         FramePictures(
             index=i,
@@ -102,7 +101,7 @@ def _report_data(
             depth=held_out[i].depth,
             metrics=rows[i],
         )
-        for i in sorted(worst)
+        for i in sorted(worst_first(rows)[:MOST_SHOWN])
     )
     return ReportData(
         title=f"{Path(record['input']['source']).name}: {folder.path.absolute().name}",
@@ -120,6 +119,7 @@ def _report_data(
     )
 
 
-def _order(psnr: float | None) -> float:
-    """For sorting, worst first: a frame without a value (its render is not finite) is the worst."""
-    return -math.inf if psnr is None or math.isnan(psnr) else psnr
+def worst_first(rows: dict[int, dict[str, Any]]) -> list[int]:
+    """Frame numbers, the lowest `psnr_tissue` first; a frame without a value, whose render is not finite, is worst."""
+    values = {frame: row["psnr_tissue"] for frame, row in rows.items()}
+    return sorted(values, key=lambda i: -math.inf if values[i] is None or math.isnan(values[i]) else values[i])

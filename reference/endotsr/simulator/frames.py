@@ -111,7 +111,7 @@ def _light(
 ) -> tuple[FloatArray, FloatArray | None]:
     """Linear light (3, H, W) at the sensor, gain included, and the highlights on the tissue. `lamp` has the lamp."""
     settings = scene.settings
-    light, highlight = _tissue_light(scene, eye, lamp, blocker, t)
+    light, highlight = tissue_light(scene, eye, lamp, blocker, t)
     if tools is not None:
         light = light * (1 - tools.coverage) + tools.light * tools.coverage
     if settings.smoke.on:
@@ -122,7 +122,7 @@ def _light(
     return light if gain is None else light * gain[:, None, None], highlight
 
 
-def _tissue_light(scene: Scene, eye: Eye, lamp: Camera, blocker: Blocker | None, t: float) -> TissueLight:
+def tissue_light(scene: Scene, eye: Eye, lamp: Camera, blocker: Blocker | None, t: float) -> TissueLight:
     """The light of the tissue; with motion blur, its mean over the exposure.
 
     During an exposure the tissue moves; the lamps' light at a pixel is that of the middle of the exposure.

@@ -31,11 +31,11 @@ def smoke_fraction(settings: SimulatorSettings, t: float) -> FloatArray:
     phase = (t - part.start) / (part.stop - part.start)
     size = part.density * smooth_step(phase / RISE) * smooth_step((1 - phase) / FALL)
     angle = np.pi * TURNS * t
-    field = np.cos(angle) * _clouds(settings, t, 0) + np.sin(angle) * _clouds(settings, t, 1)
+    field = np.cos(angle) * clouds(settings, t, 0) + np.sin(angle) * clouds(settings, t, 1)
     return size / (1 + np.exp(-CONTRAST * field))
 
 
-def _clouds(settings: SimulatorSettings, t: float, which: int) -> FloatArray:
+def clouds(settings: SimulatorSettings, t: float, which: int) -> FloatArray:
     """A smooth random field (H, W) of deviation about 1, drifted to time t."""
     part = settings.smoke
     rng = np.random.default_rng([settings.seed, 6, which])

@@ -61,7 +61,7 @@ def prepare(scene: StudyScene, setting: Setting) -> Prepared:
     camera = scaled(scene.camera, setting.scale)
     d_colour, d_depth = _weights(scene)
     if setting.scale != 1:
-        rows, columns = _upsampling(camera.height, scene.camera.height), _upsampling(camera.width, scene.camera.width)
+        rows, columns = upsampling(camera.height, scene.camera.height), upsampling(camera.width, scene.camera.width)
         d_colour, d_depth = rows.T @ d_colour @ columns, rows.T @ d_depth @ columns
     weights = (np.ascontiguousarray(w, setting.precision) for w in (d_colour, d_depth))
     return Prepared(scene, setting, in_precision(gaussians, setting.precision), spectral, camera, *weights)
@@ -97,7 +97,7 @@ def _reduced(scene: StudyScene, setting: Setting) -> tuple[Gaussians, Any]:
     return g, spectral
 
 
-def _upsampling(small: int, large: int) -> FloatArray:
+def upsampling(small: int, large: int) -> FloatArray:
     """(large, small): linear interpolation between pixel centres, the border repeated."""
     at = np.clip((np.arange(large) + 0.5) * small / large - 0.5, 0, small - 1)
     left = np.minimum(at.astype(int), max(small - 2, 0))
@@ -132,7 +132,7 @@ def frame(prepared: Prepared) -> tuple[Frame, int]:
     colour = out.colour.astype(np.float64)
     full, small = prepared.scene.camera, prepared.camera
     if small.height != full.height or small.width != full.width:
-        colour = _upsampling(small.height, full.height) @ colour @ _upsampling(small.width, full.width).T
+        colour = upsampling(small.height, full.height) @ colour @ upsampling(small.width, full.width).T
     found = {name: getattr(grads, f"d_{name}") for name in BLOCKS}
     return Frame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
 

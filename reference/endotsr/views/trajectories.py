@@ -60,7 +60,7 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     levels = np.array([LEVELS_16] * 6 + [LEVELS_8] * 3)[:, None, None]
     rounded = np.rint((values - low[:, None, None]) / (high - low)[:, None, None] * levels)
     shown = np.broadcast_to(np.rint(opacity[seen] * LEVELS_8), (1, *values.shape[1:]))
-    rest = np.concatenate([_signed(rotation), rounded[COLOUR], shown]).astype(np.int16).astype(np.uint8)
+    rest = np.concatenate([rotation_levels(rotation), rounded[COLOUR], shown]).astype(np.int16).astype(np.uint8)
     return Trajectories(times, rounded[:6].astype(np.uint16), rest, low, high)
 
 
@@ -76,7 +76,7 @@ def _moment(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bo
     return values[:, seen], (moment.quaternion / norm)[:, seen]
 
 
-def _signed(rotation: FloatArray) -> FloatArray:
+def rotation_levels(rotation: FloatArray) -> FloatArray:
     """Quaternions as whole numbers up to ROTATION_LEVELS; q and -q turn alike, so a sign that would jump is changed."""
     largest = np.abs(rotation).max(axis=0)
     levels = np.rint(rotation / np.where(largest > 0, largest, 1) * ROTATION_LEVELS)
