@@ -1,6 +1,5 @@
 """Reading EndoNeRF folders: what is right is read exactly, what is wrong is named."""
 
-import dataclasses
 import os
 import time
 from pathlib import Path
@@ -389,14 +388,6 @@ def test_bad_percentiles_are_named(tmp_path, percentiles):
     write_synthetic_folder(tmp_path)
     with pytest.raises(InputError, match="depth_percentiles"):
         read_endonerf(tmp_path, SequenceConfig(depth_percentiles=percentiles))
-
-
-def test_kept_frames_are_not_shared_with_a_changed_copy(tmp_path):
-    write_synthetic_folder(tmp_path)
-    sequence = dataclasses.replace(read_endonerf(tmp_path, EVERYTHING), keep_frames=True)
-    assert sequence.frame(1) is sequence.frame(1) and sequence.frame(1) is not sequence.frame(1, np.float64)
-    darker = dataclasses.replace(sequence, images=sequence.images // 2)
-    assert darker.frame(1).image.max() < sequence.frame(1).image.max()
 
 
 def test_missing_sequence_folder(tmp_path):

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_percentiles
+from endotsr.sequences.assemble import assemble, check_percentiles
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import tissue_masks
-from endotsr.sequences.read_frames import FrameFiles, ReadFrames, read_frames
+from endotsr.sequences.read_frames import FrameFiles
 from endotsr.sequences.recording import Pair, Pose, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
@@ -107,31 +107,31 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     notes = [f"source: {contents.file.source}"] if contents.file.source else []
     if contents.file.masks and contents.file.masks.proposed and contents.masks:
         notes.append("masks: proposed by a program, checked by nobody")
-    read = _read_frames(contents, config, notes)
-    cameras, static = cameras_of(contents)
     excluded, stated_in = polarity(contents.file, contents.folder, config)
     if contents.masks and not stated_in and contents.file.masks and excluded != contents.file.masks.excluded_value:
         notes.append(f"sequence.excluded_value = {excluded!r} takes the place of that of {FILE_NAME}")
-    names = [str(file) for file in contents.masks]
-    unit = "arbitrary unit" if contents.file.arbitrary else "mm"
-    times = contents.file.times
-    seconds = None if times is None else np.array([times[i] for i in frames_read], np.float64)
-    frames = Frames(
-        images=read.images,
-        masks=read.masks,
-        depth=read.depth,
-        cameras=cameras,
-        static=static,
-        image_files=contents.images,
-        depth_files=contents.depth,
-        facts=read.facts,
-        store=read.store,
-        unit=unit,
-        mask_source=MaskSource(str(contents.masks[0].parent), names, excluded, stated_in) if names else None,
+    entry, times, camera = contents.file.depth, contents.file.times, contents.file.camera
+    assert entry is not None
+    if entry.clipped and entry.clipped == list(config.depth_percentiles):
+        config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
+        notes.append(f"depth: clipped to its percentiles {entry.clipped} before it was reduced, and not again")
+    files = FrameFiles(
+        contents.images,
+        contents.masks,
+        contents.depth,
+        size=(camera.width, camera.height),
+        picture=lambda path: _colour(contents, path),
+        mask=lambda path: grey_plane(_sized(contents, read_picture(path), path), path),
+        plane=lambda path: _sized(contents, read_plane(path), path),
+        excluded_value=excluded,
+        unit="arbitrary unit" if contents.file.arbitrary else "mm",
+        depth_unit=entry.unit,
+        depth_scale=entry.scale * contents.file.to_scene(entry.unit),
+        stated_in=stated_in,
         arbitrary=contents.file.arbitrary,
-        seconds=seconds,
+        seconds=None if times is None else np.array([times[i] for i in frames_read], np.float64),
     )
-    return assemble(frames, config, near, Path(folder), notes)
+    return assemble(files, cameras_of(contents), config, near, Path(folder), notes)
 
 
 def polarity(file: SequenceFile, folder: Path, config: SequenceConfig) -> tuple[str, str]:
@@ -150,8 +150,8 @@ def common_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
     return hash_files(Path(folder), files)
 
 
-def cameras_of(contents: Contents) -> tuple[list[Camera], bool]:
-    """One camera a frame, and whether all are one (then one and the same object)."""
+def cameras_of(contents: Contents) -> list[Camera]:
+    """One camera a frame; one and the same object where it does not move."""
     entry, count = contents.file.camera, len(contents.images)
     lens = (entry.fx, entry.fy, entry.cx, entry.cy, entry.width, entry.height)
     poses = contents.poses
@@ -160,30 +160,8 @@ def cameras_of(contents: Contents) -> tuple[list[Camera], bool]:
         and all((p.translation == poses[0].translation).all() for p in poses)
     ):
         pose = poses[0] if poses else Pose(np.eye(3), np.zeros(3))
-        return [Camera(pose.rotation, pose.translation, *lens)] * count, True
-    return [Camera(pose.rotation, pose.translation, *lens) for pose in poses], False
-
-
-def _read_frames(contents: Contents, config: SequenceConfig, notes: list[str]) -> ReadFrames:
-    """All selected frames."""
-    entry = contents.file.depth
-    assert entry is not None
-    files = FrameFiles(
-        contents.images,
-        contents.masks,
-        contents.depth,
-        picture=lambda path: _colour(contents, path),
-        mask=lambda path: grey_plane(_sized(contents, read_picture(path), path), path),
-        plane=lambda path: _sized(contents, read_plane(path), path),
-        depth_scale=entry.scale * contents.file.to_scene(entry.unit),
-        unit=entry.unit,
-        excluded_value=polarity(contents.file, contents.folder, config)[0],
-    )
-    size = contents.file.camera.width, contents.file.camera.height
-    if entry.clipped and entry.clipped == list(config.depth_percentiles):
-        config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
-        notes.append(f"depth: clipped to its percentiles {entry.clipped} before it was reduced, and not again")
-    return read_frames(files, size, config, contents.folder, notes)
+        return [Camera(pose.rotation, pose.translation, *lens)] * count
+    return [Camera(pose.rotation, pose.translation, *lens) for pose in poses]
 
 
 def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:

@@ -10,9 +10,12 @@ from endotsr.errors import InputError
 from endotsr.opencv import area_resize
 from endotsr.opencv.pictures import EXR_ENDINGS, TIFF_ENDINGS, read_picture
 from endotsr.sequences.arrays import read_npy, read_pfm
+from endotsr.sequences.masks import sparse_step
 from endotsr.sequences.recording import grey_plane
 
 CLIPPED = SequenceConfig().depth_percentiles  # by which depth is clipped before it is reduced
+ANOTHER_SCALE = 64.0  # times the usual median depth: 8 bits stretched to 16 make 256
+LEAST_DEPTH_FRACTION = 0.05  # of a frame: the median of fewer pixels may be that of a few outliers
 DEPTH_ENDINGS = (".png", ".npy", ".pfm", *TIFF_ENDINGS, *EXR_ENDINGS)
 
 
@@ -61,3 +64,28 @@ def reduced_depth(depth: NDArray[np.float32], width: int, height: int) -> NDArra
     fraction = area_resize((depth > 0).astype(np.float32), width, height)
     found = np.zeros(fraction.shape, np.float32)
     return np.divide(area_resize(depth, width, height), fraction, out=found, where=fraction > 0)
+
+
+def check_depth_scale(depth: NDArray[np.float32], files: list[Path], types: list[np.dtype], unit: str) -> None:
+    """Refuse a depth picture that is scaled to 16 bits while others hold lengths in 8 bits.
+
+    Mixed bit depths alone are legal and occur in published sequences: one far value makes a picture 16-bit.
+    """
+    for i, ratio in far_off(depth, ANOTHER_SCALE) if len(set(types)) > 1 else []:
+        if np.count_nonzero(depth[i]) >= LEAST_DEPTH_FRACTION * depth[i].size:
+            bits = 8 * types[i].itemsize
+            other = next(j for j, kind in enumerate(types) if kind != types[i])
+            raise InputError(
+                f"{files[i]}: {bits}-bit picture, its median depth is {ratio:.3g} times the usual one, while"
+                f" {files[other].name} has {8 * types[other].itemsize} bits; allowed: {unit} in every picture"
+            )
+
+
+def far_off(depth: NDArray[np.float32], factor: float) -> list[tuple[int, float]]:
+    """Frames whose median depth is over `factor` times the usual one, or under 1 / `factor`; with that ratio."""
+    step = sparse_step(depth.shape[1])
+    sparse = depth[:, ::step, ::step]
+    medians = {i: float(np.median(frame[frame > 0])) for i, frame in enumerate(sparse) if (frame > 0).any()}
+    usual = float(np.median(list(medians.values()) or [1.0]))
+    ratios = [(i, median / usual) for i, median in medians.items()]
+    return [(i, ratio) for i, ratio in ratios if not 1 / factor <= ratio <= factor]

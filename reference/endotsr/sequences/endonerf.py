@@ -19,11 +19,11 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.assemble import Frames, MaskSource, assemble, check_percentiles
+from endotsr.sequences.assemble import assemble, check_percentiles
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
-from endotsr.sequences.read_frames import FrameFiles, ReadFrames, read_frames
+from endotsr.sequences.read_frames import FrameFiles
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames
@@ -96,29 +96,28 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     check_percentiles(config)
     files = select_files(folder, config)
     rows = read_pose_rows(files.poses, files.total)
-    notes: list[str] = []
-    read = _read_pictures(files, config, notes)
-    height, width = read.images.shape[2:]
-    cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
-    frames = Frames(
-        images=read.images,
-        masks=read.masks,
-        depth=read.depth,
-        cameras=cameras,
-        static=static,
-        image_files=files.images,
-        depth_files=files.depth,
-        facts=read.facts,
-        store=read.store,
+    height, width = read_picture(files.images[0]).shape[:2]
+    cameras = cameras_from_rows(rows, width, height, files.poses, files.frames)
+
+    def sized(pixels: NDArray, path: Path) -> NDArray:
+        if pixels.shape[:2] != (height, width):
+            size = f"{pixels.shape[1]}x{pixels.shape[0]}"
+            raise InputError(f"{path}: {size} pixels, the first image has {width}x{height}")
+        return pixels
+
+    found = FrameFiles(
+        files.images,
+        files.masks,
+        files.depth,
+        size=(width, height),
+        picture=lambda path: colour_picture(sized(read_picture(path), path), path),
+        mask=lambda path: grey_plane(sized(read_picture(path), path), path),
+        plane=lambda path: sized(read_plane(path), path),
+        excluded_value=config.excluded_value,
         unit=UNIT,
-        mask_source=_mask_source(files, Path(folder), config),
+        depth_unit=UNIT,
     )
-    return assemble(frames, config, near, Path(folder), notes)
-
-
-def _mask_source(files: Folder, folder: Path, config: SequenceConfig) -> MaskSource | None:
-    names = [str(file) for file in files.masks]
-    return MaskSource(str(folder / config.masks), names, config.excluded_value) if names else None
+    return assemble(found, cameras, config, near, Path(folder), [])
 
 
 def input_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
@@ -149,30 +148,3 @@ def write_endonerf(sequence: Sequence, folder: Path) -> None:
         write_png(folder / "images" / f"{i:06d}.png", sequence.images[i].transpose(1, 2, 0))
         write_png(folder / "masks" / f"{i:06d}.png", np.where(sequence.masks[i], 0, 255).astype(np.uint8))
         write_png(folder / "depth" / f"{i:06d}.png", millimetres)
-
-
-def _read_pictures(files: Folder, config: SequenceConfig, notes: list[str]) -> ReadFrames:
-    """All selected frames; their size is that of the first image."""
-    height, width = read_picture(files.images[0]).shape[:2]
-
-    def sized(pixels: NDArray, path: Path) -> NDArray:
-        return _sized(pixels, path, width, height)
-
-    found = FrameFiles(
-        files.images,
-        files.masks,
-        files.depth,
-        picture=lambda path: colour_picture(sized(read_picture(path), path), path),
-        mask=lambda path: grey_plane(sized(read_picture(path), path), path),
-        plane=lambda path: sized(read_plane(path), path),
-        depth_scale=1.0,
-        unit=UNIT,
-        excluded_value=config.excluded_value,
-    )
-    return read_frames(found, (width, height), config, files.images[0].parents[1], notes)
-
-
-def _sized(pixels: NDArray, path: Path, width: int, height: int) -> NDArray:
-    if pixels.shape[:2] != (height, width):
-        raise InputError(f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, the first image has {width}x{height}")
-    return pixels

@@ -49,10 +49,8 @@ def read_pose_rows(path: Path, count: int) -> NDArray[np.float64]:
     return rows
 
 
-def cameras_from_rows(
-    rows: NDArray[np.float64], width: int, height: int, path: Path, frames: range
-) -> tuple[list[Camera], bool]:
-    """Cameras of the chosen rows, and whether the camera is static (all entries are then one Camera object).
+def cameras_from_rows(rows: NDArray[np.float64], width: int, height: int, path: Path, frames: range) -> list[Camera]:
+    """Cameras of the chosen rows; one and the same object for all of them where the camera is static.
 
     rows    (n, 17) rows of the pose file
     width, height  size of the image files, pixels
@@ -64,7 +62,7 @@ def cameras_from_rows(
     cameras = [_camera(rows[i], width, height, f"{path}: frame {i}") for i in frames]
     chosen = rows[list(frames)][:, :15]
     static = bool((np.ptp(chosen, axis=0) <= STATIC_TOLERANCE).all())
-    return ([cameras[0]] * len(cameras) if static else cameras), static
+    return [cameras[0]] * len(cameras) if static else cameras
 
 
 def _camera(row: NDArray[np.float64], width: int, height: int, where: str) -> Camera:

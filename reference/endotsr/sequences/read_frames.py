@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
-from endotsr.sequences.assemble import check_depth_scale
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts
-from endotsr.sequences.depth_files import clip_depth, depth_plane
+from endotsr.sequences.depth_files import check_depth_scale, clip_depth, depth_plane
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.recording import Picture
@@ -23,39 +22,40 @@ from endotsr.untrusted.files import in_threads
 
 
 class FrameFiles(NamedTuple):
-    """The files of the selected frames, and how one of them is read."""
+    """The files of the selected frames, how one of them is read, and what the layout knows of them."""
 
     images: list[Path]
-    masks: list[Path]  # empty: none are read
+    masks: list[Path]  # empty: every pixel is tissue
     depth: list[Path]
+    size: tuple[int, int]  # width and height of every file
     picture: Callable[[Path], Picture]  # (H, W, 3), of the right size
     mask: Callable[[Path], NDArray]  # (H, W) as stored
     plane: Callable[[Path], NDArray]  # (H, W) numbers of a depth file as stored
-    depth_scale: float  # of these numbers, to the unit of the sequence
-    unit: str  # of the depth, for messages
-    excluded_value: str  # white or black
+    excluded_value: str  # of the masks, white or black
+    unit: str  # of the sequence, in words
+    depth_unit: str  # of the numbers of a depth file
+    depth_scale: float = 1.0  # from it to the unit of the sequence
+    stated_in: str = ""  # the file that states the excluded value; "": the settings do
+    arbitrary: bool = False  # the unit is unknown: the scale of the world is free
+    seconds: NDArray[np.float64] | None = None  # (n,) of the frames, ascending; None: evenly spaced
 
 
-class ReadFrames(NamedTuple):
-    """The arrays of n frames."""
+class Frames(NamedTuple):
+    """The arrays of n frames, as read."""
 
     images: NDArray[np.uint8]  # (n, 3, H, W)
     masks: NDArray[np.bool_]  # (n, H, W) True = tissue; everywhere without masks
     depth: NDArray[np.float32]  # (n, H, W) clipped; 0 = none
-    facts: tuple[list[FrameFacts], list[DepthFacts]]
+    facts: tuple[list[FrameFacts], list[DepthFacts]]  # n of each: what the checks need of pictures and stored depth
     store: FrameStore
 
 
-def read_frames(
-    files: FrameFiles, size: tuple[int, int], config: SequenceConfig, where: object, notes: list[str]
-) -> ReadFrames:
+def read_frames(files: FrameFiles, config: SequenceConfig, where: object, notes: list[str]) -> Frames:
     """Read everything; notes on the masks are appended.
-
-    size  width and height of every file
 
     Raises:  InputError naming the file of the first frame that cannot be used, or for a clip that fits nowhere.
     """
-    (width, height), n = size, len(files.images)
+    (width, height), n = files.size, len(files.images)
     store = FrameStore(n, width, height, config.memory, where)
     images = store.array((n, 3, height, width), np.uint8)
     depth = store.array((n, height, width), np.float32)
@@ -76,14 +76,14 @@ def read_frames(
         depth[i] = clip_depth(plane, config.depth_percentiles)
 
     in_threads(read_frame, n)
-    check_depth_scale(depth, files.depth, types, files.unit)
+    check_depth_scale(depth, files.depth, types, files.depth_unit)
     tissue = store.array((n, height, width), bool)
     if files.masks:
         tissue_masks(masks, [str(file) for file in files.masks], files.excluded_value, notes, tissue)
     else:
         tissue[...] = True
     both = [fact for fact in facts if fact is not None]
-    return ReadFrames(images, tissue, depth, ([fact[0] for fact in both], [fact[1] for fact in both]), store)
+    return Frames(images, tissue, depth, ([fact[0] for fact in both], [fact[1] for fact in both]), store)
 
 
 def _kept(plane: NDArray, stored: NDArray[np.uint8] | None, i: int) -> NDArray:

@@ -42,8 +42,6 @@ class Sequence:
     train_index: NDArray[np.intp]  # ascending
     test_index: NDArray[np.intp]  # ascending, disjoint from train_index
     notes: list[str] = field(default_factory=list)
-    keep_frames: bool = False  # hold converted frames in memory (15 bytes a pixel in float32)
-    _kept: dict[tuple[int, str], Frame] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, _, height, width = self.images.shape
@@ -96,16 +94,10 @@ class Sequence:
         """
         if not 0 <= index < self.count:
             raise IndexError(f"frame {index} of a sequence of {self.count}")
-        key = (int(index), np.dtype(dtype).name)
-        if key in self._kept:
-            return self._kept[key]
-        frame = Frame(
+        return Frame(
             image=np.divide(self.images[index], 255, dtype=dtype),
             mask=self.masks[index],
             depth=self.depth[index].astype(dtype),
             time=float(self.times[index]),
             camera=self.cameras[index],
         )
-        if self.keep_frames:
-            self._kept[key] = frame
-        return frame

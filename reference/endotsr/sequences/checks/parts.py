@@ -66,7 +66,7 @@ def _endonerf_parts(folder: Path, config: SequenceConfig, findings: list[Finding
     def cameras(width: int, height: int) -> list[Camera]:
         file = find_pose_file(folder)
         rows = read_pose_rows(file, len(images))
-        return cameras_from_rows(rows, width, height, file, range(len(images)))[0]
+        return cameras_from_rows(rows, width, height, file, range(len(images)))
 
     where = next((folder / n for n in ("poses_bounds.npy", "pose_bounds.npy") if (folder / n).exists()), folder)
     return Parts(folder, images, masks, depth, right, config.excluded_value, 1.0, False, where, cameras)
@@ -93,7 +93,7 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
             )
         if file.frames != len(images):
             raise InputError(f"{where}: frames = {file.frames}, but images/ holds {len(images)} pictures")
-        return cameras_of(Contents(folder, file, images, right, masks, depth, read_poses(file, where)))[0]
+        return cameras_of(Contents(folder, file, images, right, masks, depth, read_poses(file, where)))
 
     scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
     excluded, stated_in = polarity(file, folder, config)

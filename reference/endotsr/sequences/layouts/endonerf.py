@@ -32,7 +32,7 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
     files = select_files(folder, config)
     height, width = colour_picture(read_picture(files.images[0]), files.images[0]).shape[:2]
     rows = read_pose_rows(files.poses, files.total)
-    cameras, static = cameras_from_rows(rows, width, height, files.poses, files.frames)
+    cameras = cameras_from_rows(rows, width, height, files.poses, files.frames)
     right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
     if right:
         check_pairing(files.images, right)
@@ -58,7 +58,7 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         unit=UNIT,
         lens=Lens(first.fx, first.fy, first.cx, first.cy, width, height),
         baseline=options.baseline,
-        poses=None if static else [Pose(camera.rotation, camera.translation) for camera in cameras],
+        poses=None if cameras[0] is cameras[-1] else [Pose(camera.rotation, camera.translation) for camera in cameras],
         rate=options.rate,
     )
 
