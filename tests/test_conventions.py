@@ -157,6 +157,17 @@ def test_tests_use_what_is_public():
     assert set().union(*map(private_names, files)) == PIECES
 
 
+def test_one_name_is_one_class():
+    """A word of the package is one thing: no two modules define a public class of one name."""
+    found: dict[str, list[str]] = {}
+    for file in SOURCES:
+        for node in parse(file).body:
+            if isinstance(node, ast.ClassDef) and node.name[0] != "_":
+                found.setdefault(node.name, []).append(module_name(file).removeprefix("endotsr."))
+    twice = {name: modules for name, modules in found.items() if len(modules) > 1}
+    assert twice == {"Request": ["golden.judge.format", "gradcheck.twins"]}  # a case as a request, in both
+
+
 def test_text_is_written_with_its_encoding_and_line_end():
     """The defaults of Windows are another encoding and CRLF, which checksums, ports and other systems would see."""
     wrong = []

@@ -17,7 +17,7 @@ from unittest import mock
 
 import msgspec
 
-from endotsr.bench.case import Case, representative
+from endotsr.bench.case import BenchCase, representative
 from endotsr.config import PAPER, Config, config_from_dict
 from endotsr.fitting import model, objective
 from endotsr.fitting.fused import step
@@ -58,7 +58,7 @@ def benchmark_effects(gaussians: int, repeats: int, width: int, height: int, con
 
 
 def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, config: Config) -> dict[str, Any]:
-    case = Case(gaussians=gaussians, width=width, height=height)
+    case = BenchCase(gaussians=gaussians, width=width, height=height)
     everything, off = _prepared(case, config), _prepared(case, changed(config, part))
     with _without(part.functions):
         absent = _prepared(case, changed(config, part))
@@ -99,7 +99,7 @@ def changed(config: Config, part: Part) -> Config:
     return config_from_dict(data, "bench effects")
 
 
-def _prepared(case: Case, config: Config) -> tuple[Any, Any]:
+def _prepared(case: BenchCase, config: Config) -> tuple[Any, Any]:
     """State at a representative iteration of the published schedule, and its workshop."""
     from endotsr.fitting.state import bench_state, workshop
 

@@ -14,7 +14,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from endotsr.bench.case import Case, Precision, apart
+from endotsr.bench.case import BenchCase, Precision, apart
 from endotsr.bench.timing import repeated, spread
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
@@ -24,7 +24,7 @@ from endotsr.scene import workload
 Found = tuple[dict[str, FloatArray], list[float]]
 
 OURS_REPEATS = 11
-WARM_UP = Case(100, 48, 32)
+WARM_UP = BenchCase(100, 48, 32)
 LIMITS = {"float32": 1e-3, "float64": 1e-9}  # largest relative error, norm against norm, of an image or a gradient
 PIP_LINES = (
     "pip install torch --index-url https://download.pytorch.org/whl/cpu",
@@ -41,11 +41,11 @@ def measure_peers(
     reason = apart(available)  # torch is not imported in this process
     if reason is not None:
         raise InputError(f"bench peers needs torch and gsplat ({reason}); install with: {'; '.join(PIP_LINES)}")
-    cases = [Case(n, precision=p, threads=threads, repeats=repeats) for n in gaussians for p in precisions]
+    cases = [BenchCase(n, precision=p, threads=threads, repeats=repeats) for n in gaussians for p in precisions]
     return {"cases": [apart(compare, case) for case in cases]}
 
 
-def compare(case: Case) -> dict[str, Any]:
+def compare(case: BenchCase) -> dict[str, Any]:
     """Both renderers on one view. Call it through `apart`.
 
     returns  "ours", "gsplat", "pair_lists": spreads of forward and reverse together; "ratio" of the medians without
@@ -78,7 +78,7 @@ def compare(case: Case) -> dict[str, Any]:
     }
 
 
-def _view(case: Case) -> tuple[Any, ...]:
+def _view(case: BenchCase) -> tuple[Any, ...]:
     """Scene, camera, settings and the gradients of a loss by colour and depth."""
     from endotsr.fitting.model import raster_settings
     from endotsr.splatting.render import Scene

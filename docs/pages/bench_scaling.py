@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from endotsr.bench.case import Case, apart, measure
+from endotsr.bench.case import BenchCase, apart, measure
 from endotsr.bench.clock import REST, SPLAT, STAGES
 from endotsr.bench.stages import Say, line
 from endotsr.report.tables import plain
@@ -27,7 +27,7 @@ CURVES: dict[str, tuple[str, ...]] = {
     "Fourier": ("Fourier",),
     "losses": ("L1 and SSIM", "pyramid", "depth and smoothness"),
 }
-BASE = Case(gaussians=20_000, repeats=7, densifications=0)
+BASE = BenchCase(gaussians=20_000, repeats=7, densifications=0)
 LARGE = 100_000  # Gaussians from which fewer repeats suffice, as an iteration is long then
 
 
@@ -35,7 +35,7 @@ class Axis(NamedTuple):
     """One size that is varied."""
 
     unit: str
-    cases: tuple[Case, ...]
+    cases: tuple[BenchCase, ...]
     curves: tuple[str, ...]  # that depend on this size, or should not
     along: Callable[[dict[str, Any]], float]  # the size of a measured case
 

@@ -14,7 +14,7 @@ import bench_scaling
 import bench_start
 
 from endotsr.bench import stages
-from endotsr.bench.case import Case, Precision, apart
+from endotsr.bench.case import BenchCase, Precision, apart
 from endotsr.bench.stages import Say
 from endotsr.errors import InputError
 from endotsr.export.npz import read_arrays
@@ -35,15 +35,15 @@ AXES = ("gaussians", "pairs", "pixels", "bases", "frequencies", "frames")
 EFFECTS = (20_000, 15, 320, 256)  # Gaussians, repeats, columns, rows
 
 
-def grid(scenes: tuple[Path, ...]) -> list[Case]:
+def grid(scenes: tuple[Path, ...]) -> list[BenchCase]:
     """The common workload in every size, precision and number of threads, then the trained scenes."""
     cases = [
-        Case(n, precision=precision, threads=threads, repeats=REPEATS)
+        BenchCase(n, precision=precision, threads=threads, repeats=REPEATS)
         for n in SIZES
         for precision in PRECISIONS
         for threads in THREADS
     ]
-    return cases + [Case(scene=str(path), repeats=REPEATS) for path in scenes]
+    return cases + [BenchCase(scene=str(path), repeats=REPEATS) for path in scenes]
 
 
 def measured_effects() -> dict[str, Any]:

@@ -14,7 +14,7 @@ from over_seeds import interval
 
 from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
-from endotsr.sweeps.ablation import COMPARISONS, STEPS, Comparison
+from endotsr.sweeps.ablation import COMPARISONS, STEPS, Contrast
 from endotsr.sweeps.ablation_page import increment_table, interval_text, level_table
 
 NOT_YET = "Not measured yet."
@@ -108,7 +108,7 @@ def _of(found: Record | None, claim: str, metric: str = "psnr_full") -> Record |
     return next((r for r in rows if (r["claim"], r["split"], r["metric"]) == wanted), None)
 
 
-def _increment_row(found: Record | None, comparison: Comparison) -> list[str]:
+def _increment_row(found: Record | None, comparison: Contrast) -> list[str]:
     published, entry = comparison.published or 0.0, _of(found, comparison.claim)
     claim = [
         comparison.says,

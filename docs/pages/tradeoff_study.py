@@ -13,12 +13,12 @@ from tradeoff_dials import OMITTED, Dial, dials
 
 from endotsr.tradeoff.measure import frame, prepare
 from endotsr.tradeoff.scenes import StudyScene
-from endotsr.tradeoff.study import REPEATS, Plan, exact_is_possible, reference_setting, run_study
+from endotsr.tradeoff.study import REPEATS, NamedSettings, exact_is_possible, reference_setting, run_study
 
 SLOW_DIALS = ("support", "exponential", "tile")  # they need the path `definition`
 
 
-class WholePlan(Plan):
+class WholePlan(NamedSettings):
     """Every setting once, even if several dials contain it."""
 
     def __init__(self, scene: StudyScene) -> None:

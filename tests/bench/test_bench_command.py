@@ -13,7 +13,7 @@ import pytest
 
 import bench
 from endotsr.bench import stages, trained
-from endotsr.bench.case import Case, measure
+from endotsr.bench.case import BenchCase, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.stages import ns_per_pair
 from endotsr.cli.bench import BenchOptions, cases_of
@@ -34,7 +34,7 @@ RESULTS = Path(__file__).parents[2] / "docs" / "results"
 @pytest.fixture(scope="module")
 def results():
     """What two of the measurements return, at the smallest sizes."""
-    small = [Case(gaussians=n, width=48, height=32, repeats=1, threads=1, densifications=1) for n in (60, 30, 90)]
+    small = [BenchCase(gaussians=n, width=48, height=32, repeats=1, threads=1, densifications=1) for n in (60, 30, 90)]
     measured = [measure(case) for case in small]
     for result in measured:
         result |= {"limits": limits(result, PEAKS), "ns_per_pair": ns_per_pair(result)}

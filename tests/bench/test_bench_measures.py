@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from endotsr.bench import clock, pairs, peaks, timing
-from endotsr.bench.case import Case, measure, prepare, representative
+from endotsr.bench.case import BenchCase, measure, prepare, representative
 from endotsr.bench.clock import STAGES
 from endotsr.bench.limits import limits, work
 from endotsr.bench.stages import ns_per_pair
@@ -28,7 +28,7 @@ from endotsr.splatting.settings import PAPER as PAPER_RULES
 
 pytestmark = pytest.mark.slow
 
-TINY = Case(gaussians=60, width=48, height=32, repeats=2, threads=1, densifications=1)
+TINY = BenchCase(gaussians=60, width=48, height=32, repeats=2, threads=1, densifications=1)
 PEAKS = {"flop_per_second": {"float32": 1e11, "float64": 5e10}, "bytes_per_second": {"triad": 1e10, "update": 2e10}}
 
 
@@ -195,7 +195,7 @@ def test_every_axis_varies_its_size_alone():
     for name, axis in scaling.axes(10_000).items():
         assert len(axis.cases) > 2
         varied = [
-            n for n in Case.__dataclass_fields__ if n != "repeats" and len({getattr(c, n) for c in axis.cases}) > 1
+            n for n in BenchCase.__dataclass_fields__ if n != "repeats" and len({getattr(c, n) for c in axis.cases}) > 1
         ]
         assert varied == {"pairs": ["size"], "pixels": ["width", "height"]}.get(name, [name])
 

@@ -11,7 +11,7 @@ from tiny import assert_refused
 from endotsr.cli.main import COMMANDS, main
 from endotsr.cli.parts.completion import ALWAYS, SCRIPTS, words_of
 from endotsr.cli.parts.fields import fields_of
-from endotsr.cli.parts.output import Output, split_output
+from endotsr.cli.parts.output import OutputOptions, split_output
 from endotsr.cli.train import TrainOptions
 
 
@@ -40,7 +40,7 @@ def test_a_log_file_that_cannot_be_written_is_refused(tmp_path, capsys):
 def test_other_words_keep_their_order():
     output, words = split_output(["train", "x", "-q", "--out", "y", "--log-file=z", "--seed", "-1"])
     assert words == ["train", "x", "--out", "y", "--seed", "-1"] and output.quiet and output.log_file.name == "z"
-    assert split_output(["a"]) == (Output(), ["a"])
+    assert split_output(["a"]) == (OutputOptions(), ["a"])
 
 
 def test_the_short_help_is_short_and_names_the_whole_one(capsys):

@@ -10,7 +10,7 @@ from scenes import clip, inspected
 from endotsr.effects.clip import training_clip
 from endotsr.effects.inspect import EFFECTS, inspect_sequence, inspection_record
 from endotsr.effects.noise import estimate_noise
-from endotsr.effects.verdict import Verdict
+from endotsr.effects.verdict import EffectVerdict
 from endotsr.effects.views import view_verdict
 from endotsr.errors import InputError
 from endotsr.runs.files import finite
@@ -131,7 +131,7 @@ def test_verdicts_have_every_effect_and_a_sentence():
 
 
 def test_confidence_is_half_at_the_threshold_and_grows_on_both_sides():
-    verdict = Verdict("e", True, "k", 2.0, 2.0, "", "", 0.01, "R.")
+    verdict = EffectVerdict("e", True, "k", 2.0, 2.0, "", "", 0.01, "R.")
     assert verdict.confidence == 0.5
     assert verdict._replace(statistic=4.0).confidence == verdict._replace(statistic=1.0).confidence == 0.875
     assert verdict._replace(statistic=0.0, false_positive_rate=0.0).confidence == 1.0

@@ -18,7 +18,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.render import Scene
 from endotsr.views.pictures import Look, rendered, requested_views, write_pictures
-from endotsr.views.plan import Request
+from endotsr.views.plan import ViewRequest
 
 plyfile = pytest.importorskip("plyfile", reason="plyfile, an outside reader of ply files, is not installed")
 ENDONERF = np.diag([1.0, -1.0, -1.0])  # world-to-camera of a resting EndoNeRF camera: y up, z backward
@@ -101,7 +101,7 @@ def test_the_identity_camera_of_a_file_shows_the_first_frame(pose, source, tmp_p
     entry = {key: value for key, value in CAMERA._asdict().items() if key not in ("rotation", "translation")}
     path = {"cameras": [entry | {"rotation": np.eye(3).tolist(), "translation": [0, 0, 0]}]}
     (tmp_path / "path.json").write_text(json.dumps(path))
-    views = requested_views(scene, Request(Times(times=(TIME,)), str(tmp_path / "path.json")), "test")
+    views = requested_views(scene, ViewRequest(Times(times=(TIME,)), str(tmp_path / "path.json")), "test")
     shown = next(rendered(scene, views, Look()))[1].colour
     assert np.abs(shown - seen).mean() < 2e-3 and shown.max() > 0.1
 
@@ -109,7 +109,7 @@ def test_the_identity_camera_of_a_file_shows_the_first_frame(pose, source, tmp_p
 @pytest.mark.parametrize("pose", POSES)
 def test_a_camera_of_render_json_is_in_the_same_axes(pose, tmp_path):
     scene = scene_seen_by(pose)
-    request = Request(Times(times=(TIME, 0.3)), offset=(0.5, 0.0, 0.0))
+    request = ViewRequest(Times(times=(TIME, 0.3)), offset=(0.5, 0.0, 0.0))
     write_pictures(tmp_path / "a", scene, rendered(scene, requested_views(scene, request, "test"), Look()), Look())
     entry = json.loads((tmp_path / "a/render.json").read_text())["pictures"][0]["camera"]
     np.testing.assert_allclose(entry["rotation"], np.eye(3), atol=1e-12)

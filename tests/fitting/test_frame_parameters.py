@@ -32,8 +32,7 @@ from endotsr.runs.files import finite
 from endotsr.runs.model import Model
 from endotsr.runs.sources import remembered_cameras, sequence_record
 from endotsr.scene.parameters import Pose, exposure_of, trained
-from endotsr.simulator.settings import Brightening, Highlights, SimulatorSettings, with_effects
-from endotsr.simulator.settings import Exposure as CameraExposure
+from endotsr.simulator.settings import Brightening, GainDrift, Highlights, SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
 GAIN = np.array([1.0, 0.97, 0.75, 0.8, 0.85, 1.0, 0.7, 0.75, 0.8, 0.95, 0.8, 0.7])  # of the frames, known
@@ -67,7 +66,7 @@ def settings(part: str, on: bool, **training) -> Config:
 def dimmed():
     """A simulated clip whose frames were made darker by `GAIN`; highlights are not cut off, as no gain is above 1."""
     constant = {
-        "exposure": CameraExposure(on=False),
+        "exposure": GainDrift(on=False),
         "brightening": Brightening(on=False),
         "highlights": Highlights(on=False),
     }

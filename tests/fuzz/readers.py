@@ -197,11 +197,11 @@ def read_sequence(path: Path) -> object:
     from endotsr.export.times import Times
     from endotsr.runs.folder import RunFolder
     from endotsr.runs.sources import remembered_cameras
-    from endotsr.views.plan import Request, check_request, views_of
+    from endotsr.views.plan import ViewRequest, check_request, views_of
 
     folder = RunFolder(path.parent)
     record = folder.sequence_record("names", "times", "train_index", "test_index")
-    requests = Request(Times(frames="all")), Request(Times(count=3), camera="sway", size="20x20")
+    requests = ViewRequest(Times(frames="all")), ViewRequest(Times(count=3), camera="sway", size="20x20")
     for request in requests:
         check_request(request, record)
     folder.sequence_record(*RECORD)  # as the model asks when it is loaded

@@ -8,7 +8,7 @@ from endotsr.effects.inspect import Inspection
 from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line
 from endotsr.effects.plan import Change, Dictionary, Plan
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.equations.dictionary import AtomReport
 from endotsr.report.inspection import inspection_html, inspection_text, write_inspection
 from report.test_report import Reader, without_pictures
@@ -22,9 +22,9 @@ def found() -> tuple[Inspection, Plan]:
     values = np.full((16, 32), 2.0)
     values[:4] = np.nan
     verdicts = {
-        "motion": Verdict("motion", True, "periodic", 3.0, 1.0, "times", "flow", 0.01, "It <moves>.", {}, curve,
+        "motion": EffectVerdict("motion", True, "periodic", 3.0, 1.0, "times", "flow", 0.01, "It <moves>.", {}, curve,
                           Map("flow, px", values)),
-        "occluders": Verdict("occluders", False, "none", 0.0, 0.0, "fraction", "pixels", 0.0, "None."),
+        "occluders": EffectVerdict("occluders", False, "none", 0.0, 0.0, "fraction", "pixels", 0.0, "None."),
     }  # fmt: skip
     noise = Noise(np.full(3, 0.01), np.full(3, 0.01), "differences over time")
     report = AtomReport(16, 10.0, [], [])

@@ -205,13 +205,13 @@ def test_colmap(tmp_path, binary):
 def test_depth_between_points_lies_on_their_planes(tmp_path):
     """The points of a slanted plane: 1 / z is linear in the picture, so the interpolation is exact."""
     from endotsr.sequences.points import depth_from_points
-    from endotsr.sequences.recording import Lens, Pose
+    from endotsr.sequences.recording import CameraPose, Lens
 
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-4, 4, (2, 60))
     points = np.column_stack([x, y, 10 + 0.3 * x - 0.2 * y])
     lens = Lens(60.0, 50.0, 30.0, 26.0, 64, 48)
-    depth = depth_from_points(points, Pose(np.eye(3), np.zeros(3)), lens, "interpolated")
+    depth = depth_from_points(points, CameraPose(np.eye(3), np.zeros(3)), lens, "interpolated")
     row, column = np.nonzero(depth)
     assert len(row) > 1000
     a, b = (column + 0.5 - 30) / 60, (row + 0.5 - 26) / 50

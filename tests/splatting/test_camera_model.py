@@ -42,7 +42,7 @@ def plain(function):
 def split(numbers):
     """Position, scale, rotation, pose."""
     position, scale, rotation, w, d = (tuple(p.tolist()) for p in np.split(numbers, np.cumsum(SIZES)[:-1]))
-    return position, scale, rotation, formulas.Pose(w, d)
+    return position, scale, rotation, formulas.WorldToCamera(w, d)
 
 
 def projected(numbers):

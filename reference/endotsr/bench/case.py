@@ -26,7 +26,7 @@ WARM_UP = 2  # iterations after the compiling one
 
 
 @dataclass(frozen=True)
-class Case:
+class BenchCase:
     """The sizes of a case; the defaults are the common workload at 60 000 Gaussians."""
 
     gaussians: int = 60_000
@@ -57,7 +57,7 @@ def apart(function: Callable[..., Any], *arguments: Any) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def measure(case: Case) -> dict[str, Any]:
+def measure(case: BenchCase) -> dict[str, Any]:
     """Times of the stages and of the iteration, pairs, memory. Call it through `apart`.
 
     returns  JSON-able: "case"; "stages" {name: spread}; "splat" and "iteration", the same for the sum of the four
@@ -89,7 +89,7 @@ def measure(case: Case) -> dict[str, Any]:
     }
 
 
-def prepare(case: Case, config: Config) -> tuple[Any, Any]:
+def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
     """State and workshop of a case, at the timed iteration, with every target computed."""
     from endotsr.bench.trained import trained_gaussians
     from endotsr.fitting.state import bench_state, workshop

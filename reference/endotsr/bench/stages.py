@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from endotsr.bench.case import Case, apart, measure
+from endotsr.bench.case import BenchCase, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
 from endotsr.export.npz import read_arrays
@@ -14,7 +14,7 @@ from endotsr.report.words import memory
 Say = Callable[[str], None]
 
 
-def measure_stages(cases: Iterable[Case], say: Say) -> dict[str, Any]:
+def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
     """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
 
     Raises: InputError before anything is measured, if the file of a case is not a trained scene.

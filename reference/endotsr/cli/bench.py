@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-from endotsr.bench.case import Case, Precision
+from endotsr.bench.case import BenchCase, Precision
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
@@ -69,9 +69,9 @@ def _refuse(options: BenchOptions) -> None:
     refuse_unwritable(options.json)
 
 
-def cases_of(options: BenchOptions) -> list[Case]:
+def cases_of(options: BenchOptions) -> list[BenchCase]:
     """Every combination of scene, precision and threads; the common workload comes first, grouped by size."""
-    base = Case(width=options.width, height=options.height, repeats=options.repeats)
+    base = BenchCase(width=options.width, height=options.height, repeats=options.repeats)
     scenes = [replace(base, gaussians=n) for n in options.gaussians]
     scenes += [replace(base, scene=str(path)) for path in options.scenes]
     return [

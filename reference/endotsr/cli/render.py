@@ -64,11 +64,11 @@ def run(words: list[str]) -> int:
     from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
-    from endotsr.views.plan import Request
+    from endotsr.views.plan import ViewRequest
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
-    request = Request(times, options.camera, options.offset, options.size, options.angle)
+    request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate)
     refuse_unwritable(options.json)
     use_threads(options.threads)

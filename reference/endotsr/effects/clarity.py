@@ -11,7 +11,7 @@ import numpy as np
 
 from endotsr.effects.clip import Clip
 from endotsr.effects.noise import Noise
-from endotsr.effects.verdict import Curve, Verdict
+from endotsr.effects.verdict import Curve, EffectVerdict
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.sequence import Sequence
 
@@ -30,7 +30,7 @@ class _Series:
         self.sharpness, self.dark = (np.array(column) for column in zip(*rows))
 
 
-def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Verdict, Verdict]:
+def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[EffectVerdict, EffectVerdict]:
     """Verdicts on smoke and on blur."""
     series = _Series(sequence, clip, noise)
     fall = _local_median(series.sharpness) - series.sharpness
@@ -46,7 +46,7 @@ def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[Verd
     return smoke, blur
 
 
-def clear_frames(clip: Clip, *verdicts: Verdict) -> BoolArray:
+def clear_frames(clip: Clip, *verdicts: EffectVerdict) -> BoolArray:
     """(m,) False for the training frames that a verdict of `clarity_verdicts` names."""
     clear = np.ones(clip.count, bool)
     for verdict in verdicts:
@@ -77,12 +77,13 @@ def _local_median(course: FloatArray) -> FloatArray:
 
 def _verdict(
     effect: str, score: FloatArray, threshold: float, unit: str, test: str, clip: Clip, lines: dict[str, FloatArray]
-) -> Verdict:
+) -> EffectVerdict:
     bad = np.flatnonzero(score >= threshold)
     statistic = float(score.max()) if score.size else 0.0
     word = {"smoke": "smoke", "blur": "blur"}[effect]
     reason = (
         f"{len(bad)} of {clip.count} training frames show {word}." if bad.size else f"No training frame shows {word}."
     )
-    return Verdict(effect, bool(bad.size), word if bad.size else "none", statistic, threshold, unit, test, 0.01, reason,
-                   {"frames": bad.tolist()}, Curve(", ".join(lines), "time", clip.times, lines))  # fmt: skip
+    kind, curve = word if bad.size else "none", Curve(", ".join(lines), "time", clip.times, lines)
+    details = {"frames": bad.tolist()}
+    return EffectVerdict(effect, bool(bad.size), kind, statistic, threshold, unit, test, 0.01, reason, details, curve)

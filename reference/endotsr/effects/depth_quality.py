@@ -4,7 +4,7 @@ import numpy as np
 
 from endotsr.effects.clip import Clip
 from endotsr.effects.noise import NORMAL_MAD
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.sequences.sequence import Sequence
 
 LEAST_PIXELS = 10  # with depth, for a frame to have any use
@@ -13,7 +13,7 @@ RELATIVE = 1e-3  # of the median depth: smaller steps and smaller flicker do not
 MOST_LEVELS = 4096  # a frame with more values than this is not quantised
 
 
-def depth_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+def depth_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
     """Present = something is wrong with the depth. `details["usable"]` says whether any frame has enough of it."""
     depth, known = clip.depth, (clip.depth > 0) & clip.masks
     by_frame = 1.0 - known.sum(axis=(1, 2)) / np.maximum(clip.masks.sum(axis=(1, 2)), 1)
@@ -34,11 +34,11 @@ def depth_verdict(sequence: Sequence, clip: Clip) -> Verdict:
         found, reason = ["unusable"], "No training frame has ten pixels of depth that differ."
     details = {"usable": any(usable), "holes": holes, "step": step, "flicker": flicker, "median_depth": median}
     missing = np.where(clip.masks, depth <= 0, False).mean(axis=0)
-    return Verdict("depth quality", bool(found), " + ".join(found) or "good", max(scores.values()), 1.0,
-                   "times the threshold", "holes over 1 % of tissue, step and flicker over 0.1 % of the median depth",
-                   0.01, reason, details,
-                   Curve("tissue without depth, percent", "time", clip.times, {"holes": 100 * by_frame}, 100 * HOLES),
-                   Map("no depth on tissue, percent of the frames", 100 * missing))  # fmt: skip
+    test = "holes over 1 % of tissue, step and flicker over 0.1 % of the median depth"
+    curve = Curve("tissue without depth, percent", "time", clip.times, {"holes": 100 * by_frame}, 100 * HOLES)
+    picture = Map("no depth on tissue, percent of the frames", 100 * missing)
+    return EffectVerdict("depth quality", bool(found), " + ".join(found) or "good", max(scores.values()), 1.0,
+                         "times the threshold", test, 0.01, reason, details, curve, picture)  # fmt: skip
 
 
 def quantisation(depth: np.ndarray, known: np.ndarray) -> float:

@@ -16,7 +16,7 @@ from endotsr.effects.photometric import photometric_verdict
 from endotsr.effects.seen import camera_verdict, highlight_verdict, occluder_verdict
 from endotsr.effects.topology import topology_verdict
 from endotsr.effects.tracks import make_tracks, without_frames
-from endotsr.effects.verdict import Verdict, verdict_record
+from endotsr.effects.verdict import EffectVerdict, verdict_record
 from endotsr.effects.views import view_verdict
 from endotsr.errors import InputError
 from endotsr.sequences.sequence import Sequence
@@ -32,7 +32,7 @@ class Inspection(NamedTuple):
 
     clip: Clip
     noise: Noise
-    verdicts: dict[str, Verdict]  # by effect, in the order of `EFFECTS`
+    verdicts: dict[str, EffectVerdict]  # by effect, in the order of `EFFECTS`
     lines: list[Line]  # rates of the motion
     frame_rate: float | None  # frames a second, if it is known
 

@@ -12,8 +12,8 @@ from endotsr.effects.clip import TILE, Clip, tile_map
 from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line, spectral_lines
 from endotsr.effects.rigid import fit_rigid
-from endotsr.effects.tracks import Tracks, filled_tiles
-from endotsr.effects.verdict import UNKNOWN, Curve, Map, Verdict
+from endotsr.effects.tracks import FlowTracks, filled_tiles
+from endotsr.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
@@ -27,7 +27,9 @@ AFFINE_FRACTION = 0.98  # of the squared flow: above it the picture moves as a w
 FALSE_POSITIVES = 0.01  # of the F distribution of the tiles, all together
 
 
-def motion_verdict(sequence: Sequence, clip: Clip, tracks: Tracks, noise: Noise) -> tuple[Verdict, list[Line]]:
+def motion_verdict(
+    sequence: Sequence, clip: Clip, tracks: FlowTracks, noise: Noise
+) -> tuple[EffectVerdict, list[Line]]:
     """Whether tissue moves, and how; with the lines of its spectrum (empty without periodic motion)."""
     null, clear, camera = tracks.null, np.ones_like(tracks.usable), np.zeros_like(tracks.tiles)
     if not sequence.static_camera:
@@ -70,7 +72,7 @@ def _root_mean_square(tiles: FloatArray) -> FloatArray:
     return np.sqrt(np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
 
-def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
+def _affine_fraction(filled: FloatArray, clip: Clip, tracks: FlowTracks) -> float:
     """Fraction of the squared flow that an affine map of the picture explains, frame by frame."""
     rows, columns = clip.images.shape[2] // TILE, clip.images.shape[3] // TILE
     place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
@@ -80,8 +82,8 @@ def _affine_fraction(filled: FloatArray, clip: Clip, tracks: Tracks) -> float:
     return 1.0 - float((left**2).sum() / max((flat**2).sum(), 1e-30))
 
 
-def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: FloatArray, lines: list[Line],
-             waves: int) -> Verdict:  # fmt: skip
+def _verdict(kind: str, statistic: float, clip: Clip, tracks: FlowTracks, size: FloatArray, lines: list[Line],
+             waves: int) -> EffectVerdict:  # fmt: skip
     length = np.sqrt((tracks.tiles**2).sum(axis=1))
     seen = np.isfinite(length)
     path = np.where(seen, length, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
@@ -95,7 +97,7 @@ def _verdict(kind: str, statistic: float, clip: Clip, tracks: Tracks, size: Floa
         "irregular": f"Tissue moves by up to {largest:.2g} px (RMS), and no rate stands out of the spectrum.",
     }[kind]
     height, width = clip.images.shape[2:]
-    return Verdict(
+    return EffectVerdict(
         "motion", kind != "none", kind, statistic, 1.0, "times the threshold of a tile",
         "root mean square of the flow of a tile over max(2 x flow of noise alone, 0.05 px)",
         FALSE_POSITIVES, reason, {"largest_px": largest, "half_waves": waves},

@@ -13,8 +13,8 @@ from scipy import stats
 
 from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means
 from endotsr.effects.noise import Noise
-from endotsr.effects.tracks import Tracks
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.tracks import FlowTracks
+from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.kernels.arrays import BoolArray, FloatArray, IndexArray
 
 DARK, BRIGHT = 0.05, 0.95  # display units: pixels outside are not compared
@@ -36,7 +36,7 @@ class Ratios(NamedTuple):
     tiles: IndexArray  # (U,) number of each tile in the grid
 
 
-def photometric_verdict(clip: Clip, tracks: Tracks, noise: Noise, moving: bool) -> Verdict:
+def photometric_verdict(clip: Clip, tracks: FlowTracks, noise: Noise, moving: bool) -> EffectVerdict:
     """Whether the light changes, and in which way."""
     ratios = colour_ratios(clip, tracks, noise)
     if ratios.values.shape[2] < LEAST_TILES:
@@ -62,7 +62,7 @@ def photometric_verdict(clip: Clip, tracks: Tracks, noise: Noise, moving: bool) 
     return _verdict(clip, found, statistic, ranges, fraction, common, balance, ratios, sizes)
 
 
-def colour_ratios(clip: Clip, tracks: Tracks, noise: Noise) -> Ratios:
+def colour_ratios(clip: Clip, tracks: FlowTracks, noise: Noise) -> Ratios:
     """Log ratios of the mean colours of the tiles that every frame sees."""
     reference = clip.reference
     start = clip.images[reference]
@@ -141,15 +141,15 @@ def _range(course: FloatArray) -> float:
     return float(high - low)
 
 
-def _nothing(reason: str) -> Verdict:
-    return Verdict("photometric", False, "none", 0.0, 1.0, "times the threshold", "variance of the gain of the frames",
-                   ALARM, reason)  # fmt: skip
+def _nothing(reason: str) -> EffectVerdict:
+    return EffectVerdict("photometric", False, "none", 0.0, 1.0, "times the threshold",
+                         "variance of the gain of the frames", ALARM, reason)  # fmt: skip
 
 
 def _verdict(
     clip: Clip, found: list[str], statistic: float, ranges: dict[str, float], fraction: float, common: FloatArray,
     balance: FloatArray, ratios: Ratios, sizes: FloatArray,
-) -> Verdict:  # fmt: skip
+) -> EffectVerdict:  # fmt: skip
     words = {
         "gain": f"the gain of the frames ranges over {255 * ranges['gain']:.1f} grey levels",
         "white balance": f"the channels drift apart by {255 * ranges['white balance']:.1f} grey levels",
@@ -160,7 +160,7 @@ def _verdict(
     picture = np.full((clip.images.shape[2] // TILE) * (clip.images.shape[3] // TILE), np.nan)
     picture[ratios.tiles] = 255 * sizes
     lines = {"gain": 100 * common, "red": 100 * balance[:, 0], "blue": 100 * balance[:, 2]}
-    return Verdict(
+    return EffectVerdict(
         "photometric", bool(found), " + ".join(found) or "none", statistic, 1.0, "times the threshold",
         "F ratio of the variance of the frame gain over noise, its range over one grey level, changed tiles over 2 %",
         ALARM, reason, {"range": ranges, "local_fraction": fraction},

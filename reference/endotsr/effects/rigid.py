@@ -13,7 +13,7 @@ import numpy as np
 
 from endotsr.effects.clip import TILE, Clip, tile_means
 from endotsr.effects.noise import Noise
-from endotsr.effects.tracks import Tracks, normalised
+from endotsr.effects.tracks import FlowTracks, normalised
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import dense_flow, warp_bilinear
 from endotsr.splatting.camera import Camera
@@ -31,7 +31,7 @@ class Rigid(NamedTuple):
     clear: BoolArray  # (T,) tiles at least `MARGIN` from excluded pixels and from the edge of the picture
 
 
-def fit_rigid(clip: Clip, tracks: Tracks, noise: Noise) -> Rigid:
+def fit_rigid(clip: Clip, tracks: FlowTracks, noise: Noise) -> Rigid:
     """Fit an inverse depth to every tile; the poses stay as they are. Needs no depth."""
     height, width = clip.images.shape[2:]
     row, column = np.indices((height // TILE, width // TILE)).reshape(2, -1)
@@ -74,7 +74,7 @@ def inverse_depth(clip: Clip, place: FloatArray, tiles: FloatArray) -> FloatArra
     return inverse
 
 
-def return_error(clip: Clip, tracks: Tracks, noise: Noise) -> FloatArray:
+def return_error(clip: Clip, tracks: FlowTracks, noise: Noise) -> FloatArray:
     """|f(x) + b(x + f(x))| with the flow b back to the reference: mean over a tile, RMS over frames; (T,), pixels."""
     grey, mask, sigma = clip.luminance, clip.masks[clip.reference], float(noise.working.mean())
     squares = []

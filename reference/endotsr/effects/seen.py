@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.effects.clip import Clip
-from endotsr.effects.verdict import Curve, Map, Verdict
+from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.kernels.arrays import BoolArray
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import camera_centre
@@ -14,7 +14,7 @@ LEAST_HIGHLIGHT = 1e-3  # fraction of the tissue
 LEAST_POSE_CHANGE = 1e-9  # scene units, and elements of the rotation
 
 
-def occluder_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+def occluder_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
     """Whether any pixel of a training frame is excluded; a fact of the masks."""
     masks = sequence.masks[sequence.train_index]
     by_frame = 1.0 - masks.mean(axis=(1, 2))
@@ -30,11 +30,11 @@ def occluder_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     curve = Curve("excluded, percent of the pixels", "time", clip.times, {"excluded": 100 * by_frame})
     picture = Map("excluded, percent of the frames", 100 * (~clip.masks).mean(axis=0))
     details = {"never_seen": float(always.mean())}
-    return Verdict("occluders", excluded > 0, kind, excluded, 0.0, "fraction of the pixels", "excluded pixels", 0.0,
-                   reason, details, curve, picture)  # fmt: skip
+    return EffectVerdict("occluders", excluded > 0, kind, excluded, 0.0, "fraction of the pixels",
+                         "excluded pixels", 0.0, reason, details, curve, picture)  # fmt: skip
 
 
-def camera_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+def camera_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
     """Whether the poses of the training frames differ; a fact of the poses."""
     centres = np.array([camera_centre(camera) for camera in clip.cameras])
     turns = np.array([camera.rotation for camera in clip.cameras])
@@ -45,13 +45,14 @@ def camera_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     reason = (
         f"The camera moves by up to {path.max():.3g} {sequence.unit}." if moves else "All frames have the same pose."
     )
-    return Verdict("camera motion", moves, "moving" if moves else "none", spread, LEAST_POSE_CHANGE, sequence.unit,
-                   "largest difference of two poses", 0.0, reason, {"largest_shift": float(path.max())},
-                   Curve(f"distance from the first pose, {sequence.unit}", "time", clip.times, {"camera": path})
-                   if moves else None)  # fmt: skip
+    details = {"largest_shift": float(path.max())}
+    curve = Curve(f"distance from the first pose, {sequence.unit}", "time", clip.times, {"camera": path})
+    return EffectVerdict("camera motion", moves, "moving" if moves else "none", spread, LEAST_POSE_CHANGE,
+                         sequence.unit, "largest difference of two poses", 0.0, reason, details,
+                         curve if moves else None)  # fmt: skip
 
 
-def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+def highlight_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
     """Saturated and colourless tissue pixels at full size."""
     fractions, sums = [], np.zeros((sequence.height, sequence.width))
     for i in sequence.train_index:
@@ -67,11 +68,11 @@ def highlight_verdict(sequence: Sequence, clip: Clip) -> Verdict:
     side = clip.shrink
     cut = sums[: sums.shape[0] // side * side, : sums.shape[1] // side * side]
     picture = cut.reshape(cut.shape[0] // side, side, cut.shape[1] // side, side).mean(axis=(1, 3))
-    return Verdict("highlights", present, kind, statistic, LEAST_HIGHLIGHT, "fraction of the tissue",
-                   "saturated pixels without colour", 0.01, reason, {"fixed_fraction": fixed},
-                   Curve("highlights, percent of the tissue", "time", clip.times, {"highlights": 100 * fraction},
+    return EffectVerdict("highlights", present, kind, statistic, LEAST_HIGHLIGHT, "fraction of the tissue",
+                         "saturated pixels without colour", 0.01, reason, {"fixed_fraction": fixed},
+                         Curve("highlights, percent of the tissue", "time", clip.times, {"highlights": 100 * fraction},
                          100 * LEAST_HIGHLIGHT),
-                   Map("highlight, percent of the frames", 100 * picture / len(fraction)))  # fmt: skip
+                         Map("highlight, percent of the frames", 100 * picture / len(fraction)))  # fmt: skip
 
 
 def highlights(image: NDArray[np.uint8]) -> BoolArray:

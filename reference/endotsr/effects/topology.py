@@ -17,7 +17,7 @@ import numpy as np
 from endotsr.effects.clip import Clip
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import matched
-from endotsr.effects.verdict import UNKNOWN, Map, Verdict
+from endotsr.effects.verdict import UNKNOWN, EffectVerdict, Map
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import warp_bilinear
 
@@ -45,7 +45,7 @@ class End(NamedTuple):
         return 1.0 - int(self.lost.sum()) / candidates if candidates else 0.0
 
 
-def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> Verdict:
+def topology_verdict(clip: Clip, clear: BoolArray, noise: Noise, camera_moves: bool = False) -> EffectVerdict:
     """Whether tissue appears or vanishes for good.
 
     clear    (m,) False for training frames that blur or smoke spoils; they are not compared
@@ -129,7 +129,7 @@ def _largest_region(lost: BoolArray) -> int:
     return int(np.bincount(numbers.ravel())[1:].max(initial=0))
 
 
-def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> Verdict:
+def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str = "") -> EffectVerdict:
     """The answer; `why` says what leaves it open."""
     pixels = 0 if end is None else end.region * clip.shrink**2
     reason = {
@@ -138,9 +138,9 @@ def _verdict(kind: str, statistic: float, clip: Clip, end: End | None, why: str 
         "suspected": f"One end of the clip shows a region of {pixels} pixels that the other end does not.",
     }[kind]
     picture = np.full(clip.images.shape[2:], np.nan) if end is None else _picture(end)
-    return Verdict("topology change", kind == "suspected", kind, statistic, 1.0, "times the threshold",
-                   "largest region that only one end of the clip shows, over 0.3 % of the tissue", 0.05, reason,
-                   {"pixels": pixels}, None, Map("tissue that only one end shows", picture))  # fmt: skip
+    return EffectVerdict("topology change", kind == "suspected", kind, statistic, 1.0, "times the threshold",
+                         "largest region that only one end of the clip shows, over 0.3 % of the tissue", 0.05, reason,
+                         {"pixels": pixels}, None, Map("tissue that only one end shows", picture))  # fmt: skip
 
 
 def _picture(end: End) -> FloatArray:

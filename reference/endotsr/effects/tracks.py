@@ -23,7 +23,7 @@ MOST_NULL = 16  # copies of the reference frame
 VISIBLE_FRAMES = 0.6  # a tile counts where it is tissue in at least this fraction of the frames
 
 
-class Tracks(NamedTuple):
+class FlowTracks(NamedTuple):
     """Flow from the reference frame to the m training frames, pixels of the full size."""
 
     flow: NDArray[np.float32]  # (m, 2, h, w) on the working grid
@@ -52,7 +52,7 @@ def matched(clip: Clip, grey: FloatArray, start: int, end: int, sigma: float) ->
     return Match(before, after, flow, seen)
 
 
-def make_tracks(clip: Clip, noise: Noise) -> Tracks:
+def make_tracks(clip: Clip, noise: Noise) -> FlowTracks:
     """Flow, its mean in tiles, its null, and the aligned frames."""
     sigma, grey = float(noise.working.mean()), clip.luminance
     flow, valid, tiles, aligned = [], [], [], []
@@ -66,10 +66,10 @@ def make_tracks(clip: Clip, noise: Noise) -> Tracks:
     null = noise_flow(grey[clip.reference], clip.masks[clip.reference], sigma, copies) * clip.shrink
     stacked = np.array(tiles)
     usable = _usable(stacked, null, clip.count)
-    return Tracks(np.array(flow), np.array(valid), stacked, usable, null, np.array(aligned))
+    return FlowTracks(np.array(flow), np.array(valid), stacked, usable, null, np.array(aligned))
 
 
-def without_frames(tracks: Tracks, spoiled: BoolArray) -> Tracks:
+def without_frames(tracks: FlowTracks, spoiled: BoolArray) -> FlowTracks:
     """The tracks with some frames (m,) not seen; tiles that too few of the other frames see are dropped."""
     tiles = np.where(spoiled[:, None, None], np.nan, tracks.tiles)
     return tracks._replace(tiles=tiles, usable=_usable(tiles, tracks.null, max(int((~spoiled).sum()), 1)))
@@ -110,7 +110,7 @@ def noise_flow(grey: FloatArray, mask: BoolArray, sigma: float, copies: int) -> 
     return np.sqrt(np.mean(squares, axis=0))
 
 
-def filled_tiles(tracks: Tracks, times: FloatArray) -> FloatArray:
+def filled_tiles(tracks: FlowTracks, times: FloatArray) -> FloatArray:
     """Tile flow of the usable tiles (m, 2, U), frames in which a tile is hidden interpolated over time."""
     tiles = tracks.tiles[:, :, tracks.usable].copy()
     for column in tiles.reshape(len(times), -1).T:

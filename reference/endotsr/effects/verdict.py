@@ -26,7 +26,7 @@ class Map(NamedTuple):
     values: FloatArray  # (h, w)
 
 
-class Verdict(NamedTuple):
+class EffectVerdict(NamedTuple):
     """The result of one test."""
 
     effect: str  # key of `inspect.EFFECTS`
@@ -57,7 +57,7 @@ class Verdict(NamedTuple):
         return 1.0 - 0.5 * (small / large) ** 2 if large > 0 else 0.5
 
 
-def verdict_record(verdict: Verdict) -> dict[str, Any]:
+def verdict_record(verdict: EffectVerdict) -> dict[str, Any]:
     """The verdict as JSON-able data, without picture and curve."""
     fields = verdict._asdict()
     kept = {k: v for k, v in fields.items() if k not in ("curve", "map", "details")}

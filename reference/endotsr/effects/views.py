@@ -9,7 +9,7 @@ than half a grey level. A fixed camera sees every resting point from one directi
 import numpy as np
 
 from endotsr.effects.clip import Clip
-from endotsr.effects.verdict import UNKNOWN, Verdict
+from endotsr.effects.verdict import UNKNOWN, EffectVerdict
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
 from endotsr.sequences.sequence import Sequence
@@ -23,24 +23,25 @@ SEED = 21
 HIGHEST = 3
 
 
-def view_verdict(sequence: Sequence, clip: Clip) -> Verdict:
+def view_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
     """The highest degree that the views determine; `kind` is "degree D"."""
     test = "change of colour by a typical coefficient of degree 1 between frames"
     if sequence.static_camera:
-        return Verdict("view change", False, "degree 0", 0.0, LEAST_CHANGE, "display units", test, 0.0,
-                       "The camera is fixed: every point keeps one view direction.",
-                       {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
+        return EffectVerdict("view change", False, "degree 0", 0.0, LEAST_CHANGE, "display units", test, 0.0,
+                             "The camera is fixed: every point keeps one view direction.",
+                             {"degree": 0, "changes": [0.0] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
     directions = view_directions(clip)
     if not len(directions):
-        return Verdict("view change", True, UNKNOWN, LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
-                       "Without depth the view directions are not known; every degree is assumed.",
-                       {"degree": HIGHEST, "changes": [LEAST_CHANGE] * HIGHEST, "angle_degrees": 0.0})  # fmt: skip
+        reason = "Without depth the view directions are not known; every degree is assumed."
+        details = {"degree": HIGHEST, "changes": [LEAST_CHANGE] * HIGHEST, "angle_degrees": 0.0}
+        return EffectVerdict("view change", True, UNKNOWN, LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
+                             reason, details)  # fmt: skip
     changes = [float(np.median([band_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
     degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
     angle = float(np.degrees(np.median([_spread(d) for d in directions])))
     reason = f"The views of a point differ by up to {angle:.2g} degrees, which determines harmonics to degree {degree}."
-    return Verdict("view change", degree > 0, f"degree {degree}", changes[0], LEAST_CHANGE, "display units", test,
-                   0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
+    return EffectVerdict("view change", degree > 0, f"degree {degree}", changes[0], LEAST_CHANGE, "display units", test,
+                         0.01, reason, {"degree": degree, "changes": changes, "angle_degrees": angle})  # fmt: skip
 
 
 def view_directions(clip: Clip) -> FloatArray:

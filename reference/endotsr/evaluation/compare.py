@@ -25,7 +25,7 @@ class Method(NamedTuple):
     digests: dict[str, str]  # array -> SHA-256 of the frames and masks it was measured on; empty if unknown
 
 
-class Difference(NamedTuple):
+class PairedDifference(NamedTuple):
     """A paired difference to the first method, over the frames for which both have a value."""
 
     mean: float
@@ -41,7 +41,7 @@ class Row(NamedTuple):
     label: str
     metric: str
     mean: float | None
-    difference: Difference | None  # None for the first method, and without a common frame
+    difference: PairedDifference | None  # None for the first method, and without a common frame
 
 
 def methods_of(metrics: dict[str, Any], label: str, where: object, baselines: bool = False) -> list[Method]:
@@ -114,14 +114,14 @@ def _column(method: Method, metric: str) -> FloatArray:
     return np.array([np.nan if value is None else float(value) for value in values], np.float64)
 
 
-def _paired(difference: FloatArray, metric: str, seed: int) -> Difference | None:
+def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference | None:
     """Mean, interval and count of the differences; NaN entries are left out."""
     known = difference[np.isfinite(difference)]
     if not known.size:
         return None
     low, high = interval(known, seed)
     better = int(np.count_nonzero(known < 0 if metric in SMALLER_IS_BETTER else known > 0))
-    return Difference(float(known.mean()), low, high, better, known.size)
+    return PairedDifference(float(known.mean()), low, high, better, known.size)
 
 
 def interval(values: FloatArray, seed: int = 0) -> tuple[float, float]:

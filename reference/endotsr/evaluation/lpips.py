@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.untrusted.arrays import Refused, open_npz
+from endotsr.untrusted.arrays import RefusedArray, open_npz
 
 InputRange = Literal["zero_one", "minus_one_one"]
 
@@ -156,7 +156,7 @@ def _read_weights(path: Path) -> LpipsWeights:
     try:
         with open_npz(path, LARGEST_FILE, compressed=True) as file:
             arrays = {name: file.read(name) for name in file.names}
-    except Refused as error:
+    except RefusedArray as error:
         raise InputError(f"{path}: LPIPS weights cannot be read: {error}") from None
     kernels, biases, heads = [], [], []
     for layer, (before, after, size) in enumerate(zip(CHANNELS[:-1], CHANNELS[1:], KERNELS), start=1):

@@ -24,7 +24,7 @@ from endotsr.runs.records import check_sequence_record
 from endotsr.runs.sources import remembered_cameras
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, pose_at, trained
-from endotsr.untrusted.arrays import Refused, open_npz
+from endotsr.untrusted.arrays import RefusedArray, open_npz
 from endotsr.untrusted.json import integer, parsed
 
 FORMAT = "endotsr slim model"
@@ -85,7 +85,7 @@ def load_slim_model(path: Path) -> SlimModel:
         with open_npz(path, LARGEST_FILE, compressed=True) as file:
             entries = {name: file.read(name) for name in file.names}
         header = parsed(entries.pop(HEADER).tobytes(), f"{path}: header")
-    except (Refused, KeyError) as error:
+    except (RefusedArray, KeyError) as error:
         raise InputError(f"{path}: not a slim model, or damaged: {error}") from None
     if not isinstance(header, dict) or (header.get("format"), header.get("version")) != (FORMAT, VERSION):
         raise InputError(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.untrusted.arrays import Refused, open_npz
+from endotsr.untrusted.arrays import RefusedArray, open_npz
 
 ARRAYS = {"xyz": (3,), "log_scale": (3,), "quat_wxyz": (4,), "rgb": (3,), "opacity": ()}
 LARGEST_FILE = 1 << 32  # bytes
@@ -24,7 +24,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             found = {name: file.read(name) for name in ARRAYS}
     except InputError:
         raise
-    except (Refused, KeyError) as error:
+    except (RefusedArray, KeyError) as error:
         reason = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
         raise InputError(f"{path}: not a trained scene: {reason}; allowed: an npz with {', '.join(ARRAYS)}") from None
     for name, rest in ARRAYS.items():

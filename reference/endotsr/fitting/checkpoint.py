@@ -28,7 +28,7 @@ from endotsr.fitting.checkpoint_values import check_numbers, check_shapes
 from endotsr.scene.density_control import DensityStatistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, trained
-from endotsr.untrusted.arrays import NpzFile, Refused, open_npz
+from endotsr.untrusted.arrays import NpzFile, RefusedArray, open_npz
 from endotsr.untrusted.files import rename
 from endotsr.untrusted.json import parsed
 from endotsr.untrusted.names import shown
@@ -200,7 +200,7 @@ def _read(path: Path, file: NpzFile, key: str) -> NDArray:
         raise DamagedCheckpoint(f"{path}: {key}: missing")
     try:
         return file.read(key)
-    except Refused as error:
+    except RefusedArray as error:
         raise DamagedCheckpoint(f"{path}: {key}: cannot be read: {error}") from None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from endotsr.effects.inspect import Inspection
 from endotsr.effects.plan import Plan
-from endotsr.effects.verdict import UNKNOWN, Curve, Map, Verdict
+from endotsr.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.report import curves, figures, parts, tables
 from endotsr.report.style import Theme
 from endotsr.runs.files import replace_file
@@ -143,7 +143,7 @@ def _pictures(inspection: Inspection) -> str:
     return parts.section("What the tests saw", f'<div class="charts">{first}{"".join(shown)}</div>')
 
 
-def _panel(verdict: Verdict) -> str:
+def _panel(verdict: EffectVerdict) -> str:
     found = ""
     if verdict.map is not None:
         found += _figure(f"{verdict.effect}: {verdict.map.name}", _map_image(verdict.map))

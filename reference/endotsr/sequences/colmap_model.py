@@ -1,7 +1,7 @@
 """COLMAP models, text or binary: cameras, images with their poses, and points.
 
-Comes in: a folder with cameras, images and points3D (.txt or .bin); goes out: a `Model`. COLMAP's conventions are this
-project's: world-to-camera, OpenCV axes, the centre of the first pixel at (0.5, 0.5). Quaternions are w x y z.
+Comes in: a folder with cameras, images and points3D (.txt or .bin); goes out: a `ColmapModel`. COLMAP's conventions are
+this project's: world-to-camera, OpenCV axes, the centre of the first pixel at (0.5, 0.5). Quaternions are w x y z.
 """
 
 import struct
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import Lens, Pose, checked_lens
+from endotsr.sequences.recording import CameraPose, Lens, checked_lens
 from endotsr.untrusted.files import read_bytes, read_text
 
 LARGEST_FILE = 1 << 31  # bytes of images.bin: enough for ninety million observations
@@ -36,11 +36,11 @@ class ModelImage(NamedTuple):
 
     name: str
     camera: int
-    pose: Pose
+    pose: CameraPose
     points: NDArray[np.int64]  # identities of the points it sees
 
 
-class Model(NamedTuple):
+class ColmapModel(NamedTuple):
     """A whole model."""
 
     cameras: dict[int, Lens]
@@ -56,7 +56,7 @@ def find_model(path: Path) -> Path | None:
     return None
 
 
-def read_model(folder: Path) -> Model:
+def read_model(folder: Path) -> ColmapModel:
     """The model in a folder; text is preferred where both forms exist.
 
     Raises:  InputError naming the file and the line, or the byte, at which it departs from the format.
@@ -75,7 +75,7 @@ def read_model(folder: Path) -> Model:
     for image in images:
         if image.camera not in cameras:
             raise InputError(f"{folder}: image {image.name}: camera {image.camera} is not in cameras{ending}")
-    return Model(cameras, sorted(images, key=lambda image: image.name), points)
+    return ColmapModel(cameras, sorted(images, key=lambda image: image.name), points)
 
 
 def _lens(name: str, width: int, height: int, values: list[float], where: str) -> Lens:
@@ -89,13 +89,13 @@ def _lens(name: str, width: int, height: int, values: list[float], where: str) -
     return checked_lens(lens, where)
 
 
-def _pose(values: list[float] | FloatArray, where: str) -> Pose:
+def _pose(values: list[float] | FloatArray, where: str) -> CameraPose:
     from scipy.spatial.transform import Rotation
 
     numbers = np.array(values, np.float64)
     if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[:4]) - 1) > 1e-2:
         raise InputError(f"{where}: no pose: allowed: a unit quaternion w x y z and three finite numbers")
-    return Pose(Rotation.from_quat(numbers[[1, 2, 3, 0]]).as_matrix(), numbers[4:7])
+    return CameraPose(Rotation.from_quat(numbers[[1, 2, 3, 0]]).as_matrix(), numbers[4:7])
 
 
 def _lines(path: Path) -> list[tuple[int, str]]:

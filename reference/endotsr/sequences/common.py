@@ -21,7 +21,7 @@ from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.read_frames import FrameFiles
-from endotsr.sequences.recording import Pair, Pose, Recording, colour_picture, grey_plane
+from endotsr.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.sequences.splits import parse_frame_range, split_frames
@@ -39,7 +39,7 @@ class Contents(NamedTuple):
     right: list[Path]  # empty: no right pictures
     masks: list[Path]  # empty: no masks
     depth: list[Path]  # empty: no depth
-    poses: list[Pose] | None
+    poses: list[CameraPose] | None
 
 
 def recognises(path: Path) -> bool:
@@ -159,7 +159,7 @@ def cameras_of(contents: Contents) -> list[Camera]:
         all((p.rotation == poses[0].rotation).all() for p in poses)
         and all((p.translation == poses[0].translation).all() for p in poses)
     ):
-        pose = poses[0] if poses else Pose(np.eye(3), np.zeros(3))
+        pose = poses[0] if poses else CameraPose(np.eye(3), np.zeros(3))
         return [Camera(pose.rotation, pose.translation, *lens)] * count
     return [Camera(pose.rotation, pose.translation, *lens) for pose in poses]
 
@@ -183,10 +183,10 @@ def open_common(folder: Path) -> Recording:
     found = contents.file
     scale = found.to_scene(found.depth.unit) * found.depth.scale if found.depth else 1.0
 
-    def pictures(wanted: list[int]) -> Iterator[Pair]:
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
             right = _colour(contents, contents.right[i]) if contents.right else None
-            yield Pair(_colour(contents, contents.images[i]), right)
+            yield PicturePair(_colour(contents, contents.images[i]), right)
 
     def mask(i: int) -> NDArray[np.bool_]:
         assert found.masks is not None

@@ -21,7 +21,7 @@ from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.given_depth import Kind, depth_of_values
 from endotsr.sequences.prepare import step_of_depth
-from endotsr.sequences.recording import ARBITRARY, Pair, Recording
+from endotsr.sequences.recording import ARBITRARY, PicturePair, Recording
 from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.sequences.writing import new_folder, replace_text
@@ -53,7 +53,7 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[De
         )
     lens, baseline = recording.lens, recording.baseline
     disparity_range(settings, lens, baseline)
-    pairs: list[Pair] = []
+    pairs: list[PicturePair] = []
     depths: list[NDArray[np.float32]] = []
     for i, pair in enumerate(recording.pictures(list(range(recording.count)))):
         if pair.right is None:
@@ -70,7 +70,7 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[De
         yield DepthFrame(_consistent(depths[-2:], pairs[-2:], len(depths[-2:]) - 1), recording.names[-1])
 
 
-def _consistent(depths: list[NDArray[np.float32]], pairs: list[Pair], middle: int) -> NDArray[np.float32]:
+def _consistent(depths: list[NDArray[np.float32]], pairs: list[PicturePair], middle: int) -> NDArray[np.float32]:
     return temporal_median(depths, [pair.left for pair in pairs], middle)
 
 

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import Lens, Pose
+from endotsr.sequences.recording import CameraPose, Lens
 
 LEAST_POINTS = 4  # for a triangulation
 
 
-def depth_from_points(points: FloatArray, pose: Pose, lens: Lens, method: str) -> NDArray[np.float32]:
+def depth_from_points(points: FloatArray, pose: CameraPose, lens: Lens, method: str) -> NDArray[np.float32]:
     """View-space z at the pixels of the points, or inside their hull.
 
     points   (n, 3) world positions that this frame sees

@@ -21,7 +21,7 @@ from endotsr.sequences.checks.guard import notes_of
 from endotsr.sequences.depth_files import CLIPPED
 from endotsr.sequences.files import shortened
 from endotsr.sequences.points import depth_from_points
-from endotsr.sequences.recording import ARBITRARY, Lens, Pair, Pose, Recording
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, PicturePair, Recording
 from endotsr.sequences.sequence_file import (
     DEPTH,
     FORMAT,
@@ -127,7 +127,7 @@ def written_times(
 
 def _poses_and_masks(
     recording: Recording, chosen: list[int], gaps: str, notes: list[str]
-) -> tuple[list[int], list[Pose] | None]:
+) -> tuple[list[int], list[CameraPose] | None]:
     """The frames that are written and their poses; gaps are refused, left out or filled, and named."""
     lacking: dict[str, list[int]] = {}
     if recording.poses is not None:
@@ -155,7 +155,7 @@ def _write_frames(
     recording: Recording,
     folder: Path,
     chosen: list[int],
-    poses: list[Pose] | None,
+    poses: list[CameraPose] | None,
     settings: PrepareSettings,
     notes: list[str],
     on_frame: OnFrame,
@@ -197,7 +197,7 @@ def _write_frames(
     return _file_of(recording, straight, turned, chosen, depth_scale, settings, notes)
 
 
-def _checked(recording: Recording, i: int, pair: Pair, straight: Straightener) -> Pair:
+def _checked(recording: Recording, i: int, pair: PicturePair, straight: Straightener) -> PicturePair:
     """The pictures in the new camera. Raises InputError for a frame of another size than the first."""
     size = pair.left.shape[:2]
     expected = straight.left.x.shape if straight.left else None
@@ -224,7 +224,7 @@ def _mask_or_nearest(recording: Recording, i: int, chosen: list[int]) -> NDArray
 
 
 def _depth(
-    recording: Recording, i: int, straight: Straightener, pose: Pose | None, points: str, size: tuple[int, ...]
+    recording: Recording, i: int, straight: Straightener, pose: CameraPose | None, points: str, size: tuple[int, ...]
 ) -> NDArray[np.float32] | None:
     if recording.depth is not None:
         found = recording.depth(i)
@@ -246,7 +246,7 @@ def step_of_depth(largest: float) -> float:
     return float(f"{next(factor for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)) * power:.1g}")
 
 
-def _write_pictures(folder: Path, k: int, pair: Pair, ending: str) -> None:
+def _write_pictures(folder: Path, k: int, pair: PicturePair, ending: str) -> None:
     for name, picture in ((IMAGES, pair.left), (RIGHT, pair.right)):
         if picture is not None:
             (folder / name).mkdir(exist_ok=True)
@@ -271,7 +271,7 @@ def _write_depth(folder: Path, k: int, depth: NDArray[np.float32], step: float) 
 def _file_of(
     recording: Recording,
     straight: Straightener,
-    poses: list[Pose] | None,
+    poses: list[CameraPose] | None,
     chosen: list[int],
     depth_scale: float,
     settings: PrepareSettings,
@@ -305,6 +305,6 @@ def camera_entry(lens: Lens, baseline: float | None) -> CameraEntry:
     )
 
 
-def pose_row(pose: Pose) -> list[float]:
+def pose_row(pose: CameraPose) -> list[float]:
     """The twelve numbers of [poses] matrices."""
     return [float(value) for value in np.column_stack([pose.rotation, pose.translation]).ravel()]

@@ -49,14 +49,14 @@ class Rig(NamedTuple):
     translation: FloatArray  # (3,) millimetres
 
 
-class Pose(NamedTuple):
+class CameraPose(NamedTuple):
     """World-to-camera, OpenCV axes: x_camera = rotation @ x_world + translation."""
 
     rotation: FloatArray  # (3, 3)
     translation: FloatArray  # (3,) in the unit of the recording
 
 
-class Pair(NamedTuple):
+class PicturePair(NamedTuple):
     """The pictures of one moment."""
 
     left: Picture
@@ -78,7 +78,7 @@ class Recording:
     layout: str
     where: Path
     names: list[str]
-    pictures: Callable[[list[int]], Iterator[Pair]]  # of ascending frame numbers
+    pictures: Callable[[list[int]], Iterator[PicturePair]]  # of ascending frame numbers
     masks: Callable[[int], NDArray[np.bool_] | None] | None = None  # None: this frame has no mask
     proposed: bool = False  # a program made the masks, and nobody has checked them
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
@@ -89,7 +89,7 @@ class Recording:
     lens: Lens | None = None
     rig: Rig | None = None
     baseline: float | None = None  # of a rectified pair, in `unit`
-    poses: list[Pose | None] | None = None
+    poses: list[CameraPose | None] | None = None
     rate: float | None = None  # frames a second
     times: NDArray[np.float64] | None = None  # seconds of every frame, ascending; None: evenly spaced
     notes: list[str] = field(default_factory=list)

@@ -42,7 +42,7 @@ import numpy as np
 from endotsr.config import Section, checked, read_toml, refuse_unknown_keys, toml_text
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Lens, Pose, checked_lens
+from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, CameraPose, Lens, checked_lens
 
 FILE_NAME = "sequence.toml"
 FORMAT = "endotsr-sequence-1"
@@ -186,7 +186,7 @@ def _plain_name(folder: str) -> bool:
     return bool(folder) and Path(folder).name == folder and folder not in (".", "..")
 
 
-def read_poses(found: SequenceFile, path: Path) -> list[Pose] | None:
+def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
     """World-to-camera poses in OpenCV axes, translation in scene units; None if the camera rests.
 
     Raises:  InputError naming the frame.
@@ -200,7 +200,7 @@ def read_poses(found: SequenceFile, path: Path) -> list[Pose] | None:
     return [_pose(row, entry, scale, f"{path}: poses.matrices: frame {i}") for i, row in enumerate(entry.matrices)]
 
 
-def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> Pose:
+def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> CameraPose:
     if len(row) != 12:
         raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")
     matrix = np.array(row, np.float64).reshape(3, 4)
@@ -212,13 +212,13 @@ def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> Pose:
         raise InputError(f"{where}: the translation is not finite")
     if entry.direction == "camera_to_world":
         return inverse_pose(rotation, translation)
-    return Pose(rotation, translation)
+    return CameraPose(rotation, translation)
 
 
-def inverse_pose(rotation: FloatArray, translation: FloatArray) -> Pose:
+def inverse_pose(rotation: FloatArray, translation: FloatArray) -> CameraPose:
     """World-to-camera from camera-to-world, and back."""
     turned = np.ascontiguousarray(rotation.T)
-    return Pose(turned, -turned @ translation + 0.0)
+    return CameraPose(turned, -turned @ translation + 0.0)
 
 
 def checked_rotation(matrix: FloatArray, where: object) -> FloatArray:

@@ -18,8 +18,8 @@ from endotsr.sequences.recording import (
     ARBITRARY,
     MILLIMETRES,
     Lens,
-    Pair,
     Picture,
+    PicturePair,
     Recording,
     Rig,
     checked_lens,
@@ -41,20 +41,20 @@ def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
     return list_pictures(path, endings)
 
 
-def split_pair(picture: Picture, stereo: str, where: object) -> Pair:
+def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
     """Left and right of one stored picture: side by side (left half first), stacked (left on top), or none.
 
     Raises:  InputError for a picture that has no two equal halves.
     """
     height, width = picture.shape[:2]
     if stereo == "none":
-        return Pair(picture)
+        return PicturePair(picture)
     if (width if stereo == "side_by_side" else height) % 2:
         side = "width" if stereo == "side_by_side" else "height"
         raise InputError(f"{where}: {width}x{height} pixels: a {stereo} pair has an even {side}")
     if stereo == "side_by_side":
-        return Pair(picture[:, : width // 2], picture[:, width // 2 :])
-    return Pair(picture[: height // 2], picture[height // 2 :])
+        return PicturePair(picture[:, : width // 2], picture[:, width // 2 :])
+    return PicturePair(picture[: height // 2], picture[height // 2 :])
 
 
 def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
@@ -64,14 +64,14 @@ def halves(width: int, height: int, stereo: str) -> tuple[int, int]:
 
 def pictures_from_files(
     left: list[Path], right: list[Path], stereo: str = "none"
-) -> Callable[[list[int]], Iterator[Pair]]:
+) -> Callable[[list[int]], Iterator[PicturePair]]:
     """Frames from picture files: two lists, or one whose pictures hold both."""
 
-    def pictures(wanted: list[int]) -> Iterator[Pair]:
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
             picture = colour_picture(read_picture(left[i]), left[i])
             if right:
-                yield Pair(picture, colour_picture(read_picture(right[i]), right[i]))
+                yield PicturePair(picture, colour_picture(read_picture(right[i]), right[i]))
             else:
                 yield split_pair(picture, stereo, left[i])
 

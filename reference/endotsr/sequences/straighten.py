@@ -14,7 +14,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv import area_resize
 from endotsr.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
 from endotsr.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
-from endotsr.sequences.recording import Lens, Pair, Picture, Pose, Recording, lens_of_matrix, opencv_matrix
+from endotsr.sequences.recording import CameraPose, Lens, Picture, PicturePair, Recording, lens_of_matrix, opencv_matrix
 
 SKEWED = 0.5  # of the baseline: a pair whose cameras stand higher than wide apart by more is not side by side
 
@@ -31,10 +31,10 @@ class Straightener:
     notes: list[str]
     clipped: bool = False  # the depth of the recording is already
 
-    def pictures(self, pair: Pair) -> Pair:
+    def pictures(self, pair: PicturePair) -> PicturePair:
         """Both pictures in the new camera."""
         left = self._picture(pair.left, self.left)
-        return Pair(left, None if pair.right is None else self._picture(pair.right, self.right))
+        return PicturePair(left, None if pair.right is None else self._picture(pair.right, self.right))
 
     def _picture(self, picture: Picture, maps: Maps | None) -> Picture:
         return area_resize(remapped(picture, maps) if maps else picture, self.lens.width, self.lens.height)
@@ -58,11 +58,11 @@ class Straightener:
         plane = depth if self.clipped else clip_depth(depth, CLIPPED)
         return reduced_depth(plane, self.lens.width, self.lens.height)
 
-    def pose(self, pose: Pose) -> Pose:
+    def pose(self, pose: CameraPose) -> CameraPose:
         """World-to-camera of the new left camera."""
         if (self.turn == np.eye(3)).all():
             return pose
-        return Pose(self.turn @ pose.rotation, self.turn @ pose.translation)
+        return CameraPose(self.turn @ pose.rotation, self.turn @ pose.translation)
 
 
 def straightener(recording: Recording, width: int, height: int, scale: float) -> Straightener:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Pose
+from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, CameraPose
 from endotsr.sequences.sequence_file import OPENGL, inverse_pose
 from endotsr.untrusted.files import read_text
 
@@ -23,7 +23,7 @@ class Trajectory(NamedTuple):
     """Poses by stamp, ascending."""
 
     stamps: NDArray[np.float64]  # (n,)
-    poses: list[Pose]  # world-to-camera, OpenCV axes
+    poses: list[CameraPose]  # world-to-camera, OpenCV axes
     path: Path
 
     @property
@@ -77,18 +77,20 @@ def _rows(path: Path) -> tuple[FloatArray, list[int]]:
     return np.array(rows), lines
 
 
-def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> Pose:
+def _pose(row: FloatArray, scale: float, direction: str, axes: str) -> CameraPose:
     from scipy.spatial.transform import Rotation
 
     rotation, translation = Rotation.from_quat(row[4:]).as_matrix(), row[1:4] * scale
     if direction == "camera_to_world":
         rotation, translation = inverse_pose(rotation, translation)
-    return Pose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else Pose(rotation, translation)
+    return (
+        CameraPose(OPENGL @ rotation, OPENGL @ translation) if axes == "opengl" else CameraPose(rotation, translation)
+    )
 
 
 def poses_of_frames(
     trajectory: Trajectory, count: int, rate: float | None, times: FloatArray | None = None
-) -> tuple[list[Pose | None], str]:
+) -> tuple[list[CameraPose | None], str]:
     """One pose a frame, None where there is none, and a sentence on how stamps became frames.
 
     times   seconds of the frames from the first one; None: evenly spaced at `rate`
@@ -100,7 +102,7 @@ def poses_of_frames(
     """
     stamps = trajectory.stamps
     if trajectory.counts_frames and stamps[-1] < count:
-        found: list[Pose | None] = [None] * count
+        found: list[CameraPose | None] = [None] * count
         for stamp, pose in zip(stamps, trajectory.poses):
             found[int(stamp)] = pose
         return found, "stamps are frame numbers"
@@ -115,7 +117,7 @@ def poses_of_frames(
     return poses_at(trajectory, moments, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
 
 
-def poses_at(trajectory: Trajectory, moments: FloatArray, longest: float) -> list[Pose | None]:
+def poses_at(trajectory: Trajectory, moments: FloatArray, longest: float) -> list[CameraPose | None]:
     """Poses at moments, between the two nearest of the trajectory; None outside, and in gaps longer than `longest`."""
     stamps, found = trajectory.stamps, []
     for moment in moments:
@@ -131,16 +133,16 @@ def poses_at(trajectory: Trajectory, moments: FloatArray, longest: float) -> lis
     return found
 
 
-def pose_between(a: Pose, b: Pose, fraction: float) -> Pose:
+def pose_between(a: CameraPose, b: CameraPose, fraction: float) -> CameraPose:
     """The pose at a fraction of the way: the centre on the straight line, the rotation on the shortest arc."""
     from scipy.spatial.transform import Rotation, Slerp
 
     centres = [-pose.rotation.T @ pose.translation for pose in (a, b)]
     rotation = Slerp([0.0, 1.0], Rotation.from_matrix([a.rotation, b.rotation]))(fraction).as_matrix()
-    return Pose(rotation, -rotation @ (centres[0] + fraction * (centres[1] - centres[0])))
+    return CameraPose(rotation, -rotation @ (centres[0] + fraction * (centres[1] - centres[0])))
 
 
-def filled(poses: list[Pose | None]) -> list[Pose]:
+def filled(poses: list[CameraPose | None]) -> list[CameraPose]:
     """Gaps filled from the neighbours on both sides; before the first and after the last, the nearest pose."""
     known = [i for i, pose in enumerate(poses) if pose is not None]
     found = []

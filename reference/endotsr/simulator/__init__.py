@@ -1,15 +1,15 @@
 """Sequences with known truth: a deforming tissue sheet under an endoscope. Every effect has its own switch."""
 
 from endotsr.simulator.settings import EFFECTS, SimulatorSettings, with_effects
-from endotsr.simulator.simulate import SimulatedSequence, Truth, simulate
+from endotsr.simulator.simulate import SequenceTruth, SimulatedSequence, simulate
 from endotsr.simulator.trajectories import MaterialTracks, material_at, material_tracks
 
 __all__ = [
     "EFFECTS",
     "MaterialTracks",
+    "SequenceTruth",
     "SimulatedSequence",
     "SimulatorSettings",
-    "Truth",
     "material_at",
     "material_tracks",
     "simulate",

@@ -13,14 +13,14 @@ import numpy as np
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.slit import is_open, slit_coordinates
 from endotsr.simulator.surface import Surface
-from endotsr.simulator.views import View, put, rotate, see_side, see_wound
+from endotsr.simulator.views import SurfaceView, put, rotate, see_side, see_wound
 from endotsr.splatting.camera import Camera
 
 STEP = 4  # pixels between two nodes
 GEOMETRY = ("material", "point", "normal", "depth")
 
 
-def see_coarsely(surface: Surface, camera: Camera, t: float) -> View:
+def see_coarsely(surface: Surface, camera: Camera, t: float) -> SurfaceView:
     """As `views.see`, good to a hundredth of a pixel. Raises InputError as `see_rays` does."""
     ray_x = (np.arange(camera.width) + 0.5 - camera.cx) / camera.fx
     ray_y = (np.arange(camera.height) + 0.5 - camera.cy) / camera.fy
@@ -40,7 +40,9 @@ def see_coarsely(surface: Surface, camera: Camera, t: float) -> View:
     return view
 
 
-def views_during(surface: Surface, cameras: list[Camera], view: View, t: float, moments: FloatArray) -> Iterator[View]:
+def views_during(
+    surface: Surface, cameras: list[Camera], view: SurfaceView, t: float, moments: FloatArray
+) -> Iterator[SurfaceView]:
     """The view at every moment of an exposure: the material seen, with the position and normal of its middle.
 
     cameras  at the first moment, at t and at the last moment
@@ -88,7 +90,7 @@ def _node_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
 
 def _spread_view(
     surface: Surface, camera: Camera, t: float, rays: tuple[FloatArray, FloatArray], side: float | None
-) -> View:
+) -> SurfaceView:
     ray_x, ray_y = _node_rays(camera)
     sides = None if side is None else np.full_like(ray_x, side)
     coarse = see_side(surface, camera, t, ray_x, ray_y, sides)
@@ -96,7 +98,7 @@ def _spread_view(
     normal, depth = fine[2:5], fine[5]
     normal /= np.sqrt((normal**2).sum(axis=0))
     seen = np.stack([rays[0] * depth, rays[1] * depth, depth]) - camera.translation[:, None, None]
-    return View(fine[:2], rotate(camera.rotation.T, seen), normal, depth)
+    return SurfaceView(fine[:2], rotate(camera.rotation.T, seen), normal, depth)
 
 
 def _node_material(surface: Surface, camera: Camera, t: float, side: float | None) -> FloatArray:

@@ -21,7 +21,7 @@ from endotsr.sequences.poses import POSE_FILES, rows_from_cameras
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.cameras import camera_centres
 from endotsr.simulator.field_of_view import check_field_of_view
-from endotsr.simulator.frames import Scene, SimulatedFrame, make_scene, simulated_frames
+from endotsr.simulator.frames import SimulatedFrame, SimulatedScene, make_scene, simulated_frames
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.shading import lit_by_all, shade
 from endotsr.simulator.trajectories import empty_tracks, follow
@@ -69,7 +69,7 @@ def write_sequence(
     np.save(folder / POSE_FILES[0], pose_rows(scene, far))
 
 
-def frames_with_truth(folder: Path, scene: Scene, name: str) -> Iterator[SimulatedFrame]:
+def frames_with_truth(folder: Path, scene: SimulatedScene, name: str) -> Iterator[SimulatedFrame]:
     """The frames in order; the truth of each is written into `folder` before it is handed out, the rest at the end.
 
     Raises:  InputError where the settings fold the tissue over itself.
@@ -86,7 +86,7 @@ def frames_with_truth(folder: Path, scene: Scene, name: str) -> Iterator[Simulat
     write_scene(folder / TRUTH, scene, name, tracks, light)
 
 
-def tracked_points(scene: Scene) -> FloatArray:
+def tracked_points(scene: SimulatedScene) -> FloatArray:
     """The material points of the tracks, (2, P) mm: those seen on an even grid of places of frame 0."""
     camera = scene.cameras[0]
     across, down = TRACKS
@@ -96,7 +96,7 @@ def tracked_points(scene: Scene) -> FloatArray:
     return see_rays(scene.surface, camera, 0.0, (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy).material
 
 
-def tissue_light(scene: Scene, material: FloatArray, i: int) -> FloatArray:
+def tissue_light(scene: SimulatedScene, material: FloatArray, i: int) -> FloatArray:
     """Linear light (3, P) that material points send to the camera of frame i.
 
     It holds the lamps, brightening and blood; highlights, shadows, instruments, smoke, lens and gain are left out.
@@ -108,7 +108,7 @@ def tissue_light(scene: Scene, material: FloatArray, i: int) -> FloatArray:
     return shade(plain, scene.texture, view, lamps, float(scene.times[i])).light[:, 0]
 
 
-def pose_rows(scene: Scene, far: FloatArray) -> FloatArray:
+def pose_rows(scene: SimulatedScene, far: FloatArray) -> FloatArray:
     """Pose rows (n, 17) from which the reader makes the very cameras of the scene, to the last bit."""
     rows = rows_from_cameras(scene.cameras, far)
     rows[:, :15].reshape(-1, 3, 5)[:, :, 3] = camera_centres(scene.settings, scene.times)

@@ -1,8 +1,8 @@
 """The frames of a simulated scene, one after another: pictures, mask, prior depth, and the truth behind them.
 
-In: `SimulatorSettings`. Out: a `Scene`, and from it one `SimulatedFrame` at a time, so that a long sequence needs the
-memory of one frame. The order of the effects is that of the light: tissue, motion blur, instruments, smoke, lens, gain,
-display curve, sensor noise. An effect that is off is skipped, not multiplied by one.
+In: `SimulatorSettings`. Out: a `SimulatedScene`, and from it one `SimulatedFrame` at a time, so that a long sequence
+needs the memory of one frame. The order of the effects is that of the light: tissue, motion blur, instruments, smoke,
+lens, gain, display curve, sensor noise. An effect that is off is skipped, not multiplied by one.
 """
 
 from collections.abc import Iterator
@@ -25,13 +25,13 @@ from endotsr.simulator.shading import TissueLight, lit_by_all, shade
 from endotsr.simulator.smoke import with_smoke
 from endotsr.simulator.surface import Surface, make_surface
 from endotsr.simulator.texture import Texture, make_texture
-from endotsr.simulator.views import View, see
+from endotsr.simulator.views import SurfaceView, see
 from endotsr.splatting.camera import Camera
 
 LEFT_NOISE, DEPTH_NOISE, RIGHT_NOISE = 2, 3, 7  # streams of random numbers; 0, 1 and 4 to 6 make the scene
 
 
-class Scene(NamedTuple):
+class SimulatedScene(NamedTuple):
     """All that a sequence is made of."""
 
     settings: SimulatorSettings
@@ -44,7 +44,7 @@ class Scene(NamedTuple):
 class Eye(NamedTuple):
     """One of the two cameras of a frame, and what it sees."""
 
-    view: View
+    view: SurfaceView
     camera: Camera
     right: bool
 
@@ -63,18 +63,20 @@ class SimulatedFrame(NamedTuple):
     highlight: FloatArray | None  # (H, W) linear light of the highlights on the tissue; None while they are off
 
 
-def make_scene(settings: SimulatorSettings) -> Scene:
+def make_scene(settings: SimulatorSettings) -> SimulatedScene:
     """Surface, texture and cameras. Raises InputError for settings that contradict one another."""
     times = time_stamps(settings.frames)
-    return Scene(settings, times, make_cameras(settings, times), make_surface(settings), make_texture(settings))
+    return SimulatedScene(
+        settings, times, make_cameras(settings, times), make_surface(settings), make_texture(settings)
+    )
 
 
-def moves(scene: Scene) -> bool:
+def moves(scene: SimulatedScene) -> bool:
     """Whether the view changes over time."""
     return bool(scene.surface.motions) or scene.surface.slit is not None or scene.settings.camera_motion.on
 
 
-def simulated_frames(scene: Scene) -> Iterator[SimulatedFrame]:
+def simulated_frames(scene: SimulatedScene) -> Iterator[SimulatedFrame]:
     """The frames in order. Raises InputError where the settings fold the tissue over itself."""
     settings = scene.settings
     right_cameras = make_cameras(settings, scene.times, right=True) if settings.stereo.on else []
@@ -87,7 +89,7 @@ def simulated_frames(scene: Scene) -> Iterator[SimulatedFrame]:
         yield _frame(scene, left, right, i)
 
 
-def _frame(scene: Scene, left: Eye, right: Eye | None, i: int) -> SimulatedFrame:
+def _frame(scene: SimulatedScene, left: Eye, right: Eye | None, i: int) -> SimulatedFrame:
     settings, view, t = scene.settings, left.view, float(scene.times[i])
     tools = draw(settings, t)
     blocker = make_blocker(settings, tools.coverage, left.camera) if settings.shadows.on and tools is not None else None
@@ -107,7 +109,7 @@ def _frame(scene: Scene, left: Eye, right: Eye | None, i: int) -> SimulatedFrame
 
 
 def _light(
-    scene: Scene, eye: Eye, lamp: Camera, tools: Drawing | None, blocker: Blocker | None, t: float
+    scene: SimulatedScene, eye: Eye, lamp: Camera, tools: Drawing | None, blocker: Blocker | None, t: float
 ) -> tuple[FloatArray, FloatArray | None]:
     """Linear light (3, H, W) at the sensor, gain included, and the highlights on the tissue. `lamp` has the lamp."""
     settings = scene.settings
@@ -122,7 +124,7 @@ def _light(
     return light if gain is None else light * gain[:, None, None], highlight
 
 
-def tissue_light(scene: Scene, eye: Eye, lamp: Camera, blocker: Blocker | None, t: float) -> TissueLight:
+def tissue_light(scene: SimulatedScene, eye: Eye, lamp: Camera, blocker: Blocker | None, t: float) -> TissueLight:
     """The light of the tissue; with motion blur, its mean over the exposure.
 
     During an exposure the tissue moves; the lamps' light at a pixel is that of the middle of the exposure.

@@ -40,7 +40,7 @@ class Drawing(NamedTuple):
     excluded: BoolArray  # (H, W) instrument and margin
 
 
-class Pose(NamedTuple):
+class PlacedGrasper(NamedTuple):
     """One instrument at one moment, image widths."""
 
     points: FloatArray  # (2, 4) entry, wrist and the two tips
@@ -110,7 +110,7 @@ def _unmixed(light: FloatArray, coverage: FloatArray) -> FloatArray:
     return np.divide(light, coverage, out=np.zeros_like(light), where=coverage > 0)
 
 
-def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Pose:
+def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> PlacedGrasper:
     """The parts of an instrument at one moment."""
     angle = 2 * np.pi * settings.instrument.cycles * t + grasper.phase
     wrist = wrist_at(settings, grasper, t) + [shift, 0.0]
@@ -125,10 +125,10 @@ def _pose(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float)
         (grip, tips[0], JAW, METAL * 1.1),
         (grip, tips[1], JAW, METAL * 0.9),
     ]
-    return Pose(np.stack([entry, wrist, *tips], axis=1), segments)
+    return PlacedGrasper(np.stack([entry, wrist, *tips], axis=1), segments)
 
 
-def _draw_one(settings: SimulatorSettings, pose: Pose, box: tuple[slice, slice]) -> Drawing:
+def _draw_one(settings: SimulatorSettings, pose: PlacedGrasper, box: tuple[slice, slice]) -> Drawing:
     """One instrument at one moment, inside a box of the picture."""
     pixel = 1.0 / settings.width
     x, y = np.meshgrid(

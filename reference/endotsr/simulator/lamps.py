@@ -9,7 +9,7 @@ import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.simulator.views import View, rotate, to_camera
+from endotsr.simulator.views import SurfaceView, rotate, to_camera
 from endotsr.splatting.camera import Camera, camera_centre
 
 GAIN = 0.95  # linear light of a reflectance of 1, perpendicular to the view, at the scene's distance
@@ -34,7 +34,7 @@ class Blocker(NamedTuple):
 
 
 def lit_by_endoscope(
-    settings: SimulatorSettings, view: View, camera: Camera, blocker: Blocker | None, eye: Camera | None = None
+    settings: SimulatorSettings, view: SurfaceView, camera: Camera, blocker: Blocker | None, eye: Camera | None = None
 ) -> Lit:
     """The lamp at the camera: n.l with scattering, (distance / r)^2 and its beam.
 
@@ -53,7 +53,7 @@ def lit_by_endoscope(
     return Lit(diffuse, received, towards if eye is None else _half_way(view, towards, eye))
 
 
-def lit_by_second(settings: SimulatorSettings, view: View, blocker: Blocker | None, eye: Camera) -> Lit:
+def lit_by_second(settings: SimulatorSettings, view: SurfaceView, blocker: Blocker | None, eye: Camera) -> Lit:
     """The second lamp, at a fixed place and without a beam."""
     part = settings.second_light
     lamp = np.array([part.right, part.down, 0.0])
@@ -83,7 +83,7 @@ def mirrored(settings: SimulatorSettings, lit: Lit, bent: FloatArray) -> FloatAr
     return settings.highlights.strength * lit.received * mirror
 
 
-def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view: View) -> FloatArray:
+def shadow(settings: SimulatorSettings, blocker: Blocker, lamp: FloatArray, view: SurfaceView) -> FloatArray:
     """The factor on the light of a lamp at world position (3,), (H, W): 1 - strength where instruments stand between.
 
     The line from the lamp to each piece of tissue meets the plane of the instruments; their cover is read there.
@@ -110,7 +110,7 @@ def make_blocker(settings: SimulatorSettings, cover: FloatArray, camera: Camera)
     return Blocker(gaussian_filter(cover, radius, mode="nearest") if radius > 0 else cover, camera)
 
 
-def _half_way(view: View, towards: FloatArray, eye: Camera) -> FloatArray:
+def _half_way(view: SurfaceView, towards: FloatArray, eye: Camera) -> FloatArray:
     back = camera_centre(eye)[:, None, None] - view.point
     half = towards + back / np.sqrt((back**2).sum(axis=0))
     return half / np.sqrt((half**2).sum(axis=0))

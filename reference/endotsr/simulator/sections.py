@@ -50,7 +50,7 @@ class Pull(Section, frozen=True, kw_only=True):
     """normalised time at which the tissue is back"""
 
 
-class Exposure(Section, frozen=True, kw_only=True):
+class GainDrift(Section, frozen=True, kw_only=True):
     """The gain of the camera drifts, red and blue slightly apart (white balance)."""
 
     on: bool = True
@@ -109,7 +109,7 @@ class CameraMotion(Section, frozen=True, kw_only=True):
     """cycles per sequence"""
 
 
-class Noise(Section, frozen=True, kw_only=True):
+class SensorNoise(Section, frozen=True, kw_only=True):
     """Sensor noise in the picture."""
 
     on: bool = True

@@ -19,15 +19,15 @@ from endotsr.simulator.sections import (
     Cutting,
     DepthErrors,
     DepthRounding,
-    Exposure,
+    GainDrift,
     Highlights,
     Instrument,
     MoreInstruments,
     MotionBlur,
-    Noise,
     Pull,
     Pulsation,
     SecondLight,
+    SensorNoise,
     Shadows,
     Smoke,
     Stereo,
@@ -60,12 +60,12 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     breathing: Breathing = Breathing()
     pulsation: Pulsation = Pulsation()
     pull: Pull = Pull()
-    exposure: Exposure = Exposure()
+    exposure: GainDrift = GainDrift()
     brightening: Brightening = Brightening()
     highlights: Highlights = Highlights()
     instrument: Instrument = Instrument()
     camera_motion: CameraMotion = CameraMotion()
-    noise: Noise = Noise()
+    noise: SensorNoise = SensorNoise()
     depth_errors: DepthErrors = DepthErrors()
     cutting: Cutting = Cutting()
     bleeding: Bleeding = Bleeding()

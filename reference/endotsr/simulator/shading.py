@@ -1,6 +1,6 @@
 """From geometry and reflectance to linear light: lamps with fall-off, brightening tissue, blood, the wound, highlights.
 
-In: a `View` of the sheet, its texture, the lamps on it, the time. Out: linear RGB light from the tissue.
+In: a `SurfaceView` of the sheet, its texture, the lamps on it, the time. Out: linear RGB light from the tissue.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from endotsr.simulator.lamps import Blocker, Lit, bent_normal, lit_by_endoscope,
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.surface import gaussian_weight
 from endotsr.simulator.texture import Texture, sample
-from endotsr.simulator.views import View
+from endotsr.simulator.views import SurfaceView
 from endotsr.splatting.camera import Camera
 
 BLOCK_ROWS = 32  # shaded together: they stay in the processor's cache
@@ -28,7 +28,11 @@ class TissueLight(NamedTuple):
 
 
 def lit_by_all(
-    settings: SimulatorSettings, view: View, camera: Camera, blocker: Blocker | None = None, eye: Camera | None = None
+    settings: SimulatorSettings,
+    view: SurfaceView,
+    camera: Camera,
+    blocker: Blocker | None = None,
+    eye: Camera | None = None,
 ) -> list[Lit]:
     """The lamps that are on, the one at the camera first. `eye` is the camera of the view if it is another one."""
     lamps = [lit_by_endoscope(settings, view, camera, blocker, eye)]
@@ -37,7 +41,7 @@ def lit_by_all(
     return lamps
 
 
-def shade(settings: SimulatorSettings, texture: Texture, view: View, lamps: list[Lit], t: float) -> TissueLight:
+def shade(settings: SimulatorSettings, texture: Texture, view: SurfaceView, lamps: list[Lit], t: float) -> TissueLight:
     """Linear light from the tissue, before exposure.
 
     reflectance * (n.l + wrap)/(1 + wrap) * (distance / r)^2 * beam, plus a highlight (n'.half)^exponent with the same
@@ -55,13 +59,15 @@ def shade(settings: SimulatorSettings, texture: Texture, view: View, lamps: list
     return TissueLight(light, np.concatenate([part.highlight for part in parts if part.highlight is not None]))
 
 
-def _rows_of(view: View, rows: slice) -> View:
+def _rows_of(view: SurfaceView, rows: slice) -> SurfaceView:
     """Some rows of a view."""
     wound = None if view.wound is None else view.wound[rows]
-    return View(view.material[:, rows], view.point[:, rows], view.normal[:, rows], view.depth[rows], wound)
+    return SurfaceView(view.material[:, rows], view.point[:, rows], view.normal[:, rows], view.depth[rows], wound)
 
 
-def _shade_rows(settings: SimulatorSettings, texture: Texture, view: View, lamps: list[Lit], t: float) -> TissueLight:
+def _shade_rows(
+    settings: SimulatorSettings, texture: Texture, view: SurfaceView, lamps: list[Lit], t: float
+) -> TissueLight:
     """As `shade`, for some rows."""
     maps = sample(texture, view.material)
     reflectance = maps[:3]

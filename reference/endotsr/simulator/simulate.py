@@ -20,7 +20,7 @@ from endotsr.simulator.views import to_camera
 UNIT = "mm"
 
 
-class Truth(NamedTuple):
+class SequenceTruth(NamedTuple):
     """Quantities that a real sequence does not contain. Behind the instrument they are those of the hidden tissue."""
 
     depth: NDArray[np.floating]  # (n, H, W)    view-space z of the tissue, mm
@@ -34,7 +34,7 @@ class SimulatedSequence:
     """A sequence and the truth behind it."""
 
     sequence: Sequence
-    truth: Truth
+    truth: SequenceTruth
     settings: SimulatorSettings
 
     def surface_point(self, material: NDArray[np.floating], t: float) -> NDArray[np.floating]:
@@ -88,4 +88,4 @@ def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:
         test_index=test,
         notes=[f"simulated with seed {settings.seed}; tissue fraction {tissue.mean():.4f}"],
     )
-    return SimulatedSequence(sequence, Truth(depth, material, covered, scene.surface), settings)
+    return SimulatedSequence(sequence, SequenceTruth(depth, material, covered, scene.surface), settings)

@@ -20,7 +20,7 @@ from endotsr.kernels.arrays import Array
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.field_of_view import check_field_of_view
 from endotsr.simulator.folder import frames_with_truth
-from endotsr.simulator.frames import Scene, make_scene
+from endotsr.simulator.frames import SimulatedScene, make_scene
 from endotsr.simulator.instrument import graspers
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import camera_centre
@@ -62,7 +62,7 @@ def write_recording(
     write_video(folder / VIDEO, _stacked(folder, scene, name, on_frame), RATE, lossless)
 
 
-def _stacked(folder: Path, scene: Scene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
+def _stacked(folder: Path, scene: SimulatedScene, name: str, on_frame: Callable[[], object]) -> Iterator[Array]:
     """The pictures of the video, (2H, W, 3) uint8; masks and truth are written on the way."""
     from endotsr.opencv import write_png
 
@@ -77,7 +77,7 @@ def _stacked(folder: Path, scene: Scene, name: str, on_frame: Callable[[], objec
         on_frame()
 
 
-def calibration_text(scene: Scene) -> str:
+def calibration_text(scene: SimulatedScene) -> str:
     """The ini file. Its principal point counts from the centre of the first pixel, as OpenCV's does."""
     camera = scene.cameras[0]
     numbers = {
@@ -92,7 +92,7 @@ def calibration_text(scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def trajectory_text(scene: Scene) -> str:
+def trajectory_text(scene: SimulatedScene) -> str:
     """One line a frame, with all digits."""
     from scipy.spatial.transform import Rotation
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from endotsr.config import checked
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.simulator.frames import Scene, SimulatedFrame
+from endotsr.simulator.frames import SimulatedFrame, SimulatedScene
 from endotsr.simulator.gain import GainSpectrum, gain_series, gain_spectrum
 from endotsr.simulator.scenes import effects_on
 from endotsr.simulator.settings import SimulatorSettings
@@ -94,7 +94,7 @@ def write_frame(folder: Path, i: int, frame: SimulatedFrame) -> None:
     write_png(folder / "instrument" / f"{i:06d}.png", np.where(frame.covered, 255, 0).astype(np.uint8))
 
 
-def write_scene(folder: Path, scene: Scene, name: str, tracks: MaterialTracks, light: FloatArray) -> None:
+def write_scene(folder: Path, scene: SimulatedScene, name: str, tracks: MaterialTracks, light: FloatArray) -> None:
     """All that does not belong to one frame."""
     settings = scene.settings
     gain = gain_series(settings, scene.times)

@@ -1,7 +1,7 @@
 """The view of the sheet from a camera: the material point that every ray meets, its position, normal and depth.
 
-In: a surface, a camera, a time. Out: a `View`, solved by Newton's method to 1e-10 mm beside the ray. With an open slit
-a ray meets one side of it, the other side, or the wound between them.
+In: a surface, a camera, a time. Out: a `SurfaceView`, solved by Newton's method to 1e-10 mm beside the ray. With an
+open slit a ray meets one side of it, the other side, or the wound between them.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ MOST_STEPS = 30
 BLOCK_PIXELS = 16384
 
 
-class View(NamedTuple):
+class SurfaceView(NamedTuple):
     """The part of the sheet that a camera sees, per pixel."""
 
     material: FloatArray  # (2, H, W) material coordinates a, b, mm; in the wound those of the nearest edge point
@@ -33,7 +33,7 @@ class View(NamedTuple):
     wound: BoolArray | None = None  # (H, W) pixels that show the wound of an open slit; None without one
 
 
-def see(surface: Surface, camera: Camera, t: float) -> View:
+def see(surface: Surface, camera: Camera, t: float) -> SurfaceView:
     """Intersect every pixel's ray with the sheet by Newton's method on the material coordinates.
 
     Solved is X_c - p_x Z_c = 0, Y_c - p_y Z_c = 0 in (a, b), with the camera position (X_c, Y_c, Z_c) of X(a, b, t) and
@@ -51,14 +51,14 @@ def see(surface: Surface, camera: Camera, t: float) -> View:
     ]
     material, point, normal, depth = (np.concatenate(parts, axis=-2) for parts in list(zip(*blocks))[:4])
     wounds = [block.wound for block in blocks if block.wound is not None]
-    view = View(material, point, normal, depth, np.concatenate(wounds) if wounds else None)
+    view = SurfaceView(material, point, normal, depth, np.concatenate(wounds) if wounds else None)
     a, b = view.material if view.wound is None else np.where(view.wound, np.nan, view.material)
     if np.nanmin(np.diff(a, axis=1)) <= 0 or np.nanmin(np.diff(b, axis=0)) <= 0:
         raise InputError(f"simulator: at t = {t:g} the sheet folds over itself: motion or relief is too strong")
     return view
 
 
-def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
+def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
     """The view along chosen rays (ray_x, ray_y, 1) in camera axes, each array of one shape. Raises as `see` does."""
     if surface.slit is not None and is_open(surface.slit, t):
         return _see_cut(surface, camera, t, ray_x, ray_y)
@@ -67,13 +67,13 @@ def see_rays(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
 
 def see_side(
     surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray, side: FloatArray | None = None
-) -> View:
+) -> SurfaceView:
     """The view of the sheet alone, in which the side of an open slit is given for every ray and continues beyond it."""
     start = _start(surface, camera, ray_x, ray_y)
     return _meet(lambda a, b: evaluate(surface, a, b, t, side), camera, t, ray_x, ray_y, start)
 
 
-def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
+def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
     """The view of the wound of an open slit along rays that pass between its edges.
 
     The wound is the groove between the two edges: at x along and y across the slit it lies at
@@ -105,7 +105,7 @@ def see_wound(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray
     return view._replace(material=material, wound=np.ones(x.shape, bool))
 
 
-def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> View:
+def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_y: FloatArray) -> SurfaceView:
     """The view along rays with an open slit: the side on which each ray begins, else the other one, else the wound.
 
     The two sides cover different parts of the picture, so that a solution on the side it was sought on is the only one.
@@ -127,16 +127,16 @@ def _see_cut(surface: Surface, camera: Camera, t: float, ray_x: FloatArray, ray_
     return view
 
 
-def view_of_points(surface: Surface, camera: Camera, material: FloatArray, t: float) -> View:
+def view_of_points(surface: Surface, camera: Camera, material: FloatArray, t: float) -> SurfaceView:
     """The view of given material points (2, P), as a picture of one row, whether or not the camera sees them."""
     a, b = material[:, None]
     point, along_a, along_b = evaluate(surface, a, b, t)
     normal = np.stack(_cross(along_b, along_a))
     normal /= np.sqrt((normal**2).sum(axis=0))
-    return View(material[:, None], point, normal, to_camera(camera, point)[2])
+    return SurfaceView(material[:, None], point, normal, to_camera(camera, point)[2])
 
 
-def put(view: View, where: BoolArray, other: View) -> None:
+def put(view: SurfaceView, where: BoolArray, other: SurfaceView) -> None:
     """Overwrite the chosen pixels of a view by those of another, in place."""
     for target, source in zip(view, other):
         if target is not None:
@@ -150,7 +150,7 @@ def _meet(
     ray_x: FloatArray,
     ray_y: FloatArray,
     start: tuple[FloatArray, FloatArray],
-) -> View:
+) -> SurfaceView:
     """The points of a surface, given as a formula of two coordinates, that rays meet. `material` holds those two."""
     a, b = start
     for _ in range(MOST_STEPS):
@@ -173,7 +173,7 @@ def _meet(
     away = ray_x * facing[0] + ray_y * facing[1] + facing[2]
     if away.max(initial=-1) >= 0 or seen[2].min(initial=1) <= 0:
         raise InputError(f"simulator: at t = {t:g} a ray meets the back of the sheet: motion or relief is too strong")
-    return View(np.stack([a, b]), point, normal, seen[2])
+    return SurfaceView(np.stack([a, b]), point, normal, seen[2])
 
 
 def to_camera(camera: Camera, point: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.camera_model import Pinhole, intrinsics_of
 from endotsr.splatting.covariance import Shape
-from endotsr.splatting.projection_formulas import Pose, Rules
+from endotsr.splatting.projection_formulas import Rules, WorldToCamera
 from endotsr.splatting.projection_kernels import WITH_POSE, WITHOUT_POSE, project_kernel, project_reverse_kernel
 from endotsr.splatting.settings import RasterSettings
 
@@ -45,7 +45,7 @@ class ProjectionSaved(NamedTuple):
     shape: Shape
     camera: Camera
     lens: Pinhole
-    pose: Pose
+    pose: WorldToCamera
     rules: Rules
     projected: Projected
 
@@ -88,7 +88,7 @@ def projection_forward(
     n = position.shape[1]
     real, rotation = dtype.type, shape.rotation.reshape(9, n)
     lens = intrinsics_of(camera, settings, dtype)
-    pose = Pose(tuple(camera.rotation.astype(dtype).flat), tuple(camera.translation.astype(dtype)))
+    pose = WorldToCamera(tuple(camera.rotation.astype(dtype).flat), tuple(camera.translation.astype(dtype)))
     rules = Rules(real(settings.low_pass), real(settings.near), real(AXIS_LIMIT[dtype]))
     results, visible = np.empty((7, n), dtype), np.empty(n, np.bool_)
     parallel_for(project_kernel, n, position, rotation, shape.scale, lens, pose, rules, results, visible)

@@ -13,7 +13,7 @@ from endotsr.kernels.jit import jit_formula
 from endotsr.splatting.camera_model import pinhole, pinhole_reverse
 
 
-class Pose(NamedTuple):
+class WorldToCamera(NamedTuple):
     """World to camera axes, each number of the dtype of the Gaussians."""
 
     rotation: tuple[Any, ...]  # W, 9 numbers

@@ -33,7 +33,7 @@ IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
 # ---- compositing (B5) ----
 
 
-class CompositeSaved(NamedTuple):
+class CompositorSaved(NamedTuple):
     """Inputs of the reverse pass of a compositor and of the gather that follows it."""
 
     compositor: Any  # saved tuple of either compositor
@@ -44,7 +44,7 @@ class CompositeSaved(NamedTuple):
     raster: RasterSettings
 
 
-def _composite(inputs: Inputs, settings: Settings) -> tuple[Found, CompositeSaved]:
+def _composite(inputs: Inputs, settings: Settings) -> tuple[Found, CompositorSaved]:
     raster, (width, height) = raster_of(settings), (settings["width"], settings["height"])
     a, b, c = inputs["covariance2d"]
     seen = np.ones(a.size, bool)
@@ -59,10 +59,10 @@ def _composite(inputs: Inputs, settings: Settings) -> tuple[Found, CompositeSave
     forward = compositing_blocks.composite_blocks_forward if blocks else compositing.composite_forward
     out, saved = forward(records, lists, raster, inputs["background"], width, height)
     images = dict(zip(IMAGES, (out.colour, out.depth, out.opacity)))
-    return images, CompositeSaved(saved, out.transmittance, projected, order, inputs["opacity_logit"], raster)
+    return images, CompositorSaved(saved, out.transmittance, projected, order, inputs["opacity_logit"], raster)
 
 
-def _composite_reverse(cotangents: Inputs, saved: CompositeSaved) -> Found:
+def _composite_reverse(cotangents: Inputs, saved: CompositorSaved) -> Found:
     colour, depth, opacity = (cotangents[name] for name in IMAGES)
     if isinstance(saved.compositor, compositing_blocks.BlocksSaved):
         pairs = compositing_blocks.composite_blocks_reverse(colour, depth, opacity, saved.compositor)
@@ -79,7 +79,7 @@ def _composite_reverse(cotangents: Inputs, saved: CompositeSaved) -> Found:
     return dict(zip(names, grads)) | {"d_background": d_background}
 
 
-def _composite_trace(inputs: Inputs, settings: Settings, saved: CompositeSaved) -> dict[str, NDArray]:
+def _composite_trace(inputs: Inputs, settings: Settings, saved: CompositorSaved) -> dict[str, NDArray]:
     size = settings["width"], settings["height"]
     return {"order": saved.order, **decisions(saved.compositor.records, saved.raster, *size)}
 

@@ -54,7 +54,7 @@ def ablation_spec(
     return {"sequences": list(sequences), "seeds": list(range(seeds)), "configurations": made, **keys}
 
 
-class Comparison(NamedTuple):
+class Contrast(NamedTuple):
     """What `with_` gains over `without`. A comparison of the paper has what it publishes; one without is ours."""
 
     claim: str
@@ -66,27 +66,27 @@ class Comparison(NamedTuple):
 
 # The paper adds S to the base, A to S, and L to both; at a fixed count it adds A and L to S.
 COMPARISONS = (
-    Comparison("S", "S", "base", 0.04, "Spectral motion gains over the base"),
-    Comparison("A beside S", "A+S", "S", 0.29, "Temporal appearance gains beside spectral motion"),
-    Comparison("L beside A and S", "A+S+L", "A+S", 0.12, "Laplacian detail gains beside both residuals"),
-    Comparison(
+    Contrast("S", "S", "base", 0.04, "Spectral motion gains over the base"),
+    Contrast("A beside S", "A+S", "S", 0.29, "Temporal appearance gains beside spectral motion"),
+    Contrast("L beside A and S", "A+S+L", "A+S", 0.12, "Laplacian detail gains beside both residuals"),
+    Contrast(
         "A and L beside S, fixed count", f"A+S+L{FIXED}", f"S{FIXED}", 0.25,
         "At a fixed number of Gaussians, appearance and detail gain over motion alone",
     ),
-    Comparison("Matérn prior", "S", NO_PRIOR, 0.0, "The Matérn prior changes PSNR by less than 0.01 dB"),
-    Comparison(
+    Contrast("Matérn prior", "S", NO_PRIOR, 0.0, "The Matérn prior changes PSNR by less than 0.01 dB"),
+    Contrast(
         "Matérn prior, fixed representation", f"S{FIXED}", f"{NO_PRIOR}{FIXED}", 0.0,
         "The same at a fixed representation",
     ),
-    Comparison("A alone", "A", "base"),
-    Comparison("L alone", "L", "base"),
-    Comparison("S beside A", "A+S", "A"),
-    Comparison("A and S together", "A+S", "base"),
-    Comparison("all three", "A+S+L", "base"),
-    Comparison("A, fixed count", f"A{FIXED}", f"base{FIXED}"),
-    Comparison("S, fixed count", f"S{FIXED}", f"base{FIXED}"),
-    Comparison("L, fixed count", f"L{FIXED}", f"base{FIXED}"),
-    Comparison("all three, fixed count", f"A+S+L{FIXED}", f"base{FIXED}"),
+    Contrast("A alone", "A", "base"),
+    Contrast("L alone", "L", "base"),
+    Contrast("S beside A", "A+S", "A"),
+    Contrast("A and S together", "A+S", "base"),
+    Contrast("all three", "A+S+L", "base"),
+    Contrast("A, fixed count", f"A{FIXED}", f"base{FIXED}"),
+    Contrast("S, fixed count", f"S{FIXED}", f"base{FIXED}"),
+    Contrast("L, fixed count", f"L{FIXED}", f"base{FIXED}"),
+    Contrast("all three, fixed count", f"A+S+L{FIXED}", f"base{FIXED}"),
 )  # fmt: skip
 STEPS = COMPARISONS[:3]  # of the paper's cumulative ablation
 
@@ -112,7 +112,7 @@ class Estimate(NamedTuple):
 class Increment(NamedTuple):
     """A comparison on one split and metric."""
 
-    comparison: Comparison
+    comparison: Contrast
     split: str
     metric: str
     estimate: Estimate
@@ -137,7 +137,7 @@ def increments(rows: Iterable[dict[str, Any]], seed: int = 0) -> list[Increment]
     return found
 
 
-def paired(rows: list[dict[str, Any]], comparison: Comparison, split: str, metric: str) -> list[dict[str, Any]]:
+def paired(rows: list[dict[str, Any]], comparison: Contrast, split: str, metric: str) -> list[dict[str, Any]]:
     """The differences of the runs that have both a partner and a value."""
     with_, without = (
         {(row["sequence"], row["seed"]): row for row in rows if row["split"] == split and row["configuration"] == name}

@@ -74,7 +74,7 @@ class Inputs:
 Outcomes = Callable[[list[Job], Inputs], Generator[Outcome | None, None, None]]
 
 
-class Plan(NamedTuple):
+class SweepPlan(NamedTuple):
     """The runs of a sweep and what is left of them."""
 
     jobs: list[Job]
@@ -83,7 +83,7 @@ class Plan(NamedTuple):
     failed: dict[str, str]  # runs that failed before and are not tried again: name -> reason
 
 
-def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> Plan:
+def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> SweepPlan:
     """Every run, and which of them are to be made.
 
     retry    also those that failed before
@@ -98,7 +98,7 @@ def planned(spec: Spec, out: Path, inputs: Inputs, retry: bool) -> Plan:
         if job.name in failed:
             rows[job.name] = open_row(job, Outcome(job.name, FAILED, failed[job.name]))
     left = [job for job in jobs if rows[job.name]["status"] != FINISHED and job.name not in failed]
-    return Plan(jobs, rows, left, failed)
+    return SweepPlan(jobs, rows, left, failed)
 
 
 def run_sweep(
@@ -141,7 +141,7 @@ def run_sweep(
 
 
 def _made(
-    plan: Plan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter, watch: "Watch"
+    plan: SweepPlan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter, watch: "Watch"
 ) -> Generator[Job, None, None]:
     """The jobs as they end, with their rows replaced and the progress shown; closed, it ends what still runs."""
     if not plan.left:

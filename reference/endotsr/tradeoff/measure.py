@@ -35,14 +35,14 @@ class Prepared(NamedTuple):
     d_depth: FloatArray  # (h, w)
 
 
-class Frame(NamedTuple):
+class RenderedFrame(NamedTuple):
     """Image and gradients of a setting, at full resolution in float64."""
 
     colour: FloatArray  # (3, H, W) display units
     gradients: dict[str, FloatArray]  # by block, of the parameters at this moment
 
 
-class Errors(NamedTuple):
+class RenderErrors(NamedTuple):
     """Errors of a frame against the reference."""
 
     max: float  # of the colour, display units
@@ -123,7 +123,7 @@ def reverse(prepared: Prepared, saved: RenderSaved, scene_saved: SceneSaved) -> 
     return grads
 
 
-def frame(prepared: Prepared) -> tuple[Frame, int]:
+def frame(prepared: Prepared) -> tuple[RenderedFrame, int]:
     """The frame in float64 at full resolution, and its visits."""
     with prepared.setting.kernels(), threads(prepared.setting.threads):
         out, saved, scene_saved = forward(prepared)
@@ -134,10 +134,10 @@ def frame(prepared: Prepared) -> tuple[Frame, int]:
     if small.height != full.height or small.width != full.width:
         colour = upsampling(small.height, full.height) @ colour @ upsampling(small.width, full.width).T
     found = {name: getattr(grads, f"d_{name}") for name in BLOCKS}
-    return Frame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
+    return RenderedFrame(colour, {name: a.astype(np.float64) for name, a in found.items() if a is not None}), visits
 
 
-def errors(found: Frame, reference: Frame) -> Errors:
+def errors(found: RenderedFrame, reference: RenderedFrame) -> RenderErrors:
     """Colour: largest and root mean square difference; gradients: relative L2 of every block the reference has.
 
     Edges: a block without gradient in the reference is left out; a block that the setting lacks counts as zeros.
@@ -149,7 +149,7 @@ def errors(found: Frame, reference: Frame) -> Errors:
         if size > 0:
             got = found.gradients.get(name, np.zeros_like(exact))
             gradients[name] = float(np.linalg.norm(got - exact)) / size
-    return Errors(float(np.abs(difference).max()), float(np.sqrt(np.mean(difference**2))), gradients)
+    return RenderErrors(float(np.abs(difference).max()), float(np.sqrt(np.mean(difference**2))), gradients)
 
 
 def terms(prepared: Prepared) -> int:

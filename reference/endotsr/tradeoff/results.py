@@ -35,7 +35,7 @@ class Raster(msgspec.Struct):
     support: str
 
 
-class Setting(msgspec.Struct):
+class ChosenSetting(msgspec.Struct):
     """The chosen setting."""
 
     raster: Raster
@@ -47,7 +47,7 @@ class Point(msgspec.Struct):
     """One measured setting."""
 
     name: str
-    setting: Setting
+    setting: ChosenSetting
     error: Errors
     forward: Seconds
     both: Seconds
@@ -59,7 +59,7 @@ class Front(msgspec.Struct):
     forward: Annotated[list[str], msgspec.Meta(min_length=1)]
 
 
-class Scene(msgspec.Struct):
+class SceneSize(msgspec.Struct):
     """The rendered scene."""
 
     name: str
@@ -71,7 +71,7 @@ class Scene(msgspec.Struct):
 class Measurement(msgspec.Struct):
     """The keys of tradeoff.json that a budget reads."""
 
-    scene: Scene
+    scene: SceneSize
     points: list[Point]
     fronts: Front
 

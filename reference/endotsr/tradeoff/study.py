@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endotsr.runs.machine import dated
 from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
-from endotsr.tradeoff.measure import Frame, Prepared, errors, frame, prepare, seconds, terms
+from endotsr.tradeoff.measure import Prepared, RenderedFrame, errors, frame, prepare, seconds, terms
 from endotsr.tradeoff.results import FORMAT
 from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.settings import CLOSE, Setting, joint, presets
@@ -27,7 +27,7 @@ COSTS = {"forward": "seconds of a frame", "both": "seconds forward and reverse",
 Progress = Callable[[int], None]  # called with the number of completed steps
 
 
-class Plan:
+class NamedSettings:
     """Every setting once, under a name: those of the presets and of the joint sweep."""
 
     def __init__(self, scene: StudyScene) -> None:
@@ -59,7 +59,7 @@ def run_study(
     scene: StudyScene,
     *,
     repeats: int = REPEATS,
-    plan: Plan | None = None,
+    plan: NamedSettings | None = None,
     images: Path | None = None,
     begin: Callable[[int], None] = lambda steps: None,
     step: Progress = lambda steps: None,
@@ -72,7 +72,7 @@ def run_study(
     begin     is called once with the number of steps, `step` with the number of completed ones
     returns   tradeoff.json without date and machine (`described` adds them)
     """
-    plan = plan or Plan(scene)
+    plan = plan or NamedSettings(scene)
     begin(1 + len(plan.names) * (1 + repeats))
     aim = reference_setting(scene)
     reference, reference_visits = frame(prepare(scene, aim))
@@ -108,7 +108,9 @@ def described(result: dict[str, Any]) -> dict[str, Any]:
     return dated(result) | {"threads": numba.get_num_threads()}
 
 
-def _point(name: str, number: int, ready: Prepared, found: Frame, reference: Frame, visits: int) -> dict[str, Any]:
+def _point(
+    name: str, number: int, ready: Prepared, found: RenderedFrame, reference: RenderedFrame, visits: int
+) -> dict[str, Any]:
     error = errors(found, reference)
     return {
         "name": name,
@@ -126,7 +128,7 @@ def setting_dict(setting: Setting) -> dict[str, Any]:
     return {name: value for name, value in setting._asdict().items() if name != "kernels"} | {"raster": raster}
 
 
-def _keep(folder: Path, name: str, found: Frame) -> None:
+def _keep(folder: Path, name: str, found: RenderedFrame) -> None:
     np.save(folder / f"{name}.npy", found.colour)
     np.savez(folder / f"{name}_gradients.npz", **found.gradients)  # type: ignore[arg-type]
 

@@ -35,7 +35,7 @@ PROBE_WARM, PROBE = 5, 15  # iterations
 GROWTH = 2.0  # mean cost of an iteration over that of the first ones: Gaussians, residuals and losses are added
 
 
-class Configuration(NamedTuple):
+class StudyTraining(NamedTuple):
     """One training of the study."""
 
     name: str
@@ -57,7 +57,7 @@ def _plain(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def configurations(base: Config) -> list[Configuration]:
+def configurations(base: Config) -> list[StudyTraining]:
     """The base first, then the cheap and informative ones, so that a shortened study gives the main results."""
     first, other = base.initialisation.first_frame_points, base.initialisation.other_frame_points
 
@@ -66,22 +66,22 @@ def configurations(base: Config) -> list[Configuration]:
         return {"initialisation": counts}
 
     return [
-        Configuration("base", "base", {}, 1.0),
-        Configuration("no residuals", "residuals", {"model": {"appearance": False, "spectral_motion": False}}, 0.85),
-        Configuration("no Laplacian loss", "Laplacian loss", {"model": {"laplacian": False}}, 0.9),
-        Configuration("half size", "image scale", {"sequence": {"scale": base.sequence.scale / 2}}, 0.5),
-        Configuration("N / 2", "Gaussians", points(1 / 2), 0.75),
-        Configuration("cutoff 1/64", "cutoffs", {"raster": {"alpha_cutoff": 1 / 64}}, 0.9),
-        Configuration("cutoff 1e-4", "cutoffs", {"raster": {"alpha_cutoff": 1e-4}}, 1.2),
-        Configuration("stop 1e-2", "cutoffs", {"raster": {"transmittance_stop": 1e-2}}, 1.0),
-        Configuration("quarter size", "image scale", {"sequence": {"scale": base.sequence.scale / 4}}, 0.35),
-        Configuration("N / 4", "Gaussians", points(1 / 4), 0.6),
-        Configuration("float64", "precision", {"training": {"precision": "float64"}}, 1.8),
-        Configuration("2 N", "Gaussians", points(2), 1.6),
+        StudyTraining("base", "base", {}, 1.0),
+        StudyTraining("no residuals", "residuals", {"model": {"appearance": False, "spectral_motion": False}}, 0.85),
+        StudyTraining("no Laplacian loss", "Laplacian loss", {"model": {"laplacian": False}}, 0.9),
+        StudyTraining("half size", "image scale", {"sequence": {"scale": base.sequence.scale / 2}}, 0.5),
+        StudyTraining("N / 2", "Gaussians", points(1 / 2), 0.75),
+        StudyTraining("cutoff 1/64", "cutoffs", {"raster": {"alpha_cutoff": 1 / 64}}, 0.9),
+        StudyTraining("cutoff 1e-4", "cutoffs", {"raster": {"alpha_cutoff": 1e-4}}, 1.2),
+        StudyTraining("stop 1e-2", "cutoffs", {"raster": {"transmittance_stop": 1e-2}}, 1.0),
+        StudyTraining("quarter size", "image scale", {"sequence": {"scale": base.sequence.scale / 4}}, 0.35),
+        StudyTraining("N / 4", "Gaussians", points(1 / 4), 0.6),
+        StudyTraining("float64", "precision", {"training": {"precision": "float64"}}, 1.8),
+        StudyTraining("2 N", "Gaussians", points(2), 1.6),
     ]
 
 
-def changed(base: Config, configuration: Configuration) -> Config:
+def changed(base: Config, configuration: StudyTraining) -> Config:
     """The settings of a configuration."""
     data = msgspec.to_builtins(base)
     for section, values in configuration.changes.items():
@@ -131,7 +131,7 @@ def measured(
 
 
 def run_configuration(
-    configuration: Configuration,
+    configuration: StudyTraining,
     config: Config,
     sequence: Sequence,
     full: Sequence,
@@ -214,7 +214,7 @@ def run_training_study(
     return result
 
 
-def _expected_seconds(configuration: Configuration, base: dict[str, Any] | None) -> float:
+def _expected_seconds(configuration: StudyTraining, base: dict[str, Any] | None) -> float:
     """Training and evaluation of a configuration, from those of the base training; 0 before it was measured."""
     return configuration.cost * base["seconds"] + base["evaluation_seconds"] if base else 0.0
 

@@ -29,7 +29,7 @@ NUMBERS = "biuf"  # kinds of NumPy: truth values, integers, unsigned integers, f
 DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, ValueError, NotImplementedError, RuntimeError, KeyError)
 
 
-class Refused(ValueError):
+class RefusedArray(ValueError):
     """Data that is no array of plain numbers; the message states the reason."""
 
 
@@ -40,19 +40,19 @@ def read_npy(path: Path, largest: int) -> NDArray:
         file.seek(0)
         try:
             return array_from(file, length)
-        except (Refused, OSError) as error:
+        except (RefusedArray, OSError) as error:
             raise InputError(f"{path}: not a plain NumPy array file: {error}") from None
 
 
 def array_from(file: io.BufferedIOBase, length: int) -> NDArray:
-    """One array in .npy form that fills the next `length` bytes of a stream. Raises Refused."""
+    """One array in .npy form that fills the next `length` bytes of a stream. Raises RefusedArray."""
     shape, fortran, dtype, start = _header(file)
     size = math.prod(shape) * dtype.itemsize
     if size != length - start:
-        raise Refused(f"shape {shape} of {dtype.str} needs {size} bytes, the file has {length - start}")
+        raise RefusedArray(f"shape {shape} of {dtype.str} needs {size} bytes, the file has {length - start}")
     data = bytearray(size)
     if file.readinto(data) != size or file.read(1):
-        raise Refused("the data ends early")
+        raise RefusedArray("the data ends early")
     array = np.frombuffer(data, dtype)
     return array.reshape(shape, order="F" if fortran else "C")
 
@@ -61,17 +61,17 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
     """Shape, order, dtype and length in bytes of the header of an array."""
     start = file.read(8)
     if start[:6] != npy.MAGIC_PREFIX:
-        raise Refused("not an .npy file")
+        raise RefusedArray("not an .npy file")
     wide = start[6:7] in (b"\x02", b"\x03")
     if start[6:] not in (b"\x01\x00", b"\x02\x00", b"\x03\x00"):
-        raise Refused("unknown version of the .npy format")
+        raise RefusedArray("unknown version of the .npy format")
     prefix = file.read(4 if wide else 2)
     length = int.from_bytes(prefix, "little")
     if length > LONGEST_HEADER:
-        raise Refused(f"its header has {length} bytes; allowed: {LONGEST_HEADER}")
+        raise RefusedArray(f"its header has {length} bytes; allowed: {LONGEST_HEADER}")
     shape, fortran, dtype = _entries(file.read(length).decode("latin-1"))
     if dtype.hasobject:
-        raise Refused("it holds Python objects")
+        raise RefusedArray("it holds Python objects")
     if (
         dtype.kind not in NUMBERS
         or dtype.itemsize > 8
@@ -79,7 +79,9 @@ def _header(file: io.BufferedIOBase) -> tuple[tuple[int, ...], bool, np.dtype, i
         or len(shape) > MOST_AXES
         or min(shape, default=0) < 0
     ):
-        raise Refused(f"{dtype} {shape}; allowed: plain numbers of at most 8 bytes, with {MOST_AXES} axes or fewer")
+        raise RefusedArray(
+            f"{dtype} {shape}; allowed: plain numbers of at most 8 bytes, with {MOST_AXES} axes or fewer"
+        )
     return shape, fortran, dtype, len(start) + len(prefix) + length
 
 
@@ -93,9 +95,11 @@ def _entries(header: str) -> tuple[tuple[int, ...], bool, np.dtype]:
         shape, fortran, name = (found[key] for key in ("shape", "fortran_order", "descr"))
         dtype = np.dtype(name)
     except Exception as error:  # whatever the literal, or the name of a type, makes Python raise
-        raise Refused(f"its header cannot be read: {plain_line(str(error)) or 'damaged'}") from None
+        raise RefusedArray(f"its header cannot be read: {plain_line(str(error)) or 'damaged'}") from None
     if not isinstance(shape, tuple) or any(type(side) is not int for side in shape) or type(fortran) is not bool:
-        raise Refused("its header cannot be read: allowed: a shape of integers, and an order that is true or false")
+        raise RefusedArray(
+            "its header cannot be read: allowed: a shape of integers, and an order that is true or false"
+        )
     return shape, fortran, dtype
 
 
@@ -112,15 +116,15 @@ class NpzFile:
         return list(self._entries)
 
     def read(self, name: str) -> NDArray:
-        """One array, its checksum verified. Raises Refused."""
+        """One array, its checksum verified. Raises RefusedArray."""
         entry = self._entries[name]
         try:
             with self._archive.open(entry) as stream:
                 return array_from(stream, entry.file_size)  # type: ignore[arg-type]  # a ZipExtFile
-        except Refused:
+        except RefusedArray:
             raise
         except DAMAGE as error:
-            raise Refused(str(error).splitlines()[0] if str(error) else "damaged") from None
+            raise RefusedArray(str(error).splitlines()[0] if str(error) else "damaged") from None
 
 
 @contextmanager
@@ -154,7 +158,7 @@ def read_npz(path: Path, names: Collection[str], largest: int) -> dict[str, NDAr
             for name in names:
                 if name in file.names:
                     found[name] = file.read(name)
-        except Refused as error:
+        except RefusedArray as error:
             raise InputError(f"{path}: {name}: {error}") from None
     return found
 

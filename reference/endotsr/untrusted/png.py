@@ -23,7 +23,7 @@ PASSES = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), 
 LAST_FILTER = 4
 
 
-class Header(NamedTuple):
+class PngHeader(NamedTuple):
     """The chunk IHDR."""
 
     width: int
@@ -72,7 +72,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-def _header(chunks: list[tuple[bytes, bytes]], name: object) -> Header:
+def _header(chunks: list[tuple[bytes, bytes]], name: object) -> PngHeader:
     kind, content = chunks[0]
     if kind != b"IHDR" or len(content) != 13 or sum(kind == b"IHDR" for kind, _ in chunks) != 1:
         raise InputError(f"{name}: damaged PNG: its header is missing, repeated or of another length")
@@ -84,10 +84,10 @@ def _header(chunks: list[tuple[bytes, bytes]], name: object) -> Header:
         raise InputError(f"{name}: damaged PNG: its header states a kind of picture that does not exist")
     if not 0 < width * height <= MOST_PIXELS:
         raise InputError(f"{name}: {width}x{height} pixels; allowed: 1 to {MOST_PIXELS} pixels")
-    return Header(width, height, bits, colour, interlace == 1)
+    return PngHeader(width, height, bits, colour, interlace == 1)
 
 
-def _palette(chunks: list[tuple[bytes, bytes]], header: Header, name: object) -> list[tuple[bytes, bytes]]:
+def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object) -> list[tuple[bytes, bytes]]:
     """The palette of a picture that has one, as a list of no or one chunk; a suggested palette is left out."""
     if header.colour != 3:
         return []
@@ -98,14 +98,14 @@ def _palette(chunks: list[tuple[bytes, bytes]], header: Header, name: object) ->
     return found
 
 
-def _transparency(chunks: list[tuple[bytes, bytes]], header: Header, entries: int) -> list[tuple[bytes, bytes]]:
+def _transparency(chunks: list[tuple[bytes, bytes]], header: PngHeader, entries: int) -> list[tuple[bytes, bytes]]:
     """The chunk tRNS if its length is that of the colour type."""
     found = [chunk for chunk in chunks if chunk[0] == b"tRNS"][:1]
     fits = [c for c in found if TRANSPARENT.get(header.colour) == len(c[1]) or 0 < len(c[1]) <= entries]
     return fits
 
 
-def _check_pixels(packed: bytes, header: Header, name: object) -> int:
+def _check_pixels(packed: bytes, header: PngHeader, name: object) -> int:
     """Refuse compressed pixels that are damaged, too few or too many, or that use an unknown filter of a row.
 
     returns  bytes after the end of the compressed pixels
@@ -129,7 +129,7 @@ def _check_pixels(packed: bytes, header: Header, name: object) -> int:
     return len(unpacker.unused_data)
 
 
-def _rows(header: Header) -> list[tuple[int, int]]:
+def _rows(header: PngHeader) -> list[tuple[int, int]]:
     """Number of rows and bytes of a row, without the byte of its filter, for every pass over the picture."""
     passes = PASSES if header.interlaced else ((0, 0, 1, 1),)
     bits, found = CHANNELS[header.colour] * header.bits, []

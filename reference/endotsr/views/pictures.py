@@ -28,7 +28,7 @@ from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
 from endotsr.views.film import check_film, write_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
-from endotsr.views.plan import Request, View, check_request, views_of
+from endotsr.views.plan import PlannedView, ViewRequest, check_request, views_of
 
 DepthKind = Literal["accumulated", "normalised"]
 ABOUT_DEPTH = {
@@ -45,7 +45,7 @@ class Look(NamedTuple):
     panels: tuple[Panel, ...] = ("render",)  # of a film, from left to right
 
 
-def check_panels(panels: tuple[Panel, ...], views: list[View]) -> None:
+def check_panels(panels: tuple[Panel, ...], views: list[PlannedView]) -> None:
     """Raises InputError for panels that cannot be shown: none, or a truth that the views do not have."""
     if not panels:
         raise InputError("render: --panels is empty; allowed: one or more of render, truth, error, depth, opacity")
@@ -58,7 +58,7 @@ def check_panels(panels: tuple[Panel, ...], views: list[View]) -> None:
         )
 
 
-def requested_views(scene: MovingScene, request: Request, default: str) -> list[View]:
+def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> list[PlannedView]:
     """The views of a request on a scene. A path turns around the median depth of the first view.
 
     default   frames to show if no times are chosen
@@ -85,7 +85,9 @@ def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
         refuse_unwritable(film)
 
 
-def frames_of(scene: MovingScene, panels: tuple[Panel, ...], views: list[View], source: str | None) -> Sequence | None:
+def frames_of(
+    scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
+) -> Sequence | None:
     """The sequence that truth and error are shown from; None if the panels need none.
 
     source   its current location (default: the recorded one)
@@ -99,7 +101,7 @@ def frames_of(scene: MovingScene, panels: tuple[Panel, ...], views: list[View], 
     return load_run_sequence(scene.folder, source)
 
 
-def rendered(scene: MovingScene, views: list[View], look: Look) -> Iterator[tuple[View, RenderOut]]:
+def rendered(scene: MovingScene, views: list[PlannedView], look: Look) -> Iterator[tuple[PlannedView, RenderOut]]:
     """Every view with its picture; the depth is the one that is asked for."""
     for view in views:
         out = scene.render(view.time, view.camera, look.taken_out)
@@ -109,10 +111,10 @@ def rendered(scene: MovingScene, views: list[View], look: Look) -> Iterator[tupl
 def write_pictures(
     out: Path,
     scene: MovingScene,
-    pictures: Iterator[tuple[View, RenderOut]],
+    pictures: Iterator[tuple[PlannedView, RenderOut]],
     look: Look,
     npy: bool = False,
-    consume: Callable[[Iterator[tuple[View, RenderOut]]], object] = list,
+    consume: Callable[[Iterator[tuple[PlannedView, RenderOut]]], object] = list,
 ) -> int:
     """Write a folder, which appears whole or not at all; returns the number of pictures.
 
@@ -127,7 +129,7 @@ def write_pictures(
         first = next(pictures)
         step = depth_step(scene.record, first[1].depth)
 
-        def written() -> Iterator[tuple[View, RenderOut]]:
+        def written() -> Iterator[tuple[PlannedView, RenderOut]]:
             for view, picture in chain([first], pictures):
                 _write_view(target, view.label, picture, step, npy)
                 entries.append(_entry(view, scene.placement))
@@ -140,7 +142,7 @@ def write_pictures(
     return len(entries)
 
 
-def _entry(view: View, placement: Placement) -> dict[str, Any]:
+def _entry(view: PlannedView, placement: Placement) -> dict[str, Any]:
     """The entry of render.json; the camera is named where it is not that of a frame at its own time."""
     entry = {"file": f"{view.label}.png", "time": view.time, "camera_of_frame": view.frame}
     return entry if view.exact else entry | {"camera": _as_json(placed_camera(view.camera, placement))}
@@ -161,7 +163,7 @@ def _as_json(camera: Camera) -> dict[str, Any]:
 
 def write_views_film(
     file: Path,
-    pictures: Iterator[tuple[View, RenderOut]],
+    pictures: Iterator[tuple[PlannedView, RenderOut]],
     look: Look,
     rate: float,
     sequence: Sequence | None = None,
@@ -174,7 +176,7 @@ def write_views_film(
 
 
 def film_pictures(
-    pictures: Iterator[tuple[View, RenderOut]], look: Look, sequence: Sequence | None = None
+    pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: Sequence | None = None
 ) -> Iterator[ByteImage]:
     """The panels of every view; depth and error have the same colours in all of them."""
     scale = None

@@ -16,7 +16,7 @@ from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_camer
 LARGEST_ANGLE = 89.0  # degrees: beyond it a scene that was seen from one side is empty
 
 
-class View(NamedTuple):
+class PlannedView(NamedTuple):
     """Time, camera and name of one picture."""
 
     time: float
@@ -26,7 +26,7 @@ class View(NamedTuple):
     exact: bool  # whether this is the moment of a frame and its own camera, so that it can be compared with it
 
 
-class Request(NamedTuple):
+class ViewRequest(NamedTuple):
     """The views that are asked for."""
 
     times: Times = Times()
@@ -36,7 +36,7 @@ class Request(NamedTuple):
     angle: float = 8.0  # degrees, of orbit and sway
 
 
-def check_request(request: Request, record: dict[str, Any], default: str = "test") -> None:
+def check_request(request: ViewRequest, record: dict[str, Any], default: str = "test") -> None:
     """Everything that can be refused without a model and its cameras. Raises: InputError."""
     moments("render", request.times, record, default)
     if request.size:
@@ -54,13 +54,13 @@ def check_request(request: Request, record: dict[str, Any], default: str = "test
 
 
 def views_of(
-    request: Request,
+    request: ViewRequest,
     record: dict[str, Any],
     observed: list[Camera],
     pivot_depth: float,
     default: str = "test",
     placement: Placement = HERE,
-) -> list[View]:
+) -> list[PlannedView]:
     """The views of a request.
 
     request       checked by `check_request`
@@ -82,11 +82,11 @@ def views_of(
     own = own and not any(request.offset) and not request.size
     if request.camera.isdecimal():
         wanted = [(t, int(request.camera), label, False) for t, _, label, _ in wanted]
-    return [View(t, i, label, camera, own and exact) for (t, i, label, exact), camera in zip(wanted, cameras)]
+    return [PlannedView(t, i, label, camera, own and exact) for (t, i, label, exact), camera in zip(wanted, cameras)]
 
 
 def _cameras(
-    request: Request, observed: list[Camera], frames: list[int], pivot_depth: float, placement: Placement
+    request: ViewRequest, observed: list[Camera], frames: list[int], pivot_depth: float, placement: Placement
 ) -> tuple[list[Camera], bool]:
     """One camera for each of the frames, and whether they are those of the frames."""
     nearest = [observed[i] for i in frames]

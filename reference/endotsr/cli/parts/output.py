@@ -15,14 +15,14 @@ from endotsr.errors import InputError
 QUIET, LOG_FILE = ("-q", "--quiet"), "--log-file"
 
 
-class Output(NamedTuple):
+class OutputOptions(NamedTuple):
     """Where a command says what it says."""
 
     quiet: bool = False
     log_file: Path | None = None
 
 
-def split_output(words: list[str]) -> tuple[Output, list[str]]:
+def split_output(words: list[str]) -> tuple[OutputOptions, list[str]]:
     """The options of this module, and the other words in their order.
 
     Raises: InputError for `--log-file` without a value.
@@ -40,11 +40,11 @@ def split_output(words: list[str]) -> tuple[Output, list[str]]:
             file = Path(value)
         else:
             rest.append(word)
-    return Output(quiet, file), rest
+    return OutputOptions(quiet, file), rest
 
 
 @contextlib.contextmanager
-def saying(output: Output) -> Iterator[None]:
+def saying(output: OutputOptions) -> Iterator[None]:
     """Standard output and standard error as asked for, during the block; the log file is written from its beginning.
 
     Raises: InputError if the log file cannot be written.

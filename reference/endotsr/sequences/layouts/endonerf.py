@@ -14,7 +14,7 @@ from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import POSE_FILES, cameras_from_rows, read_pose_rows
-from endotsr.sequences.recording import Lens, Pair, Pose, Recording, colour_picture, grey_plane
+from endotsr.sequences.recording import CameraPose, Lens, PicturePair, Recording, colour_picture, grey_plane
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import stated_depth, stated_masks
 
@@ -37,10 +37,10 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
     if right:
         check_pairing(files.images, right)
 
-    def pictures(wanted: list[int]) -> Iterator[Pair]:
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
             other = colour_picture(read_picture(right[i]), right[i]) if right else None
-            yield Pair(colour_picture(read_picture(files.images[i]), files.images[i]), other)
+            yield PicturePair(colour_picture(read_picture(files.images[i]), files.images[i]), other)
 
     def mask(i: int) -> NDArray[np.bool_]:
         plane = grey_plane(read_picture(files.masks[i]), files.masks[i])
@@ -58,7 +58,9 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         unit=UNIT,
         lens=Lens(first.fx, first.fy, first.cx, first.cy, width, height),
         baseline=options.baseline,
-        poses=None if cameras[0] is cameras[-1] else [Pose(camera.rotation, camera.translation) for camera in cameras],
+        poses=None
+        if cameras[0] is cameras[-1]
+        else [CameraPose(camera.rotation, camera.translation) for camera in cameras],
         rate=options.rate,
     )
 

@@ -10,7 +10,7 @@ from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.files import check_pairing
 from endotsr.sequences.layouts import STATEMENTS, Layout
-from endotsr.sequences.recording import Pose, Recording, colour_picture
+from endotsr.sequences.recording import CameraPose, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import (
     files_of,
@@ -58,7 +58,7 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
     stored = colour_picture(read_picture(left[0]), left[0])
     width, height = halves(stored.shape[1], stored.shape[0], stereo)
     lens, rig = stated_camera(options, width, height, path)
-    poses: list[Pose | None] | None = None
+    poses: list[CameraPose | None] | None = None
     notes = []
     if options.trajectory is not None:
         unit = options.trajectory_unit or "m"

@@ -13,7 +13,7 @@ from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.files import frame_numbers, list_pictures
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import ARBITRARY, Pose, Recording, colour_picture, lens_of_matrix
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Recording, colour_picture, lens_of_matrix
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import mask_reader, pictures_from_files
@@ -54,8 +54,8 @@ def open_points(path: Path, options: SourceOptions) -> Recording:
     found = read_cameras(path / CAMERAS, frames)
     height, width = colour_picture(read_picture(frames[0]), frames[0]).shape[:2]
     where = path / CAMERAS
-    poses: list[Pose | None] = [
-        Pose(checked_rotation(matrix[:3, :3], f"{where}: w2c: frame {i}"), matrix[:3, 3].astype(np.float64))
+    poses: list[CameraPose | None] = [
+        CameraPose(checked_rotation(matrix[:3, :3], f"{where}: w2c: frame {i}"), matrix[:3, 3].astype(np.float64))
         for i, matrix in enumerate(found["w2c"].astype(np.float64))
     ]
     mask = options.masks or path / "mask.png"

@@ -11,7 +11,7 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import Lens, Pose, Recording, colour_picture
+from endotsr.sequences.recording import CameraPose, Lens, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_depth, stated_masks
 from endotsr.sequences.trajectory import poses_at, read_trajectory
@@ -65,7 +65,7 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
         nearest = np.abs(moments[None, :] - times[:, None]).argmin(axis=1)
         paired = [planes[k] if abs(moments[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
         depth = depth_reader(paired, STEP)
-    poses: list[Pose | None] | None = None
+    poses: list[CameraPose | None] | None = None
     where = options.trajectory or path / TRAJECTORY
     if where.is_file():
         poses = poses_at(read_trajectory(where, options.trajectory_unit or "m", options.direction), times, LONGEST)

@@ -7,7 +7,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.sequences.layouts import STATEMENTS, Layout
-from endotsr.sequences.recording import Pair, Picture, Pose, Recording
+from endotsr.sequences.recording import CameraPose, Picture, PicturePair, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import halves, split_pair, stated_camera, stated_depth, stated_masks, unit_of
 from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
@@ -29,7 +29,7 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
     rate = options.rate or facts.rate
     times = None if options.rate else facts.times
     lens, rig = stated_camera(options, width, height, path)
-    poses: list[Pose | None] | None = None
+    poses: list[CameraPose | None] | None = None
     notes = _notes(facts, rate, path)
     if facts.turn:
         done = f"turned by {facts.turn} degrees counter-clockwise" if quarters else "taken as stored"
@@ -40,7 +40,7 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
         poses, how = poses_of_frames(trajectory, facts.count, rate, times)
         notes.append(f"{options.trajectory.name}: {how}; positions in {unit}")
 
-    def pictures(wanted: list[int]) -> Iterator[Pair]:
+    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i, picture in zip(wanted, video_pictures(path, wanted)):
             turned: Picture = np.ascontiguousarray(np.rot90(picture, quarters))
             yield split_pair(turned, stereo, f"{path}: picture {i}")
