@@ -52,9 +52,9 @@ def dependents(module: str) -> frozenset[str]:
 
 
 def notebooks_for(module: str) -> list[Path]:
-    """Notebooks that import the module or what depends on it; the nearest first."""
+    """Notebooks that import the module or what depends on it; the nearest first, and chapter 0, which trains, last."""
     near, far = [], []
-    for file in sorted(notebook_signs.FOLDER.glob("*.py")):
+    for file in sorted(notebook_signs.FOLDER.glob("*.py"), key=lambda file: (file.stem == "00_why", file)):
         tree = ast.parse(file.read_text(encoding="utf-8"))
         uses = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
         if module in uses:

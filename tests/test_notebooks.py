@@ -17,11 +17,12 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
 SHOWS_THE_DEFINITION = {
+    "00_why",
     "02_colour_residual",
     "03_deformation",
     "04_motion_and_prior",
 }  # in place of a transcription of its own
-WITHOUT_DERIVATIVE = {"16_tradeoff", "17_effects"}  # measure what the others derive
+WITHOUT_DERIVATIVE = {"00_why", "16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
 
@@ -53,7 +54,7 @@ def _drawn_to_nowhere(monkeypatch):
     plt.close("all")
 
 
-SLOW = {"14_full_sequence": pytest.mark.slow}  # trains
+SLOW = {"00_why": pytest.mark.slow, "14_full_sequence": pytest.mark.slow}  # these train
 
 
 @pytest.mark.parametrize(
@@ -105,7 +106,7 @@ def test_notebook_has_all_its_parts(file):
         assert re.search(r"print\(table\(", text), "the table of the gradient check"
 
 
-@pytest.mark.parametrize("file", NOTEBOOKS[:12], ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", NOTEBOOKS[:13], ids=lambda file: file.stem)
 def test_a_flipped_sign_of_a_transcription_is_noticed(file):
     """One sign a notebook; all of them: notebook_signs.py. Those of the definition: definition/signs.py."""
     if file.stem in SHOWS_THE_DEFINITION:

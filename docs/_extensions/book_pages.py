@@ -63,7 +63,7 @@ def golden_links(row: Equation) -> str:
 
 
 def notebook_links(row: Equation) -> str:
-    found = [f"{{doc}}`{name[:2].lstrip('0')} </notebooks/{name}>`" for name in row.notebooks]
+    found = [f"{{doc}}`{int(name[:2])} </notebooks/{name}>`" for name in row.notebooks]
     return ", ".join(found) if found else row.without.notebook if row.without else ""
 
 
