@@ -122,13 +122,31 @@ axes[2].legend()
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# $\psi$ is linear in $w$, so $g_w=e\,g_\psi$. For `quartic`, $e=\exp(-u^2)$ gives $\mathrm de=-2ue\,\mathrm du$, and
-# $u=\Delta^2/\Sigma$ gives $\mathrm du=\frac{2\Delta}{\Sigma}\mathrm d\Delta-\frac{u}{\Sigma}\mathrm d\Sigma$ with
-# $\mathrm d\Delta=-\mathrm d\theta$ and $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. In each product the signs cancel,
-# leaving $+4$. For `gaussian` it is the same with $-\tfrac12\Delta^2/\Sigma$. The time enters every $\Delta$ with the
-# opposite sign of $\theta$:
+# A loss gives $g_\psi$ for each channel and Gaussian. We need gradients with respect to weight, centre, width and time.
+#
+# **(3.1) The sum.** $\psi=\sum_jw_je_j$ is linear in the weights and in the values of the bases. So $g_w=e\,g_\psi$ and
+# $g_e=w\,g_\psi$.
+#
+# **(3.2) The exponential.** Let $E$ be the exponent, $e=\exp(-E)$. Then $\mathrm de=-e\,\mathrm dE$, and
+# $g_E=-e\,g_e$.
+#
+# **(3.3) The exponent as a function of $\Delta$.** For `quartic`, $E=u^2$ with $u=\Delta^2/\Sigma$. With $\Sigma$ held
+# fixed, $\mathrm dE=2u\,\mathrm du=2u\cdot2\Delta/\Sigma\,\mathrm d\Delta$, so $\partial E/\partial\Delta=4\Delta^3/\Sigma^2$. For
+# `gaussian`, $E=\Delta^2/(2\Sigma)$ and $\partial E/\partial\Delta=\Delta/\Sigma$.
+#
+# **(3.4) The exponent as a function of $\sigma$.** $\Sigma=\sigma^2+10^{-4}$ gives $\mathrm d\Sigma=2\sigma\,\mathrm d\sigma$. With
+# $\Delta$ held fixed, $\mathrm du=-u/\Sigma\,\mathrm d\Sigma$. For `quartic`,
+# $\partial E/\partial\sigma=2u\cdot(-u/\Sigma)\cdot2\sigma=-4\Delta^4\sigma/\Sigma^3$. For `gaussian`,
+# $\partial E/\partial\sigma=-\Delta^2\sigma/\Sigma^2$.
+#
+# **(3.5) Centre and width.** $\Delta=t-\theta$ gives $\mathrm d\Delta=-\mathrm d\theta$. The sign cancels that of (3.2), so
+# $g_\theta=-g_E\,\partial E/\partial\Delta$ is positive for a basis whose centre lies before $t$. The signs of (3.2) and (3.4)
+# cancel as well: $g_\sigma=g_E\,\partial E/\partial\sigma$. Both `quartic` gradients have the factor $+4$.
+#
+# **(3.6) Time.** $t$ enters every $\Delta$ with the opposite sign of $\theta$: $g_t=-\sum g_\theta$ over all channels, bases
+# and Gaussians.
 #
 # $$
 # \begin{aligned}
@@ -182,8 +200,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# At which distance from the centre of a quartic basis is $|g_\theta|$ largest? Work in $v=\Delta/\sqrt\Sigma$. At which
-# distance is it largest for a `gaussian` basis of equal $\Sigma$?
+# 1. Which frames change a basis whose width is 0.01? Use (3.1) to find the distance at which the gradient of its weight
+#    has fallen to a thousandth of its maximum.
+# 2. Write `deformation_reverse` from (3.1) to (3.6) and let the golden cases judge it, as {doc}`index` describes:
+#    `--only deformation`.
+# 3. The cell below answers this one. At which distance from the centre of a quartic basis is
+#    $|g_\theta|$ largest? Work in $v=\Delta/\sqrt\Sigma$. At which distance is it largest for a `gaussian` basis of equal
+#    $\Sigma$?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Quartic: g_theta ~ exp(-v^4) v^3; the derivative vanishes where 3 v^2 = 4 v^6, v =

@@ -19,9 +19,12 @@
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import covariance as definition
 from endotsr.gradcheck import (
     all_pairs,
     check_function,
@@ -58,32 +61,33 @@ N = 6
 
 
 # %% tags=["transcription"]
-def rotation_text(q_tilde):
-    w, x, y, z = q_tilde / np.sqrt((q_tilde**2).sum(axis=0))
-    return np.array(
-        [
-            [1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)],
-        ]
-    )
-
-
-def covariance_text(R, s):
-    S = np.exp(s)
-    return np.stack(
-        [R[:, :, i] @ np.diag(S[:, i] ** 2) @ R[:, :, i].T for i in range(s.shape[1])], axis=-1
-    )
-
+print(inspect.getsource(definition.unit))
+print(inspect.getsource(definition.rotation_of))
+print(inspect.getsource(definition.covariance_forward))
+print(inspect.getsource(definition.covariance_matrix))
 
 # %%
 q, s = 3 * rng.normal(size=(4, N)), rng.normal(0, 0.7, (3, N))
 shape, saved = covariance_forward(q, s)
-np.testing.assert_allclose(shape.rotation, rotation_text(q), atol=1e-14)
-np.testing.assert_allclose(shape.scale, np.exp(s), rtol=1e-14)
+text, _ = definition.covariance_forward(q, s)
+np.testing.assert_allclose(shape.rotation, text.rotation, atol=1e-14)
+np.testing.assert_allclose(shape.scale, text.scale, rtol=1e-14)
 np.testing.assert_allclose(
-    covariance_matrix(shape), covariance_text(shape.rotation, s), rtol=1e-11, atol=1e-13
+    covariance_matrix(shape), definition.covariance_matrix(text), rtol=1e-11, atol=1e-13
 )
+
+# %% [markdown]
+# The definition writes $R$ with the vector part $\mathbf v=(x,y,z)$ of the quaternion. For a unit quaternion this is the
+# matrix of the display, because $w^2-\mathbf v\cdot\mathbf v=1-2\,\mathbf v\cdot\mathbf v$.
+
+# %%
+w, x, y, z = definition.unit(q)[0]
+printed = [
+    [1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    [2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)],
+    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)],
+]
+np.testing.assert_allclose(text.rotation, printed, atol=1e-14)
 
 # %% [markdown]
 # The length of the raw quaternion has no effect, even if its square would overflow or underflow. $q$ and $-q$ are the
@@ -99,19 +103,45 @@ for factor in (1e-300, 1e-30, -1.0, 1e300):
 assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(3))
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# The input is $g_\Sigma$, with all nine entries taken as independent. $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
-# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$: each entry of $M$ occurs twice, once in the row and once in
-# the column.
+# A loss gives $g_\Sigma$, with all nine entries taken as independent. We need gradients with respect to the log-scales
+# and to the raw quaternion.
+#
+# **(5.1) The product.** $\Sigma=MM^\top$ with $M=R\,\mathrm{diag}(S)$, so
+# $\mathrm d\Sigma=\mathrm dM\,M^\top+M\,\mathrm dM^\top$. Each entry of $M$ occurs twice, once in a row and once in a
+# column. The gradient adds both: $g_M=(g_\Sigma+g_\Sigma^\top)M$.
+#
+# **(5.2) Its two factors.** $M_{jk}=R_{jk}S_k$. With $S$ held fixed, $g_{R_{jk}}=g_{M_{jk}}S_k$. With $R$ held fixed,
+# a semi-axis scales one whole column, so $g_{S_k}=\sum_jR_{jk}\,g_{M_{jk}}$.
+#
+# **(5.3) The logarithm.** $S_k=e^{s_k}$ gives $\mathrm dS_k=S_k\,\mathrm ds_k$ and $g_{s_k}=S_k\,g_{S_k}$.
 #
 # $$
 # g_M=(g_\Sigma+g_\Sigma^\top)M,\qquad g_{S_k}=\sum_j R_{jk}\,g_{M_{jk}},\qquad g_{s_k}=S_k\,g_{S_k},\qquad g_{R_{jk}}=g_{M_{jk}}S_k .
 # $$
 #
-# The entries of $R$ are quadratic in the unit quaternion. Each is differentiated, and the terms are collected with
-# $G=g_R$. The last step is the normalisation. A step of $\tilde q$ along itself does not change the rotation, so that
-# part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
+# **(5.4) The rotation.** With $q=(w,\mathbf v)$,
+# $R=(w^2-\mathbf v\cdot\mathbf v)\,I+2\,\mathbf v\mathbf v^\top+2w\,[\mathbf v]_\times$. Each term is quadratic in $q$,
+# so its differential has two parts:
+# $\mathrm dR=2(w\,\mathrm dw-\mathbf v\cdot\mathrm d\mathbf v)\,I+2(\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top)+2\,\mathrm dw\,[\mathbf v]_\times+2w\,[\mathrm d\mathbf v]_\times$.
+#
+# **(5.5) Three contractions.** With $G=g_R$ and $\langle G,\mathrm dR\rangle=\sum_{jk}G_{jk}\,\mathrm dR_{jk}$, each term
+# becomes a number or a vector. $\langle G,I\rangle$ is the trace $\tau=\sum_jG_{jj}$. The symmetric part is
+# $\langle G,\mathrm d\mathbf v\,\mathbf v^\top+\mathbf v\,\mathrm d\mathbf v^\top\rangle=\mathrm d\mathbf v\cdot(G+G^\top)\mathbf v$.
+# The antisymmetric part is $\langle G,[\mathbf a]_\times\rangle=\mathbf a\cdot\mathbf s$ with the *spin*
+# $\mathbf s=(G_{21}-G_{12},\ G_{02}-G_{20},\ G_{10}-G_{01})$.
+#
+# **(5.6) The unit quaternion.** Collecting $\mathrm dw$ and $\mathrm d\mathbf v$ gives $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and
+# $g_{\mathbf v}=-2\tau\,\mathbf v+2(G+G^\top)\mathbf v+2w\,\mathbf s$.
+#
+# **(5.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ in place of
+# $\|q\|^2$. It lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. That vector points along $q$, and the next
+# line removes it. Both forms therefore give the same $g_{\tilde q}$.
+#
+# **(5.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
+# $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the rotation, so
+# that part of $g_q$ is removed. A longer $\tilde q$ rotates less for the same step, so the rest is divided by its length.
 #
 # $$
 # \begin{aligned}
@@ -125,57 +155,42 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 
 
 # %% tags=["transcription"]
-def from_sigma_text(g_Sigma, R, S):
-    """g_R and g_S of one Gaussian."""
-    M = R @ np.diag(S)
-    g_M = (g_Sigma + g_Sigma.T) @ M
-    g_S = np.array([sum(R[j, k] * g_M[j, k] for j in range(3)) for k in range(3)])
-    return g_M * S, g_S
-
-
-def quaternion_reverse_text(G, q_tilde):
-    norm = np.sqrt((q_tilde**2).sum())
-    w, x, y, z = q_tilde / norm
-    g_w = 2 * (x * (G[2, 1] - G[1, 2]) + y * (G[0, 2] - G[2, 0]) + z * (G[1, 0] - G[0, 1]))
-    g_x = 2 * (
-        -2 * x * (G[1, 1] + G[2, 2])
-        + y * (G[0, 1] + G[1, 0])
-        + z * (G[0, 2] + G[2, 0])
-        + w * (G[2, 1] - G[1, 2])
-    )
-    g_y = 2 * (
-        x * (G[0, 1] + G[1, 0])
-        - 2 * y * (G[0, 0] + G[2, 2])
-        + z * (G[1, 2] + G[2, 1])
-        + w * (G[0, 2] - G[2, 0])
-    )
-    g_z = 2 * (
-        x * (G[0, 2] + G[2, 0])
-        + y * (G[1, 2] + G[2, 1])
-        - 2 * z * (G[0, 0] + G[1, 1])
-        + w * (G[1, 0] - G[0, 1])
-    )
-    g_q = np.array([g_w, g_x, g_y, g_z])
-    q = q_tilde / norm
-    return (g_q - (q @ g_q) * q) / norm
+print(inspect.getsource(definition.rotation_reverse))
+print(inspect.getsource(definition.covariance_reverse))
 
 
 # %%
+def from_sigma(g_Sigma, R, S):
+    """(5.1) and (5.2): g_R and g_S of one Gaussian."""
+    g_M = (g_Sigma + g_Sigma.T) @ (R * S)
+    return g_M * S, (R * g_M).sum(axis=0)
+
+
 g_Sigma = rng.normal(size=(3, 3, N))
 pairs = [
-    from_sigma_text(g_Sigma[:, :, i], shape.rotation[:, :, i], shape.scale[:, i])
-    for i in range(N)
+    from_sigma(g_Sigma[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)
 ]
 g_R, g_S = (np.stack(parts, axis=-1) for parts in zip(*pairs))
 grads = covariance_reverse(Shape(g_R, g_S), saved)
-for i in range(N):
-    np.testing.assert_allclose(
-        grads.d_quaternion[:, i],
-        quaternion_reverse_text(g_R[:, :, i], q[:, i]),
-        rtol=1e-9,
-        atol=1e-12,
-    )
-np.testing.assert_allclose(grads.d_log_scale, np.exp(s) * g_S, rtol=1e-12)
+for found, expected in zip(
+    grads,
+    definition.covariance_reverse(definition.Shape(g_R, g_S), definition.CovarianceSaved(q, s)),
+):
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+# The printed form, line by line, differs from (5.6) along q alone: by 2 tau q, as (5.7) says.
+G, unit = g_R, definition.unit(q)[0]
+w, x, y, z = unit
+g_w = 2 * (x * (G[2, 1] - G[1, 2]) + y * (G[0, 2] - G[2, 0]) + z * (G[1, 0] - G[0, 1]))
+g_x = 2 * (
+    -2 * x * (G[1, 1] + G[2, 2])
+    + y * (G[0, 1] + G[1, 0])
+    + z * (G[0, 2] + G[2, 0])
+    + w * (G[2, 1] - G[1, 2])
+)
+tau = np.einsum("jji->i", G)
+lacking = definition.rotation_reverse(unit, G)[:2] - np.array([g_w, g_x])
+np.testing.assert_allclose(lacking, 2 * tau * unit[:2], atol=1e-12)
 
 along = np.abs((q * grads.d_quaternion).sum(axis=0)) / np.linalg.norm(
     grads.d_quaternion, axis=0
@@ -205,7 +220,7 @@ for _ in range(800):
     difference = covariance_matrix(shape_now)[:, :, 0] - target
     losses.append((difference**2).sum())
     path.append(covariance_matrix(shape_now)[:, :, 0])
-    back = from_sigma_text(2 * difference, shape_now.rotation[:, :, 0], shape_now.scale[:, 0])
+    back = from_sigma(2 * difference, shape_now.rotation[:, :, 0], shape_now.scale[:, 0])
     step = covariance_reverse(Shape(*(part[..., None] for part in back)), saved_now)
     q_now, s_now = q_now - 0.05 * step.d_quaternion, s_now - 0.05 * step.d_log_scale
 assert losses[-1] < 1e-3 * losses[0]
@@ -248,8 +263,7 @@ def sigma_forward(inputs):
 def sigma_reverse(inputs, g):
     shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
     parts = [
-        from_sigma_text(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i])
-        for i in range(N)
+        from_sigma(g[:, :, i], shape.rotation[:, :, i], shape.scale[:, i]) for i in range(N)
     ]
     grads = covariance_reverse(Shape(*(np.stack(p, axis=-1) for p in zip(*parts))), saved)
     return {"quaternion": grads.d_quaternion, "log_scale": grads.d_log_scale}
@@ -271,8 +285,12 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place of $(s_1,s_2,s_3)$. Which quaternion
-# gives the same $\Sigma$ as before? How many parameter sets describe one ellipsoid?
+# 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (5.2) and (5.6).
+# 2. Write `covariance_reverse` from (5.3), (5.6) and (5.8) and let the golden cases judge it: `--only covariance`
+#    ({doc}`index`). Which case fails if the division by the length is left out?
+# 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place
+#    of $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one
+#    ellipsoid?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. R' = R P with P the third of a turn that sends axis 1 to axis 2, 2 to 3 and 3 to 1:

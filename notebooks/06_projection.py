@@ -20,9 +20,14 @@
 # {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import pose as pose_definition
+from endotsr.definition import projection as definition
+from endotsr.definition import settings as definition_settings
 from endotsr.equations.pose import pose_forward, pose_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.camera import Camera
@@ -68,46 +73,19 @@ shape, _ = covariance_forward(rng.normal(size=(4, N)), rng.normal(-1, 0.5, (3, N
 
 
 # %% tags=["transcription"]
-def project_text(mu, R, S, camera, kappa, eps=0.3):
-    """One Gaussian: (u, v), (a, b, c), z and what the reverse pass uses again."""
-    W, d = camera.rotation, camera.translation
-    x, y, z = W @ mu + d
-    u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-    L_x = kappa * camera.width / (2 * camera.fx) if kappa else np.inf
-    L_y = kappa * camera.height / (2 * camera.fy) if kappa else np.inf
-    x_, y_ = z * np.clip(x / z, -L_x, L_x), z * np.clip(y / z, -L_y, L_y)
-    J = np.array(
-        [[camera.fx / z, 0, -camera.fx * x_ / z**2], [0, camera.fy / z, -camera.fy * y_ / z**2]]
-    )
-    T = J @ W @ R
-    (a, b), (_, c) = T @ np.diag(S) ** 2 @ T.T + eps * np.eye(2)
-    return (u, v), (a, b, c), z, (x, y, x_, y_, L_x, L_y, J, T)
-
-
-def determinant_text(T, S, eps=0.3):
-    crosses = [
-        (S[k] * S[m] * (T[0, k] * T[1, m] - T[1, k] * T[0, m])) ** 2
-        for k in range(3)
-        for m in range(k + 1, 3)
-    ]
-    return eps**2 + eps * sum(S[k] ** 2 * (T[:, k] ** 2).sum() for k in range(3)) + sum(crosses)
-
+print(inspect.getsource(definition.jacobian))
+print(inspect.getsource(definition.projection_forward))
 
 # %%
-for settings in (PAPER, EXACT):
+presets = (PAPER, definition_settings.PAPER), (EXACT, definition_settings.EXACT)
+for settings, text_settings in presets:
     projected, saved = projection_forward(mu, shape, camera, settings)
-    clamped = 0
-    for i in range(N):
-        R, S = shape.rotation[:, :, i], shape.scale[:, i]
-        uv, abc, depth, parts = project_text(mu[:, i], R, S, camera, settings.jacobian_clamp)
-        np.testing.assert_allclose(projected.mean2d[:, i], uv, rtol=1e-12)
-        np.testing.assert_allclose(projected.covariance2d[:, i], abc, rtol=1e-10, atol=1e-10)
-        np.testing.assert_allclose(projected.depth[i], depth, rtol=1e-13)
-        np.testing.assert_allclose(
-            projected.determinant[i], determinant_text(parts[-1], S), rtol=1e-11
-        )
-        clamped += abs(parts[0] / depth) > parts[4] or abs(parts[1] / depth) > parts[5]
-    print(f"{clamped} of {N} Gaussians beyond the clamp")
+    text, _ = definition.projection_forward(mu, shape, camera, text_settings)
+    for found, expected in zip(projected, text):
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+    in_camera = camera.rotation @ mu + camera.translation[:, None]
+    free = definition.jacobian(in_camera, camera, text_settings)[2]
+    print(f"{np.count_nonzero(~free.all(axis=0))} of {N} Gaussians beyond the clamp")
 
 # %% [markdown]
 # ## The determinant
@@ -119,6 +97,31 @@ for settings in (PAPER, EXACT):
 # \det=\varepsilon^2+\varepsilon\sum_{k=1}^{3}S_k^2\|\mathbf t_k\|^2+\sum_{k<l}\bigl(S_kS_l\,(t_{0k}t_{1l}-t_{1k}t_{0l})\bigr)^2 .
 # $$
 #
+# Here $\mathbf t_k$ are the columns of $T$. The definition has $ac-b^2$, and in float64 both agree. The kernel has the
+# sum.
+
+
+# %%
+def screen_matrix(i):
+    """T = J W R of Gaussian i, with the clamp of `paper`."""
+    J = definition.jacobian(in_camera[:, i : i + 1], camera, definition_settings.PAPER)[0]
+    return J[:, :, 0] @ camera.rotation @ shape.rotation[:, :, i], J[:, :, 0]
+
+
+def determinant_of(T, S, eps=0.3):
+    minors = [
+        S[k] * S[m] * (T[0, k] * T[1, m] - T[1, k] * T[0, m])
+        for k in range(3)
+        for m in range(k + 1, 3)
+    ]
+    return eps**2 + eps * (S**2 * (T**2).sum(axis=0)).sum() + np.sum(np.square(minors))
+
+
+projected, _ = projection_forward(mu, shape, camera, PAPER)
+sums = [determinant_of(screen_matrix(i)[0], shape.scale[:, i]) for i in range(N)]
+np.testing.assert_allclose(projected.determinant, sums, rtol=1e-11)
+
+# %% [markdown]
 # ## Figure: where the expansion is accurate, and where digits are lost
 
 # %% tags=["hide-input"]
@@ -186,11 +189,23 @@ axes[2].legend()
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# We differentiate from the last line upward. The screen covariance is $MM^\top+\varepsilon I$ with
-# $M=T\,\mathrm{diag}(S)$, so this step is the same as for $\Sigma$. $b$ stands for two entries of the matrix, and half
-# of its gradient goes to each. This gives $G_2$.
+# A loss gives $g_u,g_v$, the gradients $g_a,g_b,g_c$ of the screen covariance, and $g_z^{\mathrm{img}}$ from the depth
+# image. We differentiate from the last line of the equation upward.
+#
+# **(6.1) The three numbers as a matrix.** $b$ stands for two equal entries. Half of its gradient goes to each:
+# $G_2=\begin{bmatrix}g_a&g_b/2\\g_b/2&g_c\end{bmatrix}$.
+#
+# **(6.2) The product.** The screen covariance is $MM^\top+\varepsilon I$ with $M=T\,\mathrm{diag}(S)$. As in (5.1), and
+# because $G_2$ is symmetric, $g_M=2\,G_2M$. The low-pass is a constant and drops out.
+#
+# **(6.3) Its factors.** $M_{rk}=T_{rk}S_k$ gives $g_{S_k}=\sum_rT_{rk}\,g_{M_{rk}}$ and $g_T=g_M\,\mathrm{diag}(S)$, as in
+# (5.2). The definition goes through $\Sigma$ and reaches the same $g_S$ and $g_R$.
+#
+# **(6.4) The three matrices.** $T=JWR$ gives $\mathrm dT=\mathrm dJ\,WR+J\,\mathrm dW\,R+JW\,\mathrm dR$. A factor to the
+# left of the differential moves to the left of $g_T$, transposed; a factor to the right moves to the right:
+# $g_J=g_T(WR)^\top$, $g_R=(JW)^\top g_T$, and $g_W$ receives $J^\top g_TR^\top$.
 #
 # $$
 # \begin{aligned}
@@ -199,7 +214,7 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# In float32 this form loses digits: $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes
+# **(6.5) The footprint.** In float32 this form loses digits: $g_a,g_b,g_c$ of a needle are large and nearly cancel. The renderer therefore goes
 # from the gradients of the footprint $(A,m,r)=(c/\det,\ b/c,\ 1/c)$ of {doc}`08_compositing` directly to $S$ and $T$.
 # This is the same chain rule, with $e_k=t_{0k}-m\,t_{1k}$ written so that nothing cancels:
 #
@@ -212,9 +227,22 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The centre comes next. It enters through $(u,v)$ and through $J$, whose entries depend on $z$ and on the clamped
-# $x',y'$. Where the clamp is not active, $x'=x$. Where it is active, $x'=\pm zL_x$, which does not depend on $x$ but
-# does depend on $z$. This gives the last line.
+# The centre comes next. It enters through $(u,v)$ and through $J$.
+#
+# **(6.6) The last column of $J$.** $J_{02}=-f_xx'/z^2$, so $g_{x'}=-f_x/z^2\,g_{J_{02}}$, and in the same way for $y'$.
+#
+# **(6.7) The clamp.** $x'=z\,\mathrm{clip}(x/z)$. Where the clip is not active, $x'=x$ and $g_{x'}$ goes to $x$. Where
+# it is active, $x'=\pm zL_x$ does not depend on $x$ but does depend on $z$: $\partial x'/\partial z=\pm L_x=x'/z$.
+#
+# **(6.8) Screen position.** $u=f_xx/z+c_x$ gives $\mathrm du=\frac{f_x}z\mathrm dx-\frac{f_xx}{z^2}\mathrm dz$, and in the
+# same way for $v$.
+#
+# **(6.9) The depth in $J$.** With $x'$ held fixed, $\partial J_{00}/\partial z=-f_x/z^2$ and
+# $\partial J_{02}/\partial z=2f_xx'/z^3$. The definition holds the slope $x'/z$ fixed instead, so that its $J_{02}$
+# has one factor $1/z$; the difference is the term of (6.7).
+#
+# **(6.10) Into the world.** $(x,y,z)^\top=W\mu+\mathbf d$ gives $g_\mu=W^\top(g_x,g_y,g_z)^\top$.
+#
 #
 # $$
 # \begin{aligned}
@@ -226,7 +254,7 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# The gradient with respect to the pose is a sum over all Gaussians. (The terms with $g_{\mathbf o}$ come from the
+# **(6.11) The pose.** The same line gives $g_{\mathbf d}$ and the second part of $g_W$. Both are sums over all Gaussians. (The terms with $g_{\mathbf o}$ come from the
 # viewing directions and are not part of this stage.)
 #
 # $$
@@ -238,62 +266,26 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def reverse_text(g_uv, g_abc, g_z_image, mu, R, S, camera, kappa):
-    W = camera.rotation
-    fx, fy = camera.fx, camera.fy
-    _, _, z, (x, y, x_, y_, L_x, L_y, J, T) = project_text(mu, R, S, camera, kappa)
-    (g_u, g_v), (g_a, g_b, g_c) = g_uv, g_abc
-    G_2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])
-    M = T @ np.diag(S)
-    g_M = 2 * G_2 @ M
-    g_S = np.array([sum(T[r, k] * g_M[r, k] for r in range(2)) for k in range(3)])
-    g_T = g_M @ np.diag(S)
-    g_J, g_R = g_T @ (W @ R).T, (J @ W).T @ g_T
-    g_x_, g_y_ = -fx / z**2 * g_J[0, 2], -fy / z**2 * g_J[1, 2]
-    g_x = fx / z * g_u + (abs(x / z) <= L_x) * g_x_
-    g_y = fy / z * g_v + (abs(y / z) <= L_y) * g_y_
-    g_z = (
-        g_z_image
-        - (fx * x * g_u + fy * y * g_v) / z**2
-        - fx / z**2 * g_J[0, 0]
-        - fy / z**2 * g_J[1, 1]
-    )
-    g_z = g_z + 2 * fx * x_ / z**3 * g_J[0, 2] + 2 * fy * y_ / z**3 * g_J[1, 2]
-    g_z = g_z + (abs(x / z) > L_x) * x_ / z * g_x_ + (abs(y / z) > L_y) * y_ / z * g_y_
-    g_xyz = np.array([g_x, g_y, g_z])
-    return W.T @ g_xyz, g_R, g_S, g_xyz, np.outer(g_xyz, mu) + J.T @ g_T @ R.T
-
+print(inspect.getsource(definition.projection_reverse))
+print(inspect.getsource(definition.point_reverse))
 
 # %%
 g_uv, g_abc, g_z = rng.normal(size=(2, N)), rng.normal(size=(3, N)), rng.normal(size=N)
-for settings in (PAPER, EXACT):
+for settings, text_settings in presets:
     _, saved = projection_forward(mu, shape, camera, settings)
     grads = projection_reverse(g_uv, g_abc, g_z, saved, pose_gradient=True)
-    g_d, g_W = np.zeros(3), np.zeros((3, 3))
-    for i in range(N):
-        g_mu, g_R, g_S, g_xyz, part = reverse_text(
-            g_uv[:, i],
-            g_abc[:, i],
-            g_z[i],
-            mu[:, i],
-            shape.rotation[:, :, i],
-            shape.scale[:, i],
-            camera,
-            settings.jacobian_clamp,
-        )
-        np.testing.assert_allclose(grads.d_position[:, i], g_mu, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(grads.d_rotation[:, :, i], g_R, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(grads.d_scale[:, i], g_S, rtol=1e-9, atol=1e-10)
-        g_d, g_W = g_d + g_xyz, g_W + part
-    np.testing.assert_allclose(grads.d_camera.d_translation, g_d, rtol=1e-10)
-    np.testing.assert_allclose(grads.d_camera.d_rotation, g_W, rtol=1e-10)
+    _, text_saved = definition.projection_forward(mu, shape, camera, text_settings)
+    text = definition.projection_reverse(g_uv, g_abc, g_z, text_saved)
+    for found, expected in zip((*grads[:3], *grads.d_camera), (*text[:3], *text.d_camera)):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+g_d, g_W = text.d_camera.d_translation, text.d_camera.d_rotation
 
 # %% [markdown]
-# The direct form gives the same gradients as the form through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in
+# The direct form (6.5) is not in the definition; only the kernel needs it. It gives the same gradients as the form through $(a,b,c)$, with $g_a,g_b,g_c$ as printed in
 # {doc}`08_compositing`:
 
 
-# %% tags=["transcription"]
+# %%
 def footprint_reverse_text(g_A, g_m, g_r, T, S, a, b, c, det, eps=0.3):
     """g_S and g_T of one Gaussian from the footprint."""
     A, m, r = c / det, b / c, 1 / c
@@ -332,10 +324,7 @@ g_through = np.stack(
 )
 through = projection_reverse(g_uv, g_through, g_z, saved)
 for i in range(N):
-    S, (J, T) = (
-        shape.scale[:, i],
-        project_text(mu[:, i], shape.rotation[:, :, i], shape.scale[:, i], camera, 1.3)[3][-2:],
-    )
+    S, (T, J) = shape.scale[:, i], screen_matrix(i)
     g_S, g_T = footprint_reverse_text(
         g_A[i], g_m[i], g_r[i], T, S, a[i], b[i], c[i], projected.determinant[i]
     )
@@ -359,36 +348,27 @@ for name in ("position", "rotation", "scale"):
 # \end{aligned}
 # $$
 #
-# The gradients with respect to $W'$ and $\mathbf d'$ are those that the projection returned above. Every entry of $E$
-# depends on $\boldsymbol\omega$ through $[\boldsymbol\omega]_\times$ and through both factors, whose derivatives with
-# respect to $\omega_i$ are $\omega_i\alpha'$ and $\omega_i\beta'$.
+# The gradients with respect to $W'$ and $\mathbf d'$ are those that the projection returned above.
+#
+# **(6.12) The two products.** $W'=EW$ and $\mathbf d'=E\mathbf d+\boldsymbol\tau$ give $g_W=E^\top g_{W'}$,
+# $g_{\mathbf d}=E^\top g_{\mathbf d'}$, $g_{\boldsymbol\tau}=g_{\mathbf d'}$ and
+# $G=g_E=g_{W'}W^\top+g_{\mathbf d'}\mathbf d^\top$.
+#
+# **(6.13) The closed form.** Let $K=[\boldsymbol\omega]_\times$. Every entry of $E$ depends on $\omega_i$ through $K$,
+# where $\partial K/\partial\omega_i=[\mathbf e_i]_\times$, and through both factors, whose derivatives are
+# $\omega_i\alpha'$ and $\omega_i\beta'$ with $\alpha'=(\cos r-\alpha)/r^2$ and $\beta'=(\alpha-2\beta)/r^2$. The kernel
+# sums these parts:
+# $g_{\omega_i}=\langle\alpha G+\beta(GK^\top+K^\top G),[\mathbf e_i]_\times\rangle+\omega_i\langle G,\alpha'K+\beta'K^2\rangle$.
+#
+# **(6.14) The definition** needs no derivative of a series. The exponential of the block matrix
+# $\begin{bmatrix}K^\top&G\\0&K^\top\end{bmatrix}$ has $E^\top$ in its diagonal blocks and $g_K$ in the upper right one.
+# The spin of (5.5) turns $g_K$ into $g_{\boldsymbol\omega}$.
 
 
 # %% tags=["transcription"]
-def cross(w):
-    """[w]_x"""
-    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-
-
-def pose_text(W, d, omega, tau):
-    """W' and d'."""
-    r, K = np.linalg.norm(omega), cross(omega)
-    alpha, beta = np.sin(r) / r, (1 - np.cos(r)) / r**2
-    E = np.eye(3) + alpha * K + beta * K @ K
-    return E @ W, E @ d + tau, (E, K, r, alpha, beta)
-
-
-def pose_reverse_text(g_W, g_d, W, d, omega, E, K, r, alpha, beta):
-    """g_W, g_d, g_omega and g_tau."""
-    G = g_W @ W.T + np.outer(g_d, d)
-    alpha_prime, beta_prime = (np.cos(r) - alpha) / r**2, (alpha - 2 * beta) / r**2
-    g_omega = [
-        ((alpha * G + beta * (G @ K.T + K.T @ G)) * cross(e)).sum()
-        + omega[i] * (G * (alpha_prime * K + beta_prime * K @ K)).sum()
-        for i, e in enumerate(np.eye(3))
-    ]
-    return E.T @ g_W, E.T @ g_d, g_omega, g_d
-
+print(inspect.getsource(pose_definition.exponential))
+print(inspect.getsource(pose_definition.pose_forward))
+print(inspect.getsource(pose_definition.pose_reverse))
 
 # %%
 W, d, omega, tau = (
@@ -398,12 +378,22 @@ W, d, omega, tau = (
     np.array([0.1, 0.0, -0.2]),
 )
 *corrected, saved_pose = pose_forward(W, d, omega, tau)
-*expected, factors = pose_text(W, d, omega, tau)
+*expected, text_saved = pose_definition.pose_forward(W, d, omega, tau)
 for array, text in zip(corrected, expected):
     np.testing.assert_allclose(array, text, rtol=1e-13)
-found = pose_reverse(g_W, g_d, saved_pose)
-for array, text in zip(found, pose_reverse_text(g_W, g_d, W, d, omega, *factors)):
+for array, text in zip(
+    pose_reverse(g_W, g_d, saved_pose), pose_definition.pose_reverse(g_W, g_d, text_saved)
+):
     np.testing.assert_allclose(array, text, rtol=1e-11)
+
+# (6.13), written out
+K, r = pose_definition.CROSS @ omega, np.linalg.norm(omega)
+alpha, beta = np.sin(r) / r, (1 - np.cos(r)) / r**2
+G = g_W @ W.T + np.outer(g_d, d)
+inner = alpha * G + beta * (G @ K.T + K.T @ G)
+factors = (np.cos(r) - alpha) / r**2 * K + (alpha - 2 * beta) / r**2 * K @ K
+closed = np.einsum("ij,ijk->k", inner, pose_definition.CROSS) + omega * (G * factors).sum()
+np.testing.assert_allclose(pose_reverse(g_W, g_d, saved_pose)[2], closed, rtol=1e-11)
 
 # %% [markdown]
 # ## The gradient check
@@ -423,9 +413,11 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Make everything twice as large: positions, semi-axes, the translation of the camera, the near plane. What happens to
-# $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the gradient with respect to the position? Write down your answer
-# before you open the cell.
+# 1. A Gaussian lies on the optical axis. Which entries of $J$ are 0, and which gradients does $g_z$ then lack in (6.9)?
+# 2. Write `pose_reverse` from (6.12) and (6.13) and let the golden cases judge it: `--only pose` ({doc}`index`).
+# 3. The cell below answers this one. Make everything twice as large: positions, semi-axes, the
+#    translation of the camera, the near plane. What happens to $(u,v)$, to $(a,b,c)$ and to $z$? What happens to the
+#    gradient with respect to the position?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The screen does not change: x/z does not, and J halves while S doubles. z doubles.

@@ -20,10 +20,13 @@
 # The equation is {eq}`eq-b4` of {doc}`/specification/b04_harmonics`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.special import factorial, lpmv
 
+from endotsr.definition import harmonics as definition
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.harmonics import harmonics_forward, harmonics_reverse
 
@@ -41,65 +44,24 @@ N = 9
 # \end{aligned}
 # $$
 #
-# The specification has the table of the $Y_k$ and their derivatives. It is transcribed here with its closed-form
-# constants.
+# The specification has the table of the $Y_k$. Each is a polynomial in $x,y,z$ of degree at most 3. The definition stores
+# the polynomials as lists: a factor, then coefficient and exponents of each monomial.
 
 # %% tags=["transcription"]
-C_0, C_1 = np.sqrt(1 / (4 * np.pi)), np.sqrt(3 / (4 * np.pi))
-C_2a, C_2b, C_2c = (
-    np.sqrt(15 / (4 * np.pi)),
-    np.sqrt(5 / (16 * np.pi)),
-    np.sqrt(15 / (16 * np.pi)),
-)
-C_3a, C_3b, C_3c = (
-    np.sqrt(35 / (32 * np.pi)),
-    np.sqrt(105 / (4 * np.pi)),
-    np.sqrt(21 / (32 * np.pi)),
-)
-C_3d, C_3e = np.sqrt(7 / (16 * np.pi)), np.sqrt(105 / (16 * np.pi))
-
-
-def Y_text(x, y, z):
-    return np.array(
-        [
-            np.full_like(x, C_0),
-            -C_1 * y,
-            C_1 * z,
-            -C_1 * x,
-            C_2a * x * y,
-            -C_2a * y * z,
-            C_2b * (2 * z**2 - x**2 - y**2),
-            -C_2a * x * z,
-            C_2c * (x**2 - y**2),
-            -C_3a * y * (3 * x**2 - y**2),
-            C_3b * x * y * z,
-            -C_3c * y * (4 * z**2 - x**2 - y**2),
-            C_3d * z * (2 * z**2 - 3 * x**2 - 3 * y**2),
-            -C_3c * x * (4 * z**2 - x**2 - y**2),
-            C_3e * z * (x**2 - y**2),
-            -C_3a * x * (x**2 - 3 * y**2),
-        ]
-    )
-
-
-def colour_text(h, Delta_h0, mu, o, degree):
-    v = mu - o[:, None]
-    n = v / np.sqrt((v**2).sum(axis=0))
-    Y = Y_text(*n)
-    before = (
-        1 / 2 + Y[0] * (h[0] + Delta_h0) + sum(Y[k] * h[k] for k in range(1, (degree + 1) ** 2))
-    )
-    return np.maximum(0, before)
-
+for k, (factor, polynomial) in enumerate(definition.POLYNOMIALS):
+    terms = [f"{c:+d} x^{i} y^{j} z^{m}" for c, i, j, m in polynomial]
+    print(f"Y_{k:<2d} = {factor:+.6f} (" + " ".join(terms) + ")")
+print(inspect.getsource(definition.basis))
+print(inspect.getsource(definition.directions))
+print(inspect.getsource(definition.harmonics_forward))
 
 # %%
 h, residual = rng.normal(0, 0.6, (16, 3, N)), rng.normal(0, 0.3, (3, N))
 mu, centre = rng.normal(0, 1, (3, N)) + [[0], [0], [4]], rng.normal(0, 0.4, 3)
 for degree in range(4):
     colour, saved = harmonics_forward(h, residual, mu, centre, degree)
-    np.testing.assert_allclose(
-        colour, colour_text(h, residual, mu, centre, degree), rtol=1e-11, atol=1e-13
-    )
+    text, text_saved = definition.harmonics_forward(h, residual, mu, centre, degree)
+    np.testing.assert_allclose(colour, text, rtol=1e-11, atol=1e-13)
 assert saved.clamped.any() and colour.max() > 1, "clamped at 0; not clamped at 1"
 
 # %% [markdown]
@@ -122,7 +84,7 @@ for band in range(4):
             else np.sqrt(2) * (np.cos(m * azimuth) if m > 0 else np.sin(-m * azimuth))
         )
         real = norm * wave * lpmv(abs(m), band, np.cos(polar))
-        np.testing.assert_allclose(Y_text(*direction)[k], real, atol=1e-13)
+        np.testing.assert_allclose(definition.basis(direction, 16)[k], real, atol=1e-13)
         k += 1
 
 # %% [markdown]
@@ -144,7 +106,7 @@ for band in range(4):
         alone = np.zeros((16, 3, around.shape[1]))
         alone[k] = 0.4  # small enough that 1/2 + 0.4 Y stays above the clamp
         value = (harmonics_forward(alone, None, around, np.zeros(3), 3)[0][0] - 0.5) / 0.4
-        np.testing.assert_allclose(value, Y_text(*around)[k], atol=1e-12)
+        np.testing.assert_allclose(value, definition.basis(around, 16)[k], atol=1e-12)
         panel = figure.add_subplot(grid[band, 3 + m])
         panel.imshow(
             value.reshape(lon.shape),
@@ -158,7 +120,9 @@ for band in range(4):
         panel.axis("off")
 weights = np.cos(lat).ravel()
 gram = (
-    np.einsum("ku,lu,u->kl", Y_text(*around), Y_text(*around), weights)
+    np.einsum(
+        "ku,lu,u->kl", definition.basis(around, 16), definition.basis(around, 16), weights
+    )
     * (2 * np.pi / 73)
     * (np.pi / 36)
 )
@@ -166,12 +130,30 @@ assert np.abs(gram - np.eye(16)).max() < 0.05, "orthonormal on the sphere"
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# The colour is linear in the coefficients. The clamp passes the gradient where the value before it is $\ge0$. The
-# direction is $\mathbf n=\mathbf v/\|\mathbf v\|$: only the part of $g_{\mathbf n}$ that is perpendicular to
-# $\mathbf n$ remains, divided by the distance. This is the rule of the quaternion, because the normalisation is the
-# same.
+# A loss gives $g_{rgb}$. We need gradients with respect to the coefficients, the residual, the centre of each Gaussian
+# and the optical centre of the camera.
+#
+# **(7.1) The clamp.** $\max(0,\cdot)$ passes the gradient where the value before it is not negative:
+# $g^{\mathrm{pre}}=g_{rgb}$ there, and 0 elsewhere. At exactly 0 it passes.
+#
+# **(7.2) The coefficients.** The colour is linear in $h$, with the factor $Y_k(\mathbf n)$. So
+# $g_{h_k}=Y_k\,g^{\mathrm{pre}}$. The residual has the factor $Y_0$ of the coefficient to which it is added.
+#
+# **(7.3) The direction.** The three channels share $\mathbf n$. Each coefficient contributes the slope of its polynomial:
+# $g_{\mathbf n}=\sum_k\bigl(\sum_cg^{\mathrm{pre}}_ch_{kc}\bigr)\,\partial Y_k/\partial(x,y,z)$. $Y_0$ is constant and
+# has no slope.
+#
+# **(7.4) The slope of a monomial.** $\partial(x^iy^jz^m)/\partial x=i\,x^{i-1}y^jz^m$, with $x,y,z$ taken as independent.
+# The gradient then has a part along $\mathbf n$, which (7.5) removes.
+#
+# **(7.5) The normalisation.** $\mathbf n=\mathbf v/\|\mathbf v\|$ gives
+# $\mathrm d\mathbf n=(I-\mathbf n\mathbf n^\top)\,\mathrm d\mathbf v/\|\mathbf v\|$. Only the part of $g_{\mathbf n}$ that is
+# perpendicular to $\mathbf n$ remains, divided by the distance. This is the rule (5.8) of the quaternion.
+#
+# **(7.6) The two ends.** $\mathbf v=\mu-\mathbf o$: the centre of the Gaussian receives $+g_{\mathbf v}$. The optical
+# centre is shared by all Gaussians and receives $-\sum_ig_{\mathbf v_i}$.
 #
 # $$
 # \begin{aligned}
@@ -184,52 +166,22 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def dY_text(x, y, z):
-    """The right column of the table: d/dx, d/dy, d/dz, taken as independent. (16, 3)"""
-    return np.array(
-        [
-            [0, 0, 0],
-            [0, -C_1, 0],
-            [0, 0, C_1],
-            [-C_1, 0, 0],
-            [C_2a * y, C_2a * x, 0],
-            [0, -C_2a * z, -C_2a * y],
-            [-C_2b * 2 * x, -C_2b * 2 * y, C_2b * 4 * z],
-            [-C_2a * z, 0, -C_2a * x],
-            [C_2c * 2 * x, -C_2c * 2 * y, 0],
-            [-C_3a * 6 * x * y, -C_3a * (3 * x**2 - 3 * y**2), 0],
-            [C_3b * y * z, C_3b * x * z, C_3b * x * y],
-            [C_3c * 2 * x * y, -C_3c * (4 * z**2 - x**2 - 3 * y**2), -C_3c * 8 * y * z],
-            [-C_3d * 6 * x * z, -C_3d * 6 * y * z, C_3d * (6 * z**2 - 3 * x**2 - 3 * y**2)],
-            [-C_3c * (4 * z**2 - 3 * x**2 - y**2), C_3c * 2 * x * y, -C_3c * 8 * x * z],
-            [C_3e * 2 * x * z, -C_3e * 2 * y * z, C_3e * (x**2 - y**2)],
-            [-C_3a * (3 * x**2 - 3 * y**2), C_3a * 6 * x * y, 0],
-        ]
-    )
-
-
-def reverse_text(g_rgb, h, Delta_h0, mu, o):
-    g_h, g_mu, g_o = np.zeros_like(h), np.zeros_like(mu), np.zeros(3)
-    for i in range(mu.shape[1]):
-        v = mu[:, i] - o
-        distance = np.sqrt((v**2).sum())
-        n = v / distance
-        Y = Y_text(*n)
-        before = 1 / 2 + Y[0] * Delta_h0[:, i] + Y @ h[:, :, i]
-        g_pre = np.where(before >= 0, g_rgb[:, i], 0)
-        g_h[:, :, i] = Y[:, None] * g_pre
-        g_n = (h[:, :, i] @ g_pre) @ dY_text(*n)
-        g_v = (g_n - (n @ g_n) * n) / distance
-        g_mu[:, i] = g_v
-        g_o -= g_v
-    return g_h, g_h[0], g_mu, g_o
-
+print(inspect.getsource(definition.basis_slopes))
+print(inspect.getsource(definition.harmonics_reverse))
 
 # %%
 g_rgb = rng.normal(size=(3, N))
 grads = harmonics_reverse(g_rgb, saved)
-for found, text in zip(grads, reverse_text(g_rgb, h, residual, mu, centre)):
-    np.testing.assert_allclose(found, text, rtol=1e-9, atol=1e-12)
+text = definition.harmonics_reverse(g_rgb, text_saved)
+for found, expected in zip(grads, text):
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+# Euler: a homogeneous polynomial of degree l has the slope l Y along n.
+# (7.5) removes that part.
+n, _ = definition.directions(mu, centre)
+along = np.einsum("kan,an->kn", definition.basis_slopes(n, 16), n)
+powers = np.array([sum(p[0][1:]) for _, p in definition.POLYNOMIALS])
+np.testing.assert_allclose(along, powers[:, None] * definition.basis(n, 16), atol=1e-13)
 
 # %% [markdown]
 # ## The gradient check
@@ -250,8 +202,12 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# Mirror the scene: negate $x$ of all positions and of the camera. Which coefficients must change their sign so that
-# every Gaussian keeps its colour? Find the answer in the table, then check it with the kernel.
+# 1. All coefficients of a Gaussian above degree 0 are 0. Which gradients vanish? Which of (7.2) and (7.3) decides it?
+# 2. Write `harmonics_reverse` from (7.1) to (7.6) and let the golden cases judge it: `--only harmonics` ({doc}`index`).
+#    One case has a Gaussian at the camera itself.
+# 3. The cell below answers this one. Mirror the scene: negate $x$ of all positions and of the camera. Which
+#    coefficients must change their sign so that every Gaussian keeps its colour? Find the answer in the list of
+#    polynomials, then check it with the kernel.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Those whose Y_k is odd in x: k = 3, 4, 7, 10, 13, 15. (Y_14 = z (x^2 - y^2) is even.)

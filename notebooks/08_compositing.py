@@ -228,23 +228,23 @@ plt.show()
 # A loss gives $g_{\hat I},g_{\hat D},g_{\hat O}$ at each pixel. We need gradients with respect to every $\alpha_k$,
 # colour and depth.
 #
-# **Line 1. The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
+# **(8.1) The colour behind.** Let $R_k$ be the colour of the pixel without the Gaussians $0,\dots,k-1$. Then
 # $\hat I=R_0$. Gaussian $k$ covers the fraction $\alpha_k$ of the colour behind it:
 # $R_k=\alpha_k\,rgb_k+(1-\alpha_k)R_{k+1}$, ending with $R_n=\mathbf{bg}$.
 #
-# **Line 2. Its weight in the pixel.** Unrolling line 1 from the front gives
+# **(8.2) Its weight in the pixel.** Unrolling (8.1) from the front gives
 # $\hat I=\sum_{l<k}\alpha_lT_l\,rgb_l+T_kR_k$. So $\partial\hat I/\partial R_k=T_k$: every change behind is weighted by
 # the transmittance in front.
 #
-# **Line 3. One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
+# **(8.3) One opacity.** $T_k$ does not depend on $\alpha_k$, only on the opacities in front. $R_{k+1}$ does not
 # depend on it either, only on the opacities behind. So
 # $\partial\hat I/\partial\alpha_k=T_k\,\partial R_k/\partial\alpha_k=T_k\,(rgb_k-R_{k+1})$. More opacity adds colour of
 # Gaussian $k$ and removes colour behind it.
 #
-# **Line 4. Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and 0 as background. They
+# **(8.4) Depth and opacity** are the same sum, with $z_k$ or $1$ in place of the colour and 0 as background. They
 # give $Z_k$ and $Q_k$.
 #
-# **Line 5. Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
+# **(8.5) Colour and depth of the Gaussian** enter linearly, with the weight $\alpha_kT_k$.
 #
 # There is no division by $1-\alpha_k$, so $\alpha_k=1$ is not a special case:
 #
@@ -259,11 +259,11 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Line 6. From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
+# **(8.6) From $\alpha$ to the footprint.** Where the clamp is active, all of the following is 0. Elsewhere
 # $\alpha=o\,e^{-q/2}$, so $\mathrm d\alpha=\alpha\,\mathrm d\ln o-\tfrac12\alpha\,\mathrm dq$, and
 # $\mathrm d\ln o=(1-o)\,\mathrm d\,\mathrm{logit}$.
 #
-# **Line 7. Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
+# **(8.7) Through $q$.** $q=r\,d_y^2+A\,\eta^2$ with $\eta=d_x-m\,d_y$, $\mathrm d d_x=-\mathrm du$,
 # $\mathrm d d_y=-\mathrm dv$:
 #
 # $$
@@ -274,7 +274,7 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Line 8. Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
+# **(8.8) Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
 # $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
 # $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
@@ -292,12 +292,12 @@ def reverse_text(g_I, g_D, g_O, scene, settings):
         for column in range(WIDTH):
             g_I_p, g_D_p, g_O_p = g_I[:, row, column], g_D[row, column], g_O[row, column]
             contributors, T_n = pixel_text(column, row, scene, settings)
-            R, Z, Q = background, 0.0, 0.0  # lines 1 and 4: what is behind the last one
+            R, Z, Q = background, 0.0, 0.0  # (8.1), (8.4): what is behind the last one
             g["background"] += T_n * g_I_p
             for i, alpha, T in reversed(contributors):
                 rgb, z = scene["colour"][:, i], scene["depth"][i]
-                g_alpha = T * ((rgb - R) @ g_I_p + (z - Z) * g_D_p + (1 - Q) * g_O_p)  # line 3
-                g["colour"][:, i] += alpha * T * g_I_p  # line 5
+                g_alpha = T * ((rgb - R) @ g_I_p + (z - Z) * g_D_p + (1 - Q) * g_O_p)  # (8.3)
+                g["colour"][:, i] += alpha * T * g_I_p  # (8.5)
                 g["depth"][i] += alpha * T * g_D_p
                 R, Z, Q = (
                     alpha * rgb + (1 - alpha) * R,
@@ -307,17 +307,17 @@ def reverse_text(g_I, g_D, g_O, scene, settings):
                 o = 1 / (1 + np.exp(-scene["logit"][i]))
                 q, eta, d_y, m, r, A = footprint_text(i, column, row, scene)
                 if o * np.exp(-q / 2) > settings.alpha_max:
-                    continue  # line 6: the clamp holds
+                    continue  # (8.6): the clamp holds
                 g["logit"][i] += alpha * (1 - o) * g_alpha
                 g_q = -1 / 2 * alpha * g_alpha
-                g_A[i] += eta**2 * g_q  # line 7
+                g_A[i] += eta**2 * g_q  # (8.7)
                 g_m[i] += -2 * A * eta * d_y * g_q
                 g_r[i] += d_y**2 * g_q
                 g["mean2d"][0, i] += -2 * A * eta * g_q
                 g["mean2d"][1, i] += -2 * (r * d_y - A * m * eta) * g_q
     a, b, c = scene["covariance2d"]
     m, r, A = b / c, 1 / c, c / (a * c - b**2)
-    g["covariance2d"][0] = -(A**2) * g_A  # line 8
+    g["covariance2d"][0] = -(A**2) * g_A  # (8.8)
     g["covariance2d"][1] = 2 * A**2 * m * g_A + r * g_m
     g["covariance2d"][2] = -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r
     return g

@@ -24,9 +24,16 @@
 # losses do.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import depth as depth_definition
+from endotsr.definition import exposure as exposure_definition
+from endotsr.definition import masked_l1 as l1_definition
+from endotsr.definition import masked_ssim as definition
+from endotsr.definition import smoothness as smoothness_definition
 from endotsr.equations.exposure import exposure_forward, exposure_reverse
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.losses.depth import (
@@ -84,55 +91,32 @@ H, W = M.shape
 
 
 # %% tags=["transcription"]
-def l1_text(I_hat, I, M):
-    n = M.sum()
-    return np.abs(I_hat - I)[:, M].sum() / (3 * n)
-
-
-kappa = np.exp(-(np.arange(-5, 6) ** 2) / (2 * 1.5**2))
-kappa = kappa / kappa.sum()
-
-
-def window(image):
-    """k * image, zeros outside."""
-    padded = np.pad(image, ((0, 0), (5, 5), (5, 5)))
-    h, w = image.shape[1:]
-    return sum(
-        kappa[i] * kappa[j] * padded[:, i : i + h, j : j + w]
-        for i in range(11)
-        for j in range(11)
-    )
-
-
-def ssim_map_text(x, y):
-    C_1, C_2 = 1e-4, 9e-4
-    mu_x, mu_y = window(x), window(y)
-    var_x, var_y = window(x**2) - mu_x**2, window(y**2) - mu_y**2
-    cov = window(x * y) - mu_x * mu_y
-    a_1, a_2 = 2 * mu_x * mu_y + C_1, 2 * cov + C_2
-    b_1, b_2 = mu_x**2 + mu_y**2 + C_1, var_x + var_y + C_2
-    return a_1 * a_2 / (b_1 * b_2), (mu_x, mu_y, a_1, a_2, b_1, b_2)
-
-
-def stable_map_text(x, y):
-    C_1, C_2 = 1e-4, 9e-4
-    e, f = x - y, x + y
-    mu_e, mu_f = window(e), window(f)
-    B_1 = (mu_f**2 + mu_e**2) / 2 + C_1
-    B_2 = (window(f**2) - mu_f**2 + window(e**2) - mu_e**2) / 2 + C_2
-    P, Q = 1 - mu_e**2 / B_1, 1 - (window(e**2) - mu_e**2) / B_2
-    return P * Q
+print(inspect.getsource(l1_definition.masked_l1_forward))
+print(inspect.getsource(definition.blurred))
+print(inspect.getsource(definition.masked_ssim_forward))
 
 
 # %%
+def stable_map(x, y, C_1=1e-4, C_2=9e-4):
+    """s from the difference and the sum, as the kernel has it."""
+    e, f = x - y, x + y
+    (mu_e, mu_f), (e_e, f_f) = (
+        map(definition.blurred, (e, f)),
+        map(definition.blurred, (e * e, f * f)),
+    )
+    B_1, B_2 = (mu_f**2 + mu_e**2) / 2 + C_1, (f_f - mu_f**2 + e_e - mu_e**2) / 2 + C_2
+    return (1 - mu_e**2 / B_1) * (1 - (e_e - mu_e**2) / B_2)
+
+
 l1, saved_l1 = masked_l1_forward(I_hat, I, M)
-np.testing.assert_allclose(l1, l1_text(I_hat, I, M), rtol=1e-13)
-x, y = np.where(M, I_hat, 0), np.where(M, I, 0)
-s, parts = ssim_map_text(x, y)
-np.testing.assert_allclose(stable_map_text(x, y), s, atol=1e-11)
-target = ssim_target(I, M)
+l1_text, l1_text_saved = l1_definition.masked_l1_forward(I_hat, I, M)
+np.testing.assert_allclose(l1, l1_text, rtol=1e-13)
+target, text_target = ssim_target(I, M), definition.ssim_target(I, M)
 S, saved_ssim = masked_ssim_forward(I_hat, target)
-np.testing.assert_allclose(S, s[:, M].sum() / (3 * M.sum()), rtol=1e-11)
+S_text, ssim_text_saved = definition.masked_ssim_forward(I_hat, text_target)
+np.testing.assert_allclose(S, S_text, rtol=1e-11)
+x, y = np.where(M, I_hat, 0), np.where(M, I, 0)
+np.testing.assert_allclose(stable_map(x, y), ssim_text_saved.map, atol=1e-11)
 assert masked_ssim_forward(I, target)[0] == 1.0
 
 # %% [markdown]
@@ -161,34 +145,16 @@ assert masked_ssim_forward(I, target)[0] == 1.0
 
 
 # %% tags=["transcription"]
-def depth_text(D_hat, D, M):
-    V = M & (D > 0) & np.isfinite(D)
-    m, m_D = D_hat.max(), D[(D > 0) & np.isfinite(D)].max()
-    return np.abs(D_hat / m - D / m_D)[V].sum() / V.sum()
-
-
-def smoothness_text(D_hat, I_hat, M, E, f):
-    nu = M & ~E
-    total = 0.0
-    for axis in (0, 1):
-        both = nu & np.roll(nu, -1, axis)
-        both = both[:-1] if axis == 0 else both[:, :-1]
-        total += (np.diff(D_hat, axis=axis) ** 2)[both].sum()
-    Q = total / (nu.sum() + 1e-6)
-
-    def TV(image):
-        bar = np.where(M, 0, image)
-        return (
-            np.abs(np.diff(bar, axis=1)).sum() + np.abs(np.diff(bar, axis=2)).sum()
-        ) / bar.size
-
-    return Q + f * TV(D_hat[None]) + f * TV(I_hat)
-
+print(inspect.getsource(depth_definition.normalised_depth_forward))
+print(inspect.getsource(smoothness_definition.squared_steps))
+print(inspect.getsource(smoothness_definition.total_variation))
+print(inspect.getsource(smoothness_definition.smoothness_forward))
 
 # %%
-prior = depth_target(D_prior, M)
+prior, text_prior = depth_target(D_prior, M), depth_definition.depth_target(D_prior, M)
 L_D, saved_depth = normalised_depth_forward(D_hat, prior)
-np.testing.assert_allclose(L_D, depth_text(D_hat, D_prior, M), rtol=1e-12)
+L_D_text, depth_text_saved = depth_definition.normalised_depth_forward(D_hat, text_prior)
+np.testing.assert_allclose(L_D, L_D_text, rtol=1e-12)
 np.testing.assert_allclose(
     normalised_depth_forward(D_hat, depth_target(7 * D_prior, M))[0], L_D, rtol=1e-12
 )
@@ -202,13 +168,19 @@ for depth in (90.0, 0.9 * D_prior.max(), np.nan):
     moved = normalised_depth_forward(D_hat, depth_target(on_tool, M))[0]
     print(f"prior {depth:.0f} on the instrument: loss {L_D:.3f} -> {moved:.3f}")
     assert (moved == L_D) == (not depth > D_prior.max())
-    np.testing.assert_allclose(moved, depth_text(D_hat, on_tool, M), rtol=1e-12)
+    text = depth_definition.depth_target(on_tool, M)
+    np.testing.assert_allclose(
+        moved, depth_definition.normalised_depth_forward(D_hat, text)[0], rtol=1e-12
+    )
 
 step = D_hat + 80 * (np.arange(W) > 20)  # a fold, so that there is an edge
 E = canny_edges(step)
 assert E.any()
 L_smooth, saved_smooth = smoothness_forward(step, I_hat, M, E, 30.0)
-np.testing.assert_allclose(L_smooth, smoothness_text(step, I_hat, M, E, 30.0), rtol=1e-12)
+smooth_text, smooth_text_saved = smoothness_definition.smoothness_forward(
+    step, I_hat, M, E, 30.0
+)
+np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
 
 # %% [markdown]
 # ## Figure: why SSIM is used beside L1
@@ -228,13 +200,15 @@ axes[1, 0].imshow(M, cmap="gray")
 axes[1, 0].set_title("mask")
 scores = {}
 for column, (name, change) in enumerate(changes.items(), start=1):
-    render = I + change * (l1_text(blurred, 0 * I, M) / l1_text(change, 0 * I, M))
+    size_wanted, size = (masked_l1_forward(array, 0 * I, M)[0] for array in (blurred, change))
+    render = I + change * (size_wanted / size)
     scores[name] = masked_ssim_forward(render, target)[0]
     axes[0, column].imshow(np.clip(render, 0, 1).transpose(1, 2, 0))
     axes[0, column].set_title(
-        f"{name}: L1 {l1_text(render, I, M):.3f}, SSIM {scores[name]:.3f}"
+        f"{name}: L1 {masked_l1_forward(render, I, M)[0]:.3f}, SSIM {scores[name]:.3f}"
     )
-    lost = np.where(M, 1 - ssim_map_text(np.where(M, render, 0), y)[0].mean(axis=0), np.nan)
+    similarity = definition.masked_ssim_forward(render, text_target)[1].map
+    lost = np.where(M, 1 - similarity.mean(axis=0), np.nan)
     axes[1, column].imshow(lost, vmin=0, vmax=1, cmap="magma")
 for panel in axes.flat:
     panel.set(xticks=[], yticks=[])
@@ -242,17 +216,34 @@ assert scores["brighter"] > scores["noisy"] and scores["brighter"] > scores["blu
 plt.show()
 
 # %% [markdown]
-# ## The reverse passes
+# ## The reverse passes, line by line
 #
-# **L1.** The derivative of $|\cdot|$ is the sign, with $\operatorname{sign}(0)=0$.
+# **(10.1) L1.** The derivative of $|x|$ is $\operatorname{sign}(x)$, with $\operatorname{sign}(0)=0$. The mean has the
+# factor $1/(3n)$. Excluded pixels are not in the sum.
 #
 # $$
 # g_{\hat I_{cp}}=\begin{cases}\dfrac{g_{\mathcal L_1}}{3n}\operatorname{sign}(\hat I_{cp}-I_{cp}) & M_p\\ 0 & \text{otherwise,}\end{cases}\qquad \operatorname{sign}(0)=0 .
 # $$
 #
-# **SSIM.** $s$ depends on $x$ through three windowed images, $k*x$, $k*x^2$ and $k*(xy)$; call the derivatives with
-# respect to them $p$, $p_{xx}$, $p_{xy}$ (after $\sigma^2$ and $\sigma_{xy}$ are written out). The window is symmetric,
-# so the reverse of $k*$ is $k*$ itself; $x^2$ gives the factor $2x$, and $xy$ the factor $y$:
+# **(10.2) SSIM: what depends on $x$.** $y$ is held fixed. $x$ enters through three windowed images: $\mu_x=k*x$,
+# $X=k*x^2$ and $Z=k*(xy)$. In these, $a_1=2\mu_x\mu_y+C_1$, $a_2=2(Z-\mu_x\mu_y)+C_2$, $b_1=\mu_x^2+\mu_y^2+C_1$ and
+# $b_2=X-\mu_x^2+\sigma_y^2+C_2$.
+#
+# **(10.3) The logarithmic differential** of $s=a_1a_2/(b_1b_2)$ is
+# $\mathrm ds=\dfrac{a_2\,\mathrm da_1+a_1\,\mathrm da_2}{b_1b_2}-s\Bigl(\dfrac{\mathrm db_1}{b_1}+\dfrac{\mathrm db_2}{b_2}\Bigr)$.
+#
+# **(10.4) The partial with respect to $\mu_x$.** $\mathrm da_1=2\mu_y\,\mathrm d\mu_x$,
+# $\mathrm da_2=-2\mu_y\,\mathrm d\mu_x$, $\mathrm db_1=2\mu_x\,\mathrm d\mu_x$ and $\mathrm db_2=-2\mu_x\,\mathrm d\mu_x$. So
+# $\partial s/\partial\mu_x=2\mu_y(a_2-a_1)/(b_1b_2)-2\mu_xs\,(1/b_1-1/b_2)$.
+#
+# **(10.5) The partial with respect to $X$.** Only $b_2$ contains it, with factor 1: $\partial s/\partial X=-s/b_2$.
+#
+# **(10.6) The partial with respect to $Z$.** Only $a_2$ contains it, with factor 2:
+# $\partial s/\partial Z=2a_1/(b_1b_2)$.
+#
+# **(10.7) Back through the window.** With $\nu=g_{\mathcal S}/(3n)$ on tissue and 0 elsewhere, the three partials become
+# the images $p,p_{xx},p_{xy}$. The window is symmetric and 0 outside the image, so the adjoint of $k*$ is $k*$ itself.
+# Then $\mathrm d(x^2)=2x\,\mathrm dx$ and $\mathrm d(xy)=y\,\mathrm dx$ give the last line.
 #
 # $$
 # \begin{aligned}
@@ -262,13 +253,24 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **Depth.** The maximum is part of the formula, so the gradient at the largest pixel contains a sum over all pixels.
+# **(10.8) Depth: each pixel.** With $m$ held fixed, $\partial|\hat D_p/m-D_p/m_D|/\partial\hat D_p=\sigma_p/m$, where
+# $\sigma_p$ is the sign of the residual on valid pixels and 0 elsewhere.
+#
+# **(10.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
+# $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. It belongs to the pixels $\mathcal P^\star$ that hold the maximum, in equal parts.
+# The maximum $m_D$ of the prior is a constant.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
 # $$
 #
-# **Smoothness.** Each pixel has at most four neighbours.
+# **(10.10) Smoothness: a pair.** $(\hat D_p-\hat D_{p'})^2$ has the gradient $2(\hat D_p-\hat D_{p'})$ at $p$ and its
+# negative at $p'$. $|\bar x_p-\bar x_{p'}|$ has $\pm\operatorname{sign}(\bar x_p-\bar x_{p'})$. The adjoint of the difference of
+# neighbours along an axis is minus the difference of the padded gradients along this axis.
+#
+# **(10.11) Smoothness: a pixel.** A pixel has at most four neighbours; its gradient is the sum over their pairs. The
+# weights $\nu_p\nu_{p'}$ and the edges $E$ are constants. On tissue $\bar D=0$ whatever $\hat D$ is, so the total
+# variation has no gradient there.
 #
 # $$
 # \begin{aligned}
@@ -280,67 +282,33 @@ plt.show()
 
 
 # %% tags=["transcription"]
-def ssim_reverse_text(g_S, x, y, M):
-    s, (mu_x, mu_y, a_1, a_2, b_1, b_2) = ssim_map_text(x, y)
-    nu = np.where(M, g_S / (3 * M.sum()), 0)
-    p = nu * (2 * mu_y * (a_2 - a_1) / (b_1 * b_2) - 2 * mu_x * s * (1 / b_1 - 1 / b_2))
-    p_xx, p_xy = -nu * s / b_2, nu * 2 * a_1 / (b_1 * b_2)
-    return np.where(M, window(p) + 2 * x * window(p_xx) + y * window(p_xy), 0)
-
-
-def depth_reverse_text(g, D_hat, D, M):
-    V = M & (D > 0) & np.isfinite(D)
-    m, m_D = D_hat.max(), D[D > 0].max()
-    sigma = np.where(V, np.sign(D_hat / m - D / m_D), 0)
-    P_star = D_hat == m
-    return g / V.sum() * (sigma / m - P_star / P_star.sum() / m**2 * (sigma * D_hat).sum())
-
-
-def over_neighbours(term, image):
-    """sum over p' ~ p of term(image_p, image_p')"""
-    total = np.zeros(image.shape)
-    h, w = image.shape
-    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-        here = np.s_[max(0, -dy) : h - max(0, dy), max(0, -dx) : w - max(0, dx)]
-        there = np.s_[max(0, dy) : h - max(0, -dy), max(0, dx) : w - max(0, -dx)]
-        total[here] += term(here, there)
-    return total
-
-
-def smoothness_reverse_text(g, D_hat, I_hat, M, E, f):
-    nu = M & ~E
-    squares = over_neighbours(lambda p, q: nu[q] * (D_hat[p] - D_hat[q]), D_hat)
-
-    def signs(image):
-        bar = np.where(M, 0, image)
-        return over_neighbours(lambda p, q: np.sign(bar[p] - bar[q]), bar)
-
-    g_D = g * (2 * nu * squares / (nu.sum() + 1e-6) + ~M * f / (H * W) * signs(D_hat))
-    g_I = g * ~M * f / (3 * H * W) * np.array([signs(channel) for channel in I_hat])
-    return g_I, g_D
-
+print(inspect.getsource(l1_definition.masked_l1_reverse))
+print(inspect.getsource(definition.masked_ssim_reverse))
+print(inspect.getsource(depth_definition.normalised_depth_reverse))
+print(inspect.getsource(smoothness_definition.steps_reverse))
+print(inspect.getsource(smoothness_definition.smoothness_reverse))
 
 # %%
-n = M.sum()
 np.testing.assert_allclose(
     masked_l1_reverse(0.9, saved_l1),
-    np.where(M, 0.9 / (3 * n) * np.sign(I_hat - I), 0),
+    l1_definition.masked_l1_reverse(0.9, l1_text_saved),
     rtol=1e-13,
 )
 np.testing.assert_allclose(
     masked_ssim_reverse(-0.1, saved_ssim),
-    ssim_reverse_text(-0.1, x, y, M),
+    definition.masked_ssim_reverse(-0.1, ssim_text_saved),
     rtol=1e-6,
     atol=1e-12,
 )
 np.testing.assert_allclose(
     normalised_depth_reverse(1.0, saved_depth),
-    depth_reverse_text(1.0, D_hat, D_prior, M),
+    depth_definition.normalised_depth_reverse(1.0, depth_text_saved),
     rtol=1e-9,
     atol=1e-16,
 )
 for found, text in zip(
-    smoothness_reverse(0.5, saved_smooth), smoothness_reverse_text(0.5, step, I_hat, M, E, 30.0)
+    smoothness_reverse(0.5, saved_smooth),
+    smoothness_definition.smoothness_reverse(0.5, smooth_text_saved),
 ):
     np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-18)
 
@@ -351,22 +319,23 @@ for found, text in zip(
 # \tilde I_{cp}=e^{\gamma_{kc}}\,\hat I_{cp}+b_{kc}.
 # $$
 #
-# The colour of every pixel of a channel goes through the same two numbers. So their gradients are sums over the pixels, and that
-# of $\gamma_c$ has the factor $e^{\gamma_c}$ of the exponential.
+# **(10.12) Exposure.** All pixels of a channel share two numbers, so their gradients are sums over the pixels:
+# $g_{b_c}=\sum_pg_{\tilde I_{cp}}$ and $g_{\gamma_c}=e^{\gamma_c}\sum_pg_{\tilde I_{cp}}\hat I_{cp}$. The colour has
+# $g_{\hat I_{cp}}=e^{\gamma_c}g_{\tilde I_{cp}}$.
+
+# %% tags=["transcription"]
+print(inspect.getsource(exposure_definition.exposure_forward))
+print(inspect.getsource(exposure_definition.exposure_reverse))
 
 # %%
 gamma, b = rng.normal(0, 0.3, 3), rng.normal(0, 0.1, 3)
 exposed, saved_exposure = exposure_forward(I_hat, gamma, b)
 g_I = rng.normal(size=I_hat.shape)
 found = exposure_reverse(g_I, saved_exposure)
-for c in range(3):
-    gain = np.exp(gamma[c])
-    np.testing.assert_allclose(exposed[c], gain * I_hat[c] + b[c], rtol=1e-14)
-    np.testing.assert_allclose(found.d_colour[c], gain * g_I[c], rtol=1e-14)
-    np.testing.assert_allclose(
-        found.d_log_gain[c], gain * (g_I[c] * I_hat[c]).sum(), rtol=1e-11
-    )
-    np.testing.assert_allclose(found.d_bias[c], g_I[c].sum(), rtol=1e-11)
+text, text_saved = exposure_definition.exposure_forward(I_hat, gamma, b)
+np.testing.assert_allclose(exposed, text, rtol=1e-14)
+for array, expected in zip(found, exposure_definition.exposure_reverse(g_I, text_saved)):
+    np.testing.assert_allclose(array, expected, rtol=1e-11)
 
 # %% [markdown]
 # ## The gradient check
@@ -381,8 +350,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The depth loss does not change when the rendered depth is multiplied by a constant. What follows for the sum
-# $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that makes it true.
+# 1. Render and frame are equal. Which of the three partials (10.4) to (10.6) is 0 there, and why is their sum in (10.7)
+#    0 as well?
+# 2. Write the pair of (B7) from (10.2) to (10.7) and let the golden cases judge it: `--only masked_ssim`
+#    ({doc}`index`). The case `not_finite_under_mask` refuses a mask that multiplies.
+# 3. The cell below answers this one. The depth loss does not change when the rendered depth is multiplied by a
+#    constant. What follows for the sum $\sum_p g_{\hat D_p}\hat D_p$? Check it, and find the term of the gradient that
+#    makes it true.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The derivative along D_hat itself is zero: the sum is 0. The term of the maximum

@@ -21,6 +21,10 @@ SHOWS_THE_DEFINITION = {
     "02_colour_residual",
     "03_deformation",
     "04_motion_and_prior",
+    "05_covariance",
+    "06_projection",
+    "07_harmonics",
+    "10_base_losses",
 }  # in place of a transcription of its own
 WITHOUT_DERIVATIVE = {"00_why", "16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book

@@ -26,14 +26,14 @@ def rotation_of(q):
     """R (3, 3, N) of unit quaternions w + v: (w^2 - v.v) I + 2 v v^T + 2 w [v]_x; the kernel writes nine entries."""
     w, v = q[0], q[1:]
     outer, cross = np.einsum("in,jn->ijn", v, v), np.einsum("ijk,kn->ijn", CROSS, v)
-    return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross
+    return (w * w - (v * v).sum(axis=0)) * np.eye(3)[:, :, None] + 2 * outer + 2 * w * cross  # (5.4)
 
 
 def rotation_reverse(q, g):
     """From g = dL/dR (3, 3, N) to the unit quaternions (4, N)."""
     w, v = q[0], q[1:]
-    trace, spin = np.einsum("iin->n", g), np.einsum("ijn,ijk->kn", g, CROSS)
-    along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)
+    trace, spin = np.einsum("iin->n", g), np.einsum("ijn,ijk->kn", g, CROSS)  # (5.5)
+    along = np.einsum("ijn,jn->in", g + g.transpose(1, 0, 2), v)  # (5.6)
     return np.concatenate([[2 * w * trace + 2 * (spin * v).sum(axis=0)], -2 * v * trace + 2 * along + 2 * w * spin])
 
 
@@ -47,8 +47,8 @@ def covariance_reverse(d_shape, saved):
     """Reverse of (B2): what is along q is removed, a clipped log-scale has no gradient."""
     q, inverse_norm = unit(saved.quaternion)
     g = rotation_reverse(q, d_shape.rotation)
-    d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm
-    free = np.abs(saved.log_scale) <= 40
+    d_quaternion = (g - (g * q).sum(axis=0) * q) * inverse_norm  # (5.8)
+    free = np.abs(saved.log_scale) <= 40  # (5.3)
     return CovarianceGrads(d_quaternion, np.where(free, d_shape.scale * np.exp(np.clip(saved.log_scale, -40, 40)), 0))
 
 

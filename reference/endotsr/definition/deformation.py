@@ -26,11 +26,11 @@ def deformation_reverse(d_offsets, saved):
     """Reverse of (B1): from d_offsets (10, N). The kernel takes one exponential for value and derivatives."""
     w, centre, width, t, basis = saved
     delta, sigma, e = bell(centre, width, t, basis)
-    d_e = w * d_offsets[:, None]
-    d_exponent = np.where(e == 0, 0, -d_e * e)
+    d_e = w * d_offsets[:, None]  # (3.1)
+    d_exponent = np.where(e == 0, 0, -d_e * e)  # (3.2)
     if basis == "quartic":
-        by_delta, by_width = 4 * delta**3 / sigma**2, -4 * delta**4 * width / sigma**3
+        by_delta, by_width = 4 * delta**3 / sigma**2, -4 * delta**4 * width / sigma**3  # (3.3), (3.4)
     else:
-        by_delta, by_width = delta / sigma, -(delta**2) * width / sigma**2
-    d_centre = -d_exponent * by_delta
-    return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())
+        by_delta, by_width = delta / sigma, -(delta**2) * width / sigma**2  # (3.3), (3.4)
+    d_centre = -d_exponent * by_delta  # (3.5)
+    return DeformationGrads(e * d_offsets[:, None], d_centre, d_exponent * by_width, -d_centre.sum())  # (3.6)

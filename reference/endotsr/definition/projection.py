@@ -54,23 +54,23 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
     j, slope, free = jacobian(point, camera, settings)
     sigma, t = covariance_matrix(shape), np.einsum("ijn,jk->ikn", j, w)
     g_a, g_b, g_c = d_covariance2d
-    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])
-    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)
+    g2 = np.array([[g_a, g_b / 2], [g_b / 2, g_c]])  # (6.1)
+    g_sigma = np.einsum("ikn,ijn,jln->kln", t, g2, t)  # (6.2)
     g_t = 2 * np.einsum("ijn,jkn,kln->iln", g2, t, sigma)
-    g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)
+    g_m = 2 * np.einsum("ijn,jkn->ikn", g_sigma, shape.rotation * shape.scale)  # (5.1)
     g_point = point_reverse(point, slope, free, np.einsum("ikn,jk->ijn", g_t, w), d_mean2d, d_depth, camera, settings)
-    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)
-    d_scale = (shape.rotation * g_m).sum(axis=0)
-    return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))
+    d_w = g_point @ np.where(visible, position, 0).T + np.einsum("ijn,ikn->jk", j, g_t)  # (6.4), (6.11)
+    d_scale = (shape.rotation * g_m).sum(axis=0)  # (5.2), (6.3)
+    return ProjectionGrads(w.T @ g_point, g_m * shape.scale, d_scale, CameraGrads(d_w, g_point.sum(axis=1)))  # (6.10)
 
 
 def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera, settings):
     """From the derivatives by J, (u, v) and depth to those by the point in camera axes, (3, N)."""
     z, focal = point[2], np.array([[camera.fx], [camera.fy]])
-    g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z
-    g_clipped = np.where(free, g_slope, 0)
+    g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z; (6.6)
+    g_clipped = np.where(free, g_slope, 0)  # (6.7)
     clamp = np.where(free | (not settings.deviations.double_clamp_term), 0, g_slope * slope)  # `legacy`: counted twice
-    g_xy = (focal * d_mean2d + g_clipped) / z
-    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * np.array([g_j[0, 2], g_j[1, 2]]))
+    g_xy = (focal * d_mean2d + g_clipped) / z  # (6.8)
+    by_scale = -focal / z**2 * (np.array([g_j[0, 0], g_j[1, 1]]) - slope * np.array([g_j[0, 2], g_j[1, 2]]))  # (6.9)
     g_z = d_depth + (by_scale - g_xy * point[:2] / z - clamp / z).sum(axis=0)
     return np.concatenate([g_xy, [g_z]])

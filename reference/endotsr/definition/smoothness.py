@@ -12,7 +12,7 @@ def steps_reverse(d_steps, axis):
     """Adjoint of the differences of neighbours along an axis."""
     border = [(0, 0)] * d_steps.ndim
     border[axis] = (1, 1)
-    return -np.diff(np.pad(d_steps, border), axis=axis)
+    return -np.diff(np.pad(d_steps, border), axis=axis)  # (10.10)
 
 
 def squared_steps(depth, smooth):
@@ -32,7 +32,7 @@ def total_variation(image, mask):
     for axis in (1, 2):
         step = np.diff(outside, axis=axis)
         total, gradient = total + np.abs(step).sum(), gradient + steps_reverse(np.sign(step), axis)
-    return total / image.size, np.where(mask, 0, gradient) / image.size
+    return total / image.size, np.where(mask, 0, gradient) / image.size  # (10.11)
 
 
 def smoothness_forward(rendered_depth, rendered, mask, edges, total_variation_factor):

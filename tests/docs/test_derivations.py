@@ -1,0 +1,49 @@
+"""Derivations are numbered without gaps, and the code of the definition cites the steps that it computes."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DEFINITION = "\n".join(f.read_text("utf-8") for f in sorted((ROOT / "reference/endotsr/definition").glob("*.py")))
+NOTEBOOKS = {int(f.stem[:2]): f.read_text("utf-8") for f in sorted((ROOT / "notebooks").glob("*.py"))}
+STEP = re.compile(r"^# \*\*\((\d+)\.(\d+)\)", re.MULTILINE)
+CITATION = re.compile(r"\((\d+)\.(\d+)\)")
+DERIVED = [3, 5, 6, 7, 8, 10]
+NO_LINE = {
+    (5, 7): "says why two forms agree",
+    (6, 5): "of the kernel alone: the definition does not go through the footprint",
+    (6, 13): "of the kernel alone: the definition has the exponential of a block matrix",
+    (8, 2): "leads to (8.3)",
+    (8, 4): "is (8.3) with another factor",
+    (8, 8): "the definition differentiates with respect to the covariance in one step",
+    (10, 2): "names what depends on the render",
+    (10, 3): "leads to (10.4) to (10.6)",
+}
+
+
+@pytest.mark.parametrize("chapter", DERIVED)
+def test_steps_are_numbered_without_gaps(chapter):
+    steps = [(int(a), int(b)) for a, b in STEP.findall(NOTEBOOKS[chapter])]
+    assert steps == [(chapter, k) for k in range(1, len(steps) + 1)] and len(steps) >= 6
+
+
+def test_only_derivations_have_numbers():
+    assert [chapter for chapter, text in NOTEBOOKS.items() if STEP.search(text)] == DERIVED
+
+
+def test_every_citation_has_its_step():
+    steps = {(int(a), int(b)) for text in NOTEBOOKS.values() for a, b in STEP.findall(text)}
+    comments = "\n".join(line.partition("#")[2] for line in DEFINITION.splitlines())
+    cited = {(int(a), int(b)) for a, b in CITATION.findall(comments)}
+    for chapter in DERIVED:  # a chapter cites its own steps and those of others
+        cited |= {(int(a), int(b)) for a, b in CITATION.findall(NOTEBOOKS[chapter]) if int(a) in DERIVED}
+    assert cited <= steps, f"no such step: {sorted(cited - steps)}"
+
+
+def test_every_step_is_cited_beside_its_line_of_the_definition():
+    steps = {(int(a), int(b)) for text in NOTEBOOKS.values() for a, b in STEP.findall(text)}
+    lines = [line.partition("#") for line in DEFINITION.splitlines()]
+    cited = {(int(a), int(b)) for code, _, comment in lines if code.strip() for a, b in CITATION.findall(comment)}
+    assert steps - cited == set(NO_LINE)
