@@ -10,7 +10,7 @@ from endotsr.sequences.layouts import layouts
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
-TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip")
+TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera")
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
             "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
 

@@ -187,6 +187,20 @@ def depth_is_true(folder: Path) -> bool:
     )
 
 
+def one_camera(values, *words, points=0):
+    """A clip from one camera with the files of a network, and true depth at some points beside it."""
+
+    def make(folder: Path) -> list[str]:
+        import test_relative_depth as one
+
+        where, given = one.clip(folder, values)
+        if points:
+            one.sparse(where, points)
+        return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
+
+    return make
+
+
 def common(*words: str, command="check", **changes):
     """A folder in the common format."""
 
@@ -383,6 +397,14 @@ ROWS = [
       for kind, (values, name, ending, said) in NO_LENGTHS.items()),
     Row("depth, of half the size", depth(lambda i: true_depth(i)[::2, ::2]), "refused", "depth of 64x48 pixels"),
     Row("depth, not a number", depth(lambda i: true_depth(i) * np.nan), "refused", "no value is finite"),
+    Row("one camera, relative depth, points to compare with",
+        one_camera(lambda i: 1800 / true_depth(i) - 3, "--replace", points=60), "told",
+        "scale and shift from the depth before", depth_is_true),
+    Row("one camera, relative depth alone", one_camera(lambda i: 1800 / true_depth(i) - 3), "told",
+        "not metric, scale and shift of the depth assumed"),
+    Row("one camera, relative depth that grows with distance", one_camera(lambda i: true_depth(i) / 99), "refused",
+        "near tissue is bright"),
+    Row("one camera, no depth at all", video("a.mp4"), "told", "--kind relative"),
     Row("depth beside COLMAP", colmap_folder("--depth", "d"), "refused", "does not read --depth"),
     Row("StereoMIS, a mask missing, --gaps drop", stereomis_folder("--gaps", "drop",
         change=lambda raw: (raw / "masks/000002l.png").unlink()), "told", "not evenly spaced",

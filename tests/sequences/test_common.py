@@ -216,7 +216,7 @@ def test_without_depth_the_remedy_is_named(tmp_path):
     written(tmp_path / "mono", depth=False)
     with pytest.raises(InputError, match="`endotsr depth` makes it"):
         read_common(tmp_path / "stereo", WHOLE, 0.2)
-    with pytest.raises(InputError, match=r"no depth.*allowed: depth of every frame"):
+    with pytest.raises(InputError, match=r"no depth.*one camera: endotsr depth --given FILES --kind relative"):
         read_common(tmp_path / "mono", WHOLE, 0.2)
 
 

@@ -11,6 +11,8 @@ from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 
+LARGEST_RATIO = 100.0  # of the farthest tissue over the nearest
+
 if TYPE_CHECKING:
     from endotsr.sequences.make_depth import DepthReport
 
@@ -21,14 +23,26 @@ class DepthOptions:
 
     From the stereo pairs: semi-global matching, a check of left against right, and edge-preserving smoothing. Pixels
     without a reliable match stay without depth. With --given, the files of another program are read as they are.
+
+    A clip from one camera has two ways. --kind relative reads the inverse depth of a monocular network, whose scale and
+    shift are taken from depth that the clip has already (points of a reconstruction), or else assumed. --flat needs no
+    files: a plane that faces the camera. What is assumed makes lengths and other viewpoints no measurements.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
     """folder with sequence.toml"""
     given: Annotated[Path | None, Option("FOLDER")] = None
     """files of another program, one a frame: npy, pfm, tiff or png"""
-    kind: Literal["disparity", "depth"] = "disparity"
-    """what these files hold: disparity in pixels, or depth"""
+    kind: Literal["disparity", "depth", "relative"] = "disparity"
+    """what these files hold: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
+    align: Literal["auto", "frame", "sequence"] = "auto"
+    """of relative: scale and shift in each frame, or once (auto: each frame where the clip has depth)"""
+    farthest_over_nearest: float = 3.0
+    """of relative, without depth to compare with: how many times as far the farthest tissue is assumed to be"""
+    trust_depth: bool = False
+    """of relative: take the numbers even if they are large where the pictures are dark"""
+    flat: bool = False
+    """a plane that faces the camera, for a clip of which nothing else is known"""
     unit_scale: float = 1.0
     """length (or pixels of disparity) of one step of the stored numbers, in millimetres"""
     nearest: float = 20.0
@@ -59,6 +73,9 @@ def run(words: list[str]) -> int:
         if not 0 < getattr(options, name) < float("inf"):
             key = name.replace("_", "-")
             raise InputError(f"--{key} {getattr(options, name):g} is not allowed; allowed: a number > 0")
+    _refuse_contradictions(options)
+    from endotsr.sequences.checks.kinds import KINDS
+
     report = _made(options)
     assert report.file.depth is not None
     coverage, unit, step = report.coverage, report.file.depth.unit, report.file.depth.scale
@@ -67,17 +84,46 @@ def run(words: list[str]) -> int:
         f"depth of {len(coverage)} frames: {sum(coverage) / len(coverage):.1%} of the pixels on average,"
         f" {coverage[lowest]:.1%} in frame {lowest}; median {report.median:.4g} {unit}, steps of {step:g}"
     )
+    if report.file.depth.method.startswith(("relative", "assumed")):
+        print(f"  {report.file.depth.method}")
+    if report.file.depth.assumed:
+        print(f"not metric, {report.file.depth.assumed} of the depth assumed: {KINDS['assumed-depth'].why}")
     print(f"next: endotsr train {options.sequence} --out RUN")
     write_result(options.json, sequence=options.sequence, coverage=coverage, median=report.median, unit=unit, step=step)
     return 0
 
 
+def _refuse_contradictions(options: DepthOptions) -> None:
+    """Raises InputError for options that exclude each other, and a ratio that is none."""
+    if options.flat and options.given is not None:
+        raise InputError("--flat reads no files; allowed: --flat or --given")
+    if options.kind == "relative" and options.given is None:
+        raise InputError("--kind relative is not allowed without --given; allowed: --given FOLDER")
+    if not 1 < options.farthest_over_nearest <= LARGEST_RATIO:
+        raise InputError(
+            f"--farthest-over-nearest {options.farthest_over_nearest:g} is not allowed; allowed: a number over 1 to"
+            f" {LARGEST_RATIO:g}"
+        )
+
+
 def _made(options: DepthOptions) -> "DepthReport":
     """Depth of another program, or that of the stereo pairs."""
-    from endotsr.sequences.make_depth import make_stereo_depth, take_given_depth
+    from endotsr.sequences.make_depth import (
+        make_flat_depth,
+        make_stereo_depth,
+        take_given_depth,
+        take_relative_depth,
+    )
     from endotsr.sequences.stereo_depth import StereoSettings
 
-    if options.given is not None:
+    if options.flat:
+        return make_flat_depth(options.sequence, options.replace, _said)
+    if options.given is not None and options.kind == "relative":
+        return take_relative_depth(
+            options.sequence, options.given, options.align, options.farthest_over_nearest, options.trust_depth,
+            options.replace, _said,
+        )  # fmt: skip
+    if options.given is not None and options.kind != "relative":
         return take_given_depth(
             options.sequence, options.given, options.kind, options.unit_scale, options.replace, _said
         )

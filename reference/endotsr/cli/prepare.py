@@ -147,4 +147,9 @@ def _next_step(out: Path, depth: bool, stereo: bool, pair: bool) -> str:
             "next: state the distance of the two cameras, [camera] baseline in"
             f" {out / FILE_NAME} (or prepare --baseline MM), then endotsr depth {out}"
         )
-    return f"next: endotsr depth {out}" if stereo else f"next: add depth/ to {out}; training needs it"
+    if stereo:
+        return f"next: endotsr depth {out}"
+    return (
+        f"next: endotsr depth {out} --given FILES --kind relative (inverse depth of a network), or --flat;"
+        " training needs depth"
+    )

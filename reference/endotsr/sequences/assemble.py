@@ -53,7 +53,7 @@ def assemble(
     notes.append(_depth_note(depth, near, files.depth, "scene units" if files.arbitrary else files.unit))
     facts = frames.facts[0], with_coverage(frames.facts[1], depth, masks)
     where = files.depth[0].parent
-    notes += guarded(files.images, facts, cameras, where, files.arbitrary, near, files.seconds)
+    notes += guarded(files.images, facts, cameras, where, files.arbitrary, near, files.seconds, files.assumed)
     if frames.store.note:
         notes.append(frames.store.note)
     if files.masks:

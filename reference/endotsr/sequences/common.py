@@ -17,6 +17,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.assemble import assemble, check_percentiles
+from endotsr.sequences.checks.kinds import KINDS, ONE_CAMERA
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import tissue_masks
@@ -72,7 +73,7 @@ def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, ran
             " straightens them"
         )
     if not contents.depth:
-        remedy = "`endotsr depth` makes it from the stereo pair" if contents.right else "allowed: depth of every frame"
+        remedy = "`endotsr depth` makes it from the stereo pair" if contents.right else ONE_CAMERA
         if contents.right and not contents.file.camera.baseline:
             remedy += f", once [camera] baseline, the distance of the two cameras, is stated in {FILE_NAME}"
         raise InputError(f"{folder}: no depth: [depth] is missing in {FILE_NAME}; {remedy}")
@@ -115,6 +116,8 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     if entry.clipped and entry.clipped == list(config.depth_percentiles):
         config = msgspec.structs.replace(config, depth_percentiles=EVERYTHING)
         notes.append(f"depth: clipped to its percentiles {entry.clipped} before it was reduced, and not again")
+    if entry.assumed:
+        notes.append(f"not metric: {entry.method}; {KINDS['assumed-depth'].why}")
     files = FrameFiles(
         contents.images,
         contents.masks,
@@ -124,11 +127,12 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         mask=lambda path: grey_plane(_sized(contents, read_picture(path), path), path),
         plane=lambda path: _sized(contents, read_plane(path), path),
         excluded_value=excluded,
-        unit="arbitrary unit" if contents.file.arbitrary else "mm",
+        unit=contents.file.unit_in_words,
         depth_unit=entry.unit,
         depth_scale=entry.scale * contents.file.to_scene(entry.unit),
         stated_in=stated_in,
         arbitrary=contents.file.arbitrary,
+        assumed=entry.assumed,
         seconds=None if times is None else np.array([times[i] for i in frames_read], np.float64),
     )
     return assemble(files, cameras_of(contents), config, near, Path(folder), notes)

@@ -25,9 +25,6 @@ def depth_of_values(
 
     Raises:  InputError for another proportion, disparities without a baseline, and files without any depth.
     """
-    height, width = values.shape
-    if abs(width * lens.height - height * lens.width) > max(width, lens.width):
-        raise InputError(f"{where}: {width}x{height} pixels, the pictures have {lens.width}x{lens.height}")
     numbers = values.astype(np.float64) * scale
     numbers[~np.isfinite(numbers)] = 0.0
     if kind == "disparity":
@@ -35,11 +32,21 @@ def depth_of_values(
             raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
         if (numbers <= 0).all():
             numbers = -numbers
-        focal = lens.fx * width / lens.width
+        focal = lens.fx * values.shape[1] / lens.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
-    numbers = np.maximum(numbers, 0.0)
-    row = ((np.arange(lens.height) + 0.5) * height / lens.height).astype(np.intp)
-    column = ((np.arange(lens.width) + 0.5) * width / lens.width).astype(np.intp)
-    depth = numbers[row][:, column].astype(np.float32)  # nearest pixel: no depth between two surfaces is made up
+    depth = at_size(np.maximum(numbers, 0.0), lens, where).astype(np.float32)
     depth[~np.isfinite(depth)] = 0.0
     return depth
+
+
+def at_size(values: NDArray, lens: Lens, where: object) -> NDArray:
+    """The numbers at the size of the sequence, nearest pixel: no depth between two surfaces is made up.
+
+    Raises:  InputError for another proportion.
+    """
+    height, width = values.shape
+    if abs(width * lens.height - height * lens.width) > max(width, lens.width):
+        raise InputError(f"{where}: {width}x{height} pixels, the pictures have {lens.width}x{lens.height}")
+    row = ((np.arange(lens.height) + 0.5) * height / lens.height).astype(np.intp)
+    column = ((np.arange(lens.width) + 0.5) * width / lens.width).astype(np.intp)
+    return values[row][:, column]

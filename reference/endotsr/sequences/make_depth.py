@@ -22,7 +22,8 @@ from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.given_depth import Kind, depth_of_values
 from endotsr.sequences.prepare import step_of_depth
 from endotsr.sequences.recording import ARBITRARY, PicturePair, Recording
-from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
+from endotsr.sequences.relative_depth import Align, MadeDepth, flat_depth, relative_depth
+from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, Assumed, DepthEntry, SequenceFile, sequence_text
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.sequences.writing import new_folder, replace_text
 
@@ -90,10 +91,12 @@ def write_depth(
     method: str,
     replace: bool = False,
     on_frame: OnFrame = lambda i, n: None,
+    assumed: Assumed = "",
 ) -> DepthReport:
     """Write the depth of a sequence and enter it into its `sequence.toml`.
 
     replace   whether depth that exists may be replaced
+    assumed   what is not measured: lengths of the sequence are then in an arbitrary unit
 
     Raises:  InputError; the folder is as before then.
     """
@@ -116,9 +119,9 @@ def write_depth(
             on_frame(k + 1, len(contents.images))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    unit = ARBITRARY if contents.file.arbitrary else "mm"
-    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=method)
-    found = msgspec.structs.replace(contents.file, depth=entry)
+    unit = ARBITRARY if contents.file.arbitrary or assumed else "mm"
+    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=method, assumed=assumed)
+    found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if assumed else contents.file.unit)
     _put_in_place(folder, staged, found)
     return DepthReport(found, coverage, float(np.median(medians)))
 
@@ -148,3 +151,33 @@ def take_given_depth(
     """Depth from the files of another program. Raises InputError."""
     frames = given_frames(list_contents(folder), source, kind, scale)
     return write_depth(folder, frames, f"{kind} from {source.name}", replace, on_frame)
+
+
+def take_made_depth(folder: Path, made: MadeDepth, replace: bool, on_frame: OnFrame = lambda i, n: None) -> DepthReport:
+    """Depth of `relative_depth`. Raises InputError."""
+    names = [image.stem for image in list_contents(folder).images]
+    frames = (DepthFrame(plane, name) for plane, name in zip(made.frames, names))
+    return write_depth(folder, frames, made.method, replace, on_frame, made.assumed)
+
+
+def make_flat_depth(folder: Path, replace: bool, on_frame: OnFrame = lambda i, n: None) -> DepthReport:
+    """A plane in every frame. Raises InputError."""
+    return take_made_depth(folder, flat_depth(list_contents(folder)), replace, on_frame)
+
+
+def take_relative_depth(
+    folder: Path,
+    source: Path,
+    align: Align,
+    farthest: float,
+    trusted: bool,
+    replace: bool,
+    on_frame: OnFrame = lambda i, n: None,
+) -> DepthReport:
+    """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
+    contents = list_contents(folder)
+    if contents.depth and not replace:
+        raise InputError(
+            f"{folder}: has depth already; allowed: --replace, which takes scale and shift from it and fills the rest"
+        )
+    return take_made_depth(folder, relative_depth(contents, source, align, farthest, trusted), replace, on_frame)

@@ -38,6 +38,7 @@ class FrameFiles(NamedTuple):
     stated_in: str = ""  # the file that states the excluded value; "": the settings do
     arbitrary: bool = False  # the unit is unknown: the scale of the world is free
     seconds: NDArray[np.float64] | None = None  # (n,) of the frames, ascending; None: evenly spaced
+    assumed: str = ""  # what is not measured of the depth
 
 
 class Frames(NamedTuple):

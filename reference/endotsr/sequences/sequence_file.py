@@ -23,6 +23,7 @@
     scale = 0.01                       # length = stored value x scale, in `unit`; 0 = no depth here
     clipped = []                       # percentiles to which depth was clipped before it was reduced: not done again
     method = "given"
+    assumed = ""                       # what is not measured: "", "scale and shift" or "shape"
 
     [poses]                            # absent: the camera rests at the origin
     direction = "world_to_camera"      # or "camera_to_world"
@@ -50,6 +51,7 @@ IMAGES, RIGHT, MASKS, DEPTH = "images", "images_right", "masks", "depth"
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 OPENGL = np.diag([1.0, -1.0, -1.0])  # OpenGL axes to OpenCV axes, and back
 Unit = Literal["um", "mm", "cm", "m", "arbitrary"]
+Assumed = Literal["", "scale and shift", "shape"]  # of the depth: what is not measured
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 PositiveCount = Annotated[int, msgspec.Meta(ge=1)]
@@ -89,6 +91,7 @@ class DepthEntry(Section, frozen=True, kw_only=True):
     scale: Positive = 1.0
     clipped: list[float] = msgspec.field(default_factory=list)
     method: str = "given"
+    assumed: Assumed = ""
 
 
 class PoseEntry(Section, frozen=True, kw_only=True):
@@ -118,6 +121,12 @@ class SequenceFile(Section, frozen=True, kw_only=True):
         """Whether the unit of the lengths is unknown."""
         return self.unit == ARBITRARY
 
+    @property
+    def unit_in_words(self) -> str:
+        """The unit of all lengths, with what is assumed of them; it stands beside every length that is written."""
+        assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
+        return f"arbitrary unit{assumed}" if self.arbitrary else "mm"
+
     def to_scene(self, unit: str) -> float:
         """The factor from lengths in `unit` to scene units: millimetres, or the arbitrary unit itself."""
         return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
@@ -145,6 +154,8 @@ def read_sequence_file(folder: Path) -> SequenceFile:
             f"{path}: depth.unit = {found.depth.unit!r} with unit = {found.unit!r} is not allowed; allowed: both"
             " arbitrary (then of one scale), or neither"
         )
+    if found.depth and found.depth.assumed and not found.arbitrary:
+        raise InputError(f"{path}: depth.assumed beside unit = {found.unit!r} is not allowed; allowed: 'arbitrary'")
     for key, entry in (("masks", found.masks), ("depth", found.depth)):
         if entry and not _plain_name(entry.folder):
             raise InputError(

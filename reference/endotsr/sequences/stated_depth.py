@@ -30,8 +30,8 @@ NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|
 LOOKED_AT = 8  # frames
 MATCHED = 128  # px: narrower stereo pairs are not matched
 REMEDY = (
-    "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth; a"
-    " relative depth has to become lengths first; --trust-depth reads the files as lengths all the same"
+    "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth, a"
+    " relative inverse depth with --kind relative; --trust-depth reads the files as lengths all the same"
 )
 
 

@@ -92,7 +92,8 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if run.frames:
         run.findings += frame_findings(run.frames, str(parts.images[0].parent))
     if run.depth:
-        run.findings += depth_findings(run.depth, str(parts.depth[0].parent), parts.arbitrary, config.raster.near)
+        where, near = str(parts.depth[0].parent), config.raster.near
+        run.findings += depth_findings(run.depth, where, parts.arbitrary, near, parts.assumed)
         run.findings += light_finding(run.light, str(parts.depth[0].parent))
     if run.samples:
         _check_masks(parts, run, config)

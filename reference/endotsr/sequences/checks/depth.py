@@ -56,13 +56,17 @@ def _levels(values: NDArray[np.float32]) -> int:
     return some if some >= FEW_LEVELS else len(np.unique(values))
 
 
-def depth_findings(facts: list[DepthFacts], where: str, arbitrary: bool, near: float) -> list[Finding]:
-    """Findings on the depth of a sequence."""
+def depth_findings(
+    facts: list[DepthFacts], where: str, arbitrary: bool, near: float, assumed: str = ""
+) -> list[Finding]:
+    """Findings on the depth of a sequence. `assumed`: what is not measured of it, as sequence.toml states."""
     with_depth = [fact for fact in facts if fact.median > 0]
     if not with_depth:
         return [finding("no-depth", where, "no pixel of any frame has depth")]
     usual = float(np.median([fact.median for fact in with_depth]))
     found = _numbers(with_depth, where)
+    if assumed:
+        found = [finding("assumed-depth", where, f"not measured of the depth: its {assumed}")]
     if not arbitrary and not found:
         found += unit_finding(usual, where)
     if usual <= near:

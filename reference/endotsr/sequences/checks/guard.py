@@ -17,7 +17,7 @@ from endotsr.sequences.checks.findings import Finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
 from endotsr.splatting.camera import Camera
 
-SAID_ALREADY = ("far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
+SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
 MOST = 5  # notes of one kind
 
 
@@ -29,19 +29,21 @@ def guarded(
     arbitrary: bool,
     near: float,
     seconds: NDArray[np.float64] | None = None,
+    assumed: str = "",
 ) -> list[str]:
     """Notes on what the checks of pictures, depth and cameras find.
 
     images   the files of the frames, in time order
     facts    of pictures and of depth, one a frame
     seconds  of the frames, where they are not evenly spaced
+    assumed  what is not measured of the depth
 
     Raises:  InputError for the first refusal.
     """
     pictures, depth = facts
     found = gap_findings(images) + time_findings(seconds, str(images[0].parents[1]))
     found += frame_findings(pictures, str(images[0].parent))
-    found += depth_findings(depth, str(depth_folder), arbitrary, near)
+    found += depth_findings(depth, str(depth_folder), arbitrary, near, assumed)
     usual = float(np.median([fact.median for fact in depth if fact.median] or [0.0]))
     found += camera_findings(cameras, usual, str(images[0].parents[1]))
     return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])

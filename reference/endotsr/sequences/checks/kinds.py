@@ -9,6 +9,10 @@ Level = Literal["refusal", "warning", "note"]
 
 REFUSED = "a training refuses it"
 LEAVE_OUT = "leave the frame out (prepare --frames, or delete it)"
+ONE_CAMERA = (
+    "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), a COLMAP model,"
+    " or endotsr depth --flat"
+)
 SMALLER = "endotsr prepare --scale 0.5, or fewer --frames"
 
 
@@ -61,7 +65,10 @@ KINDS: dict[str, Kind] = {
                                  "look at its mask; leave the frame out if the mask is right"),
     "single-mask": Kind("refusal", REFUSED, "mend this mask"),
     # depth
-    "no-depth": Kind("refusal", "nothing can be placed in space", "make it with `endotsr depth`, or check its scale"),
+    "no-depth": Kind("refusal", "nothing can be placed in space",
+                     f"a stereo pair: endotsr depth; {ONE_CAMERA}; empty files: check their scale"),
+    "assumed-depth": Kind("warning", "lengths and other viewpoints are no measurements",
+                          "take scale and shift from points of a reconstruction, or from a stereo pair"),
     "depth-file": Kind("refusal", REFUSED, "export the depth again"),
     "depth-values": Kind("refusal", REFUSED, "store lengths"),
     "frame-without-depth": Kind("note", "it takes no part in the initialisation", "none needed if these are few"),

@@ -36,6 +36,7 @@ class Parts(NamedTuple):
     cameras: Callable[[int, int], list[Camera]]  # of pictures of this width and height
     seconds: NDArray[np.float64] | None = None  # of the frames, where they are not evenly spaced
     stated_in: str = ""  # the file that states the polarity of the masks; "": the settings do
+    assumed: str = ""  # what is not measured of the depth
 
 
 def parts_of(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
@@ -98,9 +99,11 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
     scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
     excluded, stated_in = polarity(file, folder, config)
     seconds = None if file.times is None else np.array(file.times, np.float64)
+    assumed = file.depth.assumed if file.depth else ""
     return Parts(
-        folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds, stated_in
-    )
+        folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds, stated_in,
+        assumed,
+    )  # fmt: skip
 
 
 def _stated(file: SequenceFile, where: Path) -> list[Finding]:
