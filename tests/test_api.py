@@ -85,7 +85,7 @@ def test_settings_are_those_of_the_command_line(tmp_path):
 @pytest.mark.parametrize(
     "given, named",
     [
-        ({"preset": "papper"}, "paper, sharp, demo"),
+        ({"preset": "papper"}, "paper, sharp, quick, demo"),
         ({"modell": {}}, "unknown key modell"),
         ({"model": {"basis": "cubic"}}, "quartic, gaussian"),
         ({"model": {"base": 3}}, "unknown key model.base"),

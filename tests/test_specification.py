@@ -156,6 +156,18 @@ def test_run_presets_equal_the_table():
             assert documented_value(text) == settings_by_key(PRESETS[name])[key]
 
 
+def test_the_quick_preset_is_sharp_with_another_length_and_a_budget():
+    stretched, quick = settings_by_key(with_iterations(SHARP, 1600)), settings_by_key(PRESETS["quick"])
+    assert {key: quick[key] for key in quick if quick[key] != stretched[key]} == {
+        "preset": "quick",
+        "density.growth": "budget",
+        "density.maximum": 22_000,
+        "initialisation.first_frame_points": 14_000,
+        "initialisation.other_frame_points": 2000,
+        "training.coarse_start": True,
+    }
+
+
 def test_the_demo_preset_is_sharp_with_another_length_and_size():
     stretched, demo = settings_by_key(with_iterations(SHARP, 1500)), settings_by_key(DEMO)
     assert {key: demo[key] for key in demo if demo[key] != stretched[key]} == {

@@ -64,6 +64,13 @@ UNDIFFERENTIATED = {
         "none: dense optical flow is an estimate, and a port may take any",
         "none: it is an option of training that is not part of the paper",
     ),
+    "b17": Undifferentiated(
+        ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.halved.halved"),
+        "the choice of the frames is a constant of training",
+        "tests/fitting/test_coarse_start.py",
+        "none: it is an option of training that is not part of the paper",
+        "none: it is an option of training that is not part of the paper",
+    ),
     "m1": Undifferentiated(
         ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",

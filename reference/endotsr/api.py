@@ -35,7 +35,6 @@ from endotsr.config import (
     config_from_dict,
     lengthened,
     merged,
-    read_toml,
     refuse_unknown_keys,
     with_iterations,
 )
@@ -51,6 +50,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
+from endotsr.untrusted.toml import read_toml
 
 if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState

@@ -6,7 +6,6 @@ and the allowed values. Iterations are counted from 1. Lengths are in scene unit
 
 import math
 import re
-import tomllib
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
@@ -14,9 +13,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 
 from endotsr.errors import InputError
-from endotsr.untrusted.files import read_text
-
-LARGEST_SETTINGS = 1 << 20  # bytes of a TOML file
+from endotsr.untrusted.toml import read_toml, toml_text
 
 SectionType = TypeVar("SectionType", bound=msgspec.Struct)
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -224,6 +221,8 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
     """iterations between raises of the active harmonic degree"""
+    coarse_start: bool = False
+    """start on frames of half size, until their fit is as near to them as they are to the full frames"""
     bridge_fraction: Fraction = 0.0
     """fraction of iterations that render a time between two training frames, made of both along optical flow"""
     seed: Count = 0
@@ -236,10 +235,13 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     """iterations between checkpoints"""
 
 
+Preset = Literal["paper", "sharp", "quick", "demo"]
+
+
 class Config(Section, frozen=True, kw_only=True):
     """All settings of a run."""
 
-    preset: Literal["paper", "sharp", "demo"] = "paper"
+    preset: Preset = "paper"
     """preset whose values these settings start from"""
     sequence: SequenceConfig = SequenceConfig()
     model: ModelConfig = ModelConfig()
@@ -306,6 +308,15 @@ def lengthened(config: Config, training_frames: int) -> Config:
     return with_iterations(config, wanted) if wanted > config.training.iterations else with_fixed_length(config)
 
 
+QUICK = with_iterations(SHARP, 1600)
+QUICK = msgspec.structs.replace(
+    QUICK,
+    preset="quick",
+    # what a first look has time for at 640x512 pixels
+    density=msgspec.structs.replace(QUICK.density, growth="budget", maximum=22_000),
+    initialisation=msgspec.structs.replace(QUICK.initialisation, first_frame_points=14_000, other_frame_points=2_000),
+    training=msgspec.structs.replace(QUICK.training, coarse_start=True),
+)
 DEMO = with_iterations(SHARP, 1500)
 DEMO = msgspec.structs.replace(
     DEMO,
@@ -314,7 +325,7 @@ DEMO = msgspec.structs.replace(
     density=msgspec.structs.replace(DEMO.density, gradient_threshold=4e-4),
     initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
 )
-PRESETS = {"paper": PAPER, "sharp": SHARP, "demo": DEMO}
+PRESETS = {"paper": PAPER, "sharp": SHARP, "quick": QUICK, "demo": DEMO}
 
 
 def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Config:
@@ -341,17 +352,6 @@ def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: s
 def load_config(path: Path) -> Config:
     """Read a TOML file. Raises InputError naming the file, the key and what is allowed."""
     return config_from_dict(read_toml(path), str(path))
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, unchecked. Raises InputError naming the file."""
-    text = read_text(Path(path), LARGEST_SETTINGS)
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(f"{path}: not valid TOML: it is nested too deeply") from None
-    except ValueError as error:  # of TOML, and of dates or integers that Python cannot hold
-        raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -469,26 +469,3 @@ def _refuse_contradictions(config: Config, where: str) -> None:
 def config_to_toml(config: Config) -> str:
     """The resolved configuration as TOML text that `load_config` reads back to an equal Config."""
     return toml_text(msgspec.to_builtins(config))
-
-
-def toml_text(data: dict[str, Any]) -> str:
-    """TOML of plain values and one level of sections; a key whose value is None is left out."""
-    lines, sections = [], []
-    for key, value in data.items():
-        if isinstance(value, dict):
-            sections += ["", f"[{key}]", *(f"{k} = {_toml_value(v)}" for k, v in value.items())]
-        elif value is not None:
-            lines.append(f"{key} = {_toml_value(value)}")
-    return "\n".join(lines + sections) + "\n"
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
-    if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
-        return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line a row
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
-    return repr(value)

@@ -88,7 +88,7 @@ def test_the_settings_of_the_definition_are_those_of_paper():
     assert PAPER[:7] == FAST_PAPER[:7] and not any(PAPER.deviations)
 
 
-@pytest.mark.parametrize("preset", ["paper", "sharp", "demo"])
+@pytest.mark.parametrize("preset", ["paper", "sharp", "quick", "demo"])
 def test_the_schedules_of_every_preset_are_the_same(preset):
     config = config_from_dict({"preset": preset})
     for i in range(1, config.training.iterations + 100, 7):

@@ -10,7 +10,7 @@ from endotsr.config import PAPER
 from endotsr.opencv import read_png, write_png
 from endotsr.sequences.checks.check import check_sequence
 from endotsr.sequences.common import open_common, read_common
-from endotsr.sequences.relative_depth import FEWEST, Line, fitted_line
+from endotsr.sequences.relative_depth import FEWEST, StraightLine, fitted_line
 from endotsr.sequences.sequence_file import read_sequence_file
 
 
@@ -59,7 +59,7 @@ def test_a_line_is_found_though_a_third_of_the_points_is_wrong():
 
 
 def test_no_depth_where_the_line_leaves_the_front_of_the_camera():
-    depth = Line(1.0, 0.0).depth(np.array([[2.0, 0.0, -1.0, np.nan]]))
+    depth = StraightLine(1.0, 0.0).depth(np.array([[2.0, 0.0, -1.0, np.nan]]))
     assert depth.tolist() == [[0.5, 0.0, 0.0, 0.0]]
 
 

@@ -61,7 +61,7 @@ REFUSED = {
     "length": ('splits = ["blocks 0"]', "with N >= 1"),
     "no length": ('splits = ["every_second 2"]', "splits = 'every_second 2' is not allowed"),
     "measure": ('measures = ["beauty"]', "measures = 'beauty' is not allowed; allowed: depth, flicker, right_view"),
-    "preset": ('preset = "best"', "preset = 'best' is not allowed; allowed: paper, sharp, demo"),
+    "preset": ('preset = "best"', "preset = 'best' is not allowed; allowed: paper, sharp, quick, demo"),
     "iterations": ("iterations = 0", "iterations: 0 is not allowed; allowed: an integer >= 1 and <= "),
     "switch": ("keep_checkpoints = 1", "keep_checkpoints = 1 is not allowed; allowed: true, false"),
     "simulator": ("simulator.colour = 1", "unknown key simulator.colour"),

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import Place, check_place, ended, run_spec
-from endotsr.config import PRESETS, with_iterations
+from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 
 
@@ -27,7 +27,7 @@ class AblateOptions:
     """folder of the sweep (required)"""
     seeds: Annotated[int, Option("N")] = 3
     """number of seeds, from 0"""
-    preset: Literal["paper", "sharp", "demo"] = "paper"
+    preset: Preset = "paper"
     """settings of every run"""
     iterations: Annotated[int | None, Option("N")] = None
     """exact length of every run; stretches the schedule"""

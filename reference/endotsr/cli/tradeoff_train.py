@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
+from endotsr.config import Preset
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder
 from endotsr.runs.sources import SIMULATED
@@ -32,7 +33,7 @@ class TradeoffTrainOptions:
     out"""
     iterations: Annotated[int | None, Option("N")] = None
     """iterations of each training instead"""
-    preset: Literal["paper", "sharp", "demo"] | None = None
+    preset: Preset | None = None
     """settings of the base training (default: demo for `simulated`, paper for a folder)"""
     scale: float = 1.0
     """image scale of the base training"""

@@ -32,6 +32,8 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import check_finite
 from endotsr.untrusted.json import number
 
+LEAST_COARSE_SIDE = 32  # pixels of a full frame; a smaller one has no coarse start
+
 
 @dataclass
 class TrainingState:
@@ -45,6 +47,7 @@ class TrainingState:
     lambda_lap: float | None  # full Laplacian weight; None until an `auto` weight is calibrated
     frames: FrameParameters | None = None  # parameters that are not per Gaussian; None if the model has none
     ahead: OffsetsAhead | None = None  # computed while the FDM was updated; not part of a checkpoint
+    coarse: bool = False  # the next iteration is compared with frames of half size
     drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint holds the generator before it
 
     @property
@@ -121,7 +124,9 @@ def new_training(sequence: Sequence, config: Config) -> TrainingState:
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     gaussians = initialise(sequence, config.initialisation, config.model, rng, dtype)
     frames = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)
-    return fresh_state(gaussians, frames, rng, lambda_lap=_given_weight(config))
+    state = fresh_state(gaussians, frames, rng, lambda_lap=_given_weight(config))
+    state.coarse = config.training.coarse_start and min(sequence.width, sequence.height) >= LEAST_COARSE_SIDE
+    return state
 
 
 def bench_state(gaussians: Gaussians, config: Config, iteration: int) -> TrainingState:
@@ -168,7 +173,10 @@ def save_state(path: Path, state: TrainingState, config: Config, sequence: str |
         check_state(state)
     except ValueError as error:
         raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
-    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "sequence": sequence}
+    header = {
+        "config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "sequence": sequence,
+        "coarse": state.coarse,
+    }  # fmt: skip
     save_checkpoint(
         path, state.gaussians, state.adam, state.iteration, state.rng_state, state.statistics, header, state.frames
     )
@@ -187,4 +195,5 @@ def state_from_checkpoint(checkpoint: Checkpoint, config: Config) -> TrainingSta
         checkpoint.statistics,
         _given_weight(config) if weight is None else weight,
         checkpoint.frames,
+        coarse=bool(checkpoint.header.get("coarse", False)),
     )

@@ -15,6 +15,7 @@ import numpy as np
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import adam_update, add_array, regather
+from endotsr.fitting.coarse_start import coarse_ends, workshop_of
 from endotsr.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
@@ -81,8 +82,11 @@ def train(
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
-    shop = workshop(sequence, config)
+    shop = workshop_of(state, sequence, config, on_message)
     while state.iteration < config.training.iterations:
+        if state.coarse and coarse_ends(state, shop, sequence):
+            state.coarse, shop = False, workshop(sequence, config)
+            on_message(f"coarse start: the frames have their full size after iteration {state.iteration}")
         entry = training_step(state, shop)
         on_iteration(entry)
         if advice := watch.see(entry, state.gaussians):

@@ -33,7 +33,7 @@ EXTREMES = (1.0, 99.0)  # percentiles of r that count as the farthest and the ne
 LOOKED_AT = 8  # frames whose light is compared
 
 
-class Line(NamedTuple):
+class StraightLine(NamedTuple):
     """1 / z = scale r + shift."""
 
     scale: float
@@ -60,7 +60,7 @@ class MadeDepth(NamedTuple):
     assumed: Assumed
 
 
-def fitted_line(relative: FloatArray, depth: FloatArray) -> Line | None:
+def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
     """The line of 1 / z over r, robust against pixels of either that are wrong.
 
     relative, depth   (H, W) or (n,); r not finite or z = 0 takes no part
@@ -76,13 +76,13 @@ def fitted_line(relative: FloatArray, depth: FloatArray) -> Line | None:
         return None
     step = -(-len(x) // MOST)
     middle = siegelslopes(y[::step], x[::step])
-    rough = Line(float(middle[0]), float(middle[1]))  # type: ignore[arg-type]
+    rough = StraightLine(float(middle[0]), float(middle[1]))  # type: ignore[arg-type]
     residual = np.abs(y - rough.scale * x - rough.shift)
     near = residual <= SPREAD * np.median(residual)
     if np.ptp(x[near]) == 0:
         return rough
     scale, shift = np.polyfit(x[near], y[near], 1)
-    return Line(float(scale), float(shift))
+    return StraightLine(float(scale), float(shift))
 
 
 def relative_depth(contents: Contents, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
@@ -180,18 +180,20 @@ def _refuse_known_scale(contents: Contents) -> None:
         )
 
 
-def _assumed_line(relative: Callable[[int], FloatArray], group: list[int], farthest: float, source: Path) -> Line:
+def _assumed_line(
+    relative: Callable[[int], FloatArray], group: list[int], farthest: float, source: Path
+) -> StraightLine:
     """The line that puts the nearest tissue of these frames at 1 and the farthest at `farthest`."""
     samples = [values[np.isfinite(values)][::37] for values in map(relative, group)]
     low, high = np.percentile(np.concatenate(samples) if any(map(len, samples)) else [0.0], EXTREMES)
     if not high > low:
         raise InputError(f"{source}: the numbers are all {low:g}; allowed: a relative inverse depth")
     scale = (1 - 1 / farthest) / (high - low)
-    return Line(float(scale), float(1 - scale * high))
+    return StraightLine(float(scale), float(1 - scale * high))
 
 
 def _refuse_against_light(
-    contents: Contents, relative: Callable[[int], FloatArray], lines: list[Line], source: Path
+    contents: Contents, relative: Callable[[int], FloatArray], lines: list[StraightLine], source: Path
 ) -> None:
     recording, light = open_common(contents.folder), []
     looked = list(range(min(LOOKED_AT, recording.count)))

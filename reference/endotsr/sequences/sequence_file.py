@@ -40,10 +40,11 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from endotsr.config import Section, checked, read_toml, refuse_unknown_keys, toml_text
+from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, CameraPose, Lens, checked_lens
+from endotsr.untrusted.toml import read_toml, toml_text
 
 FILE_NAME = "sequence.toml"
 FORMAT = "endotsr-sequence-1"

@@ -28,7 +28,6 @@ from endotsr.config import (
     checked,
     config_from_dict,
     merged,
-    read_toml,
     refuse_unknown_keys,
     with_iterations,
     without_former_keys,
@@ -38,6 +37,7 @@ from endotsr.evaluation.measures import check_measures
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.untrusted.json import integer, listed, text
+from endotsr.untrusted.toml import read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
 KEYS = (

@@ -14,12 +14,13 @@ from endotsr.cli.parts.parser import given_keys, parse_known
 from endotsr.config import (
     MILESTONES,
     Config,
+    Preset,
     config_from_dict,
-    read_toml,
     with_fixed_length,
     with_iterations,
 )
 from endotsr.errors import InputError
+from endotsr.untrusted.toml import read_toml
 
 # Options that are a setting under a shorter name.
 SHORT_NAMES = {
@@ -35,7 +36,7 @@ SHORT_NAMES = {
 class Sources:
     """The sources of the settings of a run."""
 
-    preset: Literal["paper", "sharp", "demo"] | None = None
+    preset: Preset | None = None
     config: Path | None = None
     iterations: int | None = None
     schedule: Literal["stretched", "absolute"] | None = None  # None = stretched

@@ -1,0 +1,84 @@
+"""The coarse start of a training (specification B17): frames of half size until their fit is as near as they are.
+
+    e(i) = mean_k L1(render of frame k at half size)         d = mean_k mean |P_1(frame k)|  over its valid pixels
+
+P_1 is the finest band of equation (5): what the frames of half size lack. The training goes on with the full frames
+from the first check with e(i) < d on, and from `density.until` at the latest. Comes in: the state and both sequences;
+goes out: the one that the next iteration is compared with. This module changes no parameter.
+"""
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import Config
+from endotsr.equations.laplacian import laplacian_levels, support_masks
+from endotsr.fitting.model import Spectral, camera_at, render_at
+from endotsr.fitting.state import TrainingState, Workshop, workshop
+from endotsr.losses.masked_l1 import masked_l1_forward
+from endotsr.sequences.halved import halved
+from endotsr.sequences.sequence import Sequence
+
+CHECK_EVERY = 50  # iterations between two checks
+CHECKED_FRAMES = 8  # training frames, evenly spaced, that a check renders
+
+
+def workshop_of(
+    state: TrainingState, sequence: Sequence, config: Config, on_message: Callable[[str], object]
+) -> Workshop:
+    """What the next iterations work on: frames of half size while `state.coarse`, else the sequence itself."""
+    if not state.coarse:
+        return workshop(sequence, config)
+    on_message("coarse start: frames of half size until their fit is as near to them as they are to the full frames")
+    return workshop(halved(sequence), coarse_config(config))
+
+
+def coarse_config(config: Config) -> Config:
+    """The settings for half the size, with half the smoothness: a step between two pixels is twice as long there."""
+    loss = msgspec.structs.replace(config.loss, smoothness_weight=config.loss.smoothness_weight / 2)
+    return msgspec.structs.replace(config, loss=loss)
+
+
+def coarse_ends(state: TrainingState, coarse: Workshop, sequence: Sequence) -> bool:
+    """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
+    if state.iteration >= coarse.config.density.until:
+        return True
+    if state.iteration == 0 or state.iteration % CHECK_EVERY:
+        return False
+    frames = checked_frames(sequence)
+    return fit_error(state, coarse.spectral, coarse.config, coarse.sequence, frames) < lacking(sequence, frames)
+
+
+def checked_frames(sequence: Sequence) -> NDArray[np.intp]:
+    """The training frames that a check renders: at most CHECKED_FRAMES, evenly spaced, the first and last included."""
+    train = sequence.train_index
+    return train[np.linspace(0, len(train) - 1, min(CHECKED_FRAMES, len(train))).round().astype(np.intp)]
+
+
+def fit_error(
+    state: TrainingState, spectral: Spectral, config: Config, sequence: Sequence, frames: NDArray[np.intp]
+) -> float:
+    """e: the mean masked L1 (B6) of the renders of some frames, display units."""
+    errors = []
+    for index in map(int, frames):
+        frame = sequence.frame(index, config.training.precision)
+        at = (camera_at(state.frames, frame.camera, frame.time), frame.time)
+        rendered = render_at(state.gaussians, spectral, config, *at, frames=state.frames)
+        errors.append(masked_l1_forward(rendered.colour, frame.image, frame.mask)[0])
+    return float(np.mean(errors))
+
+
+def lacking(sequence: Sequence, frames: NDArray[np.intp]) -> float:
+    """d: the mean magnitude of the finest Laplacian band of some frames over its valid pixels, display units.
+
+    Edges: a frame without a valid pixel does not count; 0 without any, and the coarse start then ends late.
+    """
+    found = []
+    for index in map(int, frames):
+        frame = sequence.frame(index)
+        valid = support_masks(frame.mask, 1).bands[0]
+        if valid.any():
+            found.append(np.abs(laplacian_levels(frame.image, 1).bands[0][:, valid]).mean(dtype=np.float64))
+    return float(np.mean(found)) if found else 0.0

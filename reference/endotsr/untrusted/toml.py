@@ -1,0 +1,46 @@
+"""TOML of settings and sequences: read with a bound on its size, and written from plain values."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+
+LARGEST_FILE = 1 << 20  # bytes
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, unchecked. Raises InputError naming the file."""
+    text = read_text(Path(path), LARGEST_FILE)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: it is nested too deeply") from None
+    except ValueError as error:  # of TOML, and of dates or integers that Python cannot hold
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+
+
+def toml_text(data: dict[str, Any]) -> str:
+    """TOML of plain values and one level of sections; a key whose value is None is left out."""
+    lines, sections = [], []
+    for key, value in data.items():
+        if isinstance(value, dict):
+            sections += ["", f"[{key}]", *(f"{k} = {_toml_value(v)}" for k, v in value.items())]
+        elif value is not None:
+            lines.append(f"{key} = {_toml_value(value)}")
+    return "\n".join(lines + sections) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
+    if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
+        return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line a row
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
+    return repr(value)
