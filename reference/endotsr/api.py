@@ -45,7 +45,7 @@ from endotsr.runs import sources
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
-from endotsr.runs.record import new_record
+from endotsr.runs.records import new_record
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera

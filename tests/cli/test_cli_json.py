@@ -5,7 +5,7 @@ import json
 import pytest
 from tiny import assert_refused, written_folder
 
-from endotsr.cli.golden import DOORS
+from endotsr.cli.golden import SUBCOMMANDS
 from endotsr.cli.main import COMMANDS, main
 
 NOT_ALONE = {"golden"}  # only with a second word
@@ -14,7 +14,7 @@ WITHOUT = {
     "tradeoff train": "the folder it writes holds training.json",
 }
 EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), "tradeoff train"]
-EVERY += [f"golden {door}" for door in DOORS]
+EVERY += [f"golden {door}" for door in SUBCOMMANDS]
 PRINTING = [name for name in EVERY if name not in WITHOUT]
 NUMBERS = range(len(EVERY))  # not the names: `pytest -k gradcheck` selects the gradient checks alone
 

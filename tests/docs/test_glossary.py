@@ -39,6 +39,14 @@ FORBIDDEN_WORDS = {
     "birth": "activation",
     "conformance": "golden",
 }
+# Words that mean one thing, and the rooms that have it. Elsewhere the thing has another name.
+RESERVED = {
+    "moment": {"definition", "fitting", "losses", "stages"},
+    "moments": {"definition", "fitting", "losses", "stages"},
+    "band": {"definition", "equations", "stages"},
+    "bands": {"definition", "equations", "stages"},
+    "door": {"golden"},
+}
 # Whole identifiers: the same letters are right inside `lambda_msp`, `lambda_lap` and `g_lap`.
 FORBIDDEN_NAMES = {
     "msp": "matern_penalty",
@@ -111,6 +119,12 @@ def forbidden(name: str) -> str | None:
     return FORBIDDEN_WORDS[words[0]] if words else FORBIDDEN_NAMES.get(name.lower().strip("_"))
 
 
+def out_of_place(name: str, room: str) -> bool:
+    """Whether an identifier uses a word of other rooms; a class has its words run together."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower().split("_")
+    return any(room not in RESERVED[word] for word in words if word in RESERVED)
+
+
 @pytest.fixture(scope="module")
 def log_keys() -> set[str]:
     """Keys of the log of a run in which every term takes part."""
@@ -158,6 +172,8 @@ def test_every_golden_array_exists():
 
 def test_a_replaced_word_is_recognised():
     assert forbidden("detail_weight") and forbidden("LEAST_TISSUE_SHARE") and forbidden("msp") and forbidden("_lap")
+    assert out_of_place("least_moment", "export") and out_of_place("OneMoment", "views")
+    assert not out_of_place("moment", "fitting")
     assert not any(forbidden(name) for name in ("details", "lambda_msp", "g_lap", "parallel_for", "laplacian_from"))
 
 
@@ -171,3 +187,14 @@ def test_no_identifier_uses_a_replaced_word(file):
     found = {name: forbidden(name) for name in identifiers(ast.parse(file.read_text(encoding="utf-8")))}
     wrong = {name: instead for name, instead in found.items() if instead}
     assert not wrong, f"write instead: {wrong}"
+    room = file.relative_to(PACKAGE).parts[0]
+    assert [name for name in found if out_of_place(name, room)] == []
+
+
+def test_every_class_that_the_glossary_names_exists():
+    """Among the rules of naming; the tables are looked up above."""
+    rules = GLOSSARY.read_text(encoding="utf-8").partition("## Rules of naming")[2].partition("\n## ")[0]
+    classes = {n.name for f in PACKAGE.rglob("*.py") for n in ast.walk(ast.parse(f.read_text(encoding="utf-8")))
+               if isinstance(n, ast.ClassDef)}  # fmt: skip
+    named = {name for name in QUOTED.findall(rules) if re.fullmatch(r"([A-Z][a-z]+)+", name)}
+    assert {"Frame", "Sequence", "Pose"} <= named <= classes

@@ -177,11 +177,11 @@ def clock_jumps(bench: Bench) -> tuple[bool, str]:
     out = bench.fresh()
 
     def work() -> int:
-        from endotsr.runs import record, training
+        from endotsr.runs import records, training
 
         jumps = iter(range(10**6))
         times = lambda: f"{2026 + (10 if next(jumps) % 2 else -1)}-01-01T00:00:00+00:00"
-        record.now = training.now = times
+        records.now = training.now = times
         time.time = lambda: 0.0
         return endotsr_quietly(train_words(out, "--no-evaluate"))
 

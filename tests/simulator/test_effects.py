@@ -7,7 +7,7 @@ import pytest
 from endotsr.errors import InputError
 from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.simulator.bleeding import blood_cover
-from endotsr.simulator.blur import moments, open_span
+from endotsr.simulator.blur import open_span, shutter_times
 from endotsr.simulator.cameras import make_cameras
 from endotsr.simulator.coarse import see_coarsely, views_during
 from endotsr.simulator.frames import Eye, make_scene, simulated_frames, tissue_light
@@ -282,23 +282,23 @@ def test_shadows_lie_where_the_line_to_the_lamp_is_covered():
     ("effects", "bound"), [(("breathing", "camera_motion", "highlights"), 0.15), (("breathing", "cutting"), 0.25)]
 )
 def test_blur_is_the_mean_over_sharp_moments(effects, bound, right):
-    """Against pictures of the tissue at twenty moments of the exposure, each solved and shaded in full."""
+    """Against pictures of the tissue at twenty times of the exposure, each solved and shaded in full."""
     settings = with_effects(SimulatorSettings(width=96, height=64, frames=24, focal=2.0), *effects)
     settings = changed(changed(settings, "motion_blur", on=True, shutter=1.0, samples=20), "breathing", cycles=4.0)
     scene = make_scene(changed(settings, "cutting", start=0.3, stop=0.4))
     t = 0.35
 
-    def light(moment):
-        camera, lamp = (make_cameras(settings, [moment], which)[0] for which in (right, False))
-        view = see(scene.surface, camera, moment)
+    def light(at):
+        camera, lamp = (make_cameras(settings, [at], which)[0] for which in (right, False))
+        view = see(scene.surface, camera, at)
         lamps = lit_by_all(settings, view, lamp, None, camera)
         return shade(settings, scene.texture, view, lamps, t).light
 
     cameras = [make_cameras(settings, [t], which)[0] for which in (right, False)]
     eye = Eye(see(scene.surface, cameras[0], t), cameras[0], right)
     found = tissue_light(scene, eye, cameras[1], None, t).light
-    expected = np.mean([light(t + moment) for moment in moments(settings)], axis=0)
-    assert np.abs(moments(settings)).max() == pytest.approx(0.95 * 0.5 * open_span(settings))
+    expected = np.mean([light(t + u) for u in shutter_times(settings)], axis=0)
+    assert np.abs(shutter_times(settings)).max() == pytest.approx(0.95 * 0.5 * open_span(settings))
     effect = np.sqrt(np.mean((light(t) - expected) ** 2))
     assert np.sqrt(np.mean((found - expected) ** 2)) < bound * effect and effect > 0.01
 

@@ -69,7 +69,7 @@ class ReferenceOptions:
     """folder of the golden cases"""
 
 
-DOORS = {
+SUBCOMMANDS = {
     "judge": "judge a folder of outputs",
     "run": "call a port's command and judge its outputs",
     "reference": "write the reference's own outputs in the same form",
@@ -79,12 +79,12 @@ DOORS = {
 def run(words: list[str]) -> int:
     """The command."""
     if not words or words[0] in ("-h", "--help"):
-        width = max(map(len, DOORS))
+        width = max(map(len, SUBCOMMANDS))
         print("usage: endotsr golden SUBCOMMAND [OPTIONS]\n")
-        print("\n".join(f"  {name:<{width}}  {text}" for name, text in DOORS.items()))
+        print("\n".join(f"  {name:<{width}}  {text}" for name, text in SUBCOMMANDS.items()))
         return 0
-    if words[0] not in DOORS:
-        raise InputError(f"unknown subcommand golden {words[0]!r}; allowed: {', '.join(DOORS)}")
+    if words[0] not in SUBCOMMANDS:
+        raise InputError(f"unknown subcommand golden {words[0]!r}; allowed: {', '.join(SUBCOMMANDS)}")
     return globals()[f"_{words[0]}"](words[1:])
 
 

@@ -36,7 +36,7 @@ def view_verdict(sequence: Sequence, clip: Clip) -> EffectVerdict:
         details = {"degree": HIGHEST, "changes": [LEAST_CHANGE] * HIGHEST, "angle_degrees": 0.0}
         return EffectVerdict("view change", True, UNKNOWN, LEAST_CHANGE, LEAST_CHANGE, "display units", test, 0.01,
                              reason, details)  # fmt: skip
-    changes = [float(np.median([band_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
+    changes = [float(np.median([degree_change(d, k) for d in directions])) for k in range(1, HIGHEST + 1)]
     degree = next((k - 1 for k in range(1, HIGHEST + 1) if changes[k - 1] < LEAST_CHANGE), HIGHEST)
     angle = float(np.degrees(np.median([_spread(d) for d in directions])))
     reason = f"The views of a point differ by up to {angle:.2g} degrees, which determines harmonics to degree {degree}."
@@ -57,14 +57,14 @@ def view_directions(clip: Clip) -> FloatArray:
     return away / np.linalg.norm(away, axis=2, keepdims=True)
 
 
-def band_change(directions: FloatArray, degree: int) -> float:
+def degree_change(directions: FloatArray, degree: int) -> float:
     """Root mean square over frames of TYPICAL x the strongest harmonic of this degree, lower degrees removed."""
-    lower, band = harmonic_design(directions, degree - 1), harmonic_design(directions, degree)
-    band = band[:, lower.shape[1] :]
+    lower, own = harmonic_design(directions, degree - 1), harmonic_design(directions, degree)
+    own = own[:, lower.shape[1] :]
     # directions of the lower degrees that are rounding noise explain nothing
     left, sizes, _ = np.linalg.svd(lower, full_matrices=False)
     basis = left[:, sizes > 1e-6 * sizes[0]]
-    rest = band - basis @ (basis.T @ band)
+    rest = own - basis @ (basis.T @ own)
     return TYPICAL * float(np.linalg.svd(rest, compute_uv=False)[0]) / len(directions) ** 0.5
 
 

@@ -10,7 +10,7 @@ from endotsr.export.model import save_slim_model
 from endotsr.export.placement import placed_points, placed_scene
 from endotsr.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
 from endotsr.export.scene import MovingScene
-from endotsr.export.times import Times, moments
+from endotsr.export.times import Times, chosen_times
 from endotsr.runs.files import refuse_unwritable, replacing_folder
 from endotsr.runs.folder import refuse_existing
 
@@ -74,7 +74,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
         raise InputError(
             f"{out}: a slim model holds every time and the whole scene; allowed: --out alone, or a .ply file"
         )
-    if scene.one_moment:
+    if scene.one_time:
         raise InputError(f"{out}: a .ply file is one moment, a slim model a whole scene; allowed: of a run folder")
     refuse_unwritable(out)
     model = scene.model
@@ -87,7 +87,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
 
 
 def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
-    wanted = moments("export", times if times.chosen else Times(frames="all"), scene.record)
+    wanted = chosen_times("export", times if times.chosen else Times(frames="all"), scene.record)
     if times.chosen and len(wanted) > 1:
         raise InputError(f"{out}: one file holds one time, and {len(wanted)} are chosen; allowed: a folder, one time")
     refuse_unwritable(out)
@@ -97,7 +97,7 @@ def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> 
 
 
 def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
-    wanted = moments("export", times, scene.record, default="all")
+    wanted = chosen_times("export", times, scene.record, default="all")
     refuse_existing(out)
     scene.model  # refuses a run without a usable checkpoint before anything is made  # noqa: B018
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
@@ -117,7 +117,7 @@ def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int
         vertices = placed_points(found.vertices.T, placement).T
         write_ply(file, mesh_vertices(vertices, found.colours), comments, found.faces)
         return len(found.faces)
-    moment = placed_scene(scene.at(time, content.taken_out), placement)
-    vertices = point_vertices(moment, content.least_opacity) if content.kind == "points" else gaussian_vertices(moment)
+    placed = placed_scene(scene.at(time, content.taken_out), placement)
+    vertices = point_vertices(placed, content.least_opacity) if content.kind == "points" else gaussian_vertices(placed)
     write_ply(file, vertices, comments)
     return vertices.size

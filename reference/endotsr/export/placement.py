@@ -3,8 +3,8 @@
 A scene is trained in the world of its sequence, and layouts differ: an EndoNeRF world has y up and z backward. Every
 output (ply, point cloud, mesh, camera paths) is in the axes of the camera of the first frame instead: x to the right, y
 down, z forward, the origin at its optical centre. The camera with the identity as its pose sees what the first frame
-shows. The conversion is made at the door: checkpoints, sequence.json and the arrays of a slim model stay in the world
-of the training, to the bit, and `cameras[0]` of their records leads from it to the outputs.
+shows. Outputs are converted when they are written: checkpoints, sequence.json and the arrays of a slim model stay in
+the world of the training, to the bit, and `cameras[0]` of their records leads from it to the outputs.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from endotsr.splatting.harmonics_formulas import harmonic_basis
 from endotsr.splatting.render import Scene
 
 DIRECTIONS = 64  # from which the rotation of the harmonics is found
-BANDS = (slice(0, 3), slice(3, 8), slice(8, 15))  # Y_1 ... Y_15 of degree 1, 2 and 3
+DEGREES = (slice(0, 3), slice(3, 8), slice(8, 15))  # Y_1 ... Y_15 of degree 1, 2 and 3
 NEAR_WHOLE = 1e-12  # an entry of a rotation of harmonics this near to a whole number is that number
 
 
@@ -76,10 +76,10 @@ def _turned_harmonics(harmonics: FloatArray, rotation: FloatArray) -> FloatArray
         directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         before, after = _basis(directions), _basis(directions @ rotation.T)
-        for band in BANDS:
-            rows = slice(band.start + 1, band.stop + 1)
+        for degree in DEGREES:
+            rows = slice(degree.start + 1, degree.stop + 1)
             if rows.stop <= len(harmonics):
-                turn = np.linalg.lstsq(after[:, band], before[:, band], rcond=None)[0]
+                turn = np.linalg.lstsq(after[:, degree], before[:, degree], rcond=None)[0]
                 turn = np.where(np.abs(turn - np.rint(turn)) < NEAR_WHOLE, np.rint(turn), turn)
                 found[rows] = np.tensordot(turn, found[rows], 1)
     return found.astype(harmonics.dtype)

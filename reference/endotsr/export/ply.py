@@ -134,11 +134,11 @@ def _gaussians(vertex: NDArray[np.void]) -> Gaussians:
     rest = [f"f_rest_{i}" for i in range(sum(name.startswith("f_rest_") for name in names))]
     if len(rest) not in REST:
         raise ValueError(f"{len(rest)} f_rest columns; 0, 9, 24 or 45 expected")
-    bands = 1 + len(rest) // 3
-    harmonics = np.empty((bands, 3, vertex.size))
+    coefficients = 1 + len(rest) // 3
+    harmonics = np.empty((coefficients, 3, vertex.size))
     harmonics[0] = columns("f_dc_0", "f_dc_1", "f_dc_2")
     if rest:
-        harmonics[1:] = columns(*rest).reshape(3, bands - 1, -1).transpose(1, 0, 2)
+        harmonics[1:] = columns(*rest).reshape(3, coefficients - 1, -1).transpose(1, 0, 2)
     return Gaussians(
         columns("x", "y", "z"), columns("rot_0", "rot_1", "rot_2", "rot_3"), columns("scale_0", "scale_1", "scale_2"),
         columns("opacity")[0], harmonics,

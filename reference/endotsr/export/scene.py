@@ -41,7 +41,7 @@ class MovingScene:
     record: dict[str, Any]
     loaded: Model | None = None
     folder: RunFolder | None = None
-    one_moment: bool = False  # of a ply file, which has the axes of the outputs
+    one_time: bool = False  # of a ply file, which has the axes of the outputs
 
     @cached_property
     def model(self) -> Model:
@@ -61,7 +61,7 @@ class MovingScene:
     @property
     def placement(self) -> Placement:
         """From the world of the training to the axes of the outputs; a ply file has these already."""
-        return HERE if self.one_moment else placement_of(self.cameras[0])
+        return HERE if self.one_time else placement_of(self.cameras[0])
 
     def render(self, time: float, camera: Camera, taken_out: tuple[str, ...] = ()) -> RenderOut:
         """Render at a time in [0, 1]; `taken_out` names spectral components to leave out."""
@@ -113,7 +113,7 @@ def _from_ply(path: Path) -> MovingScene:
         "cameras": [camera._asdict() | {name: getattr(camera, name).tolist() for name in ("rotation", "translation")}],
     }
     model = Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0)
-    return MovingScene(record, model, one_moment=True)
+    return MovingScene(record, model, one_time=True)
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:

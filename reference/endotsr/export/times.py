@@ -22,10 +22,10 @@ class Times(NamedTuple):
         return bool(self.times) or self.frames is not None or self.count is not None
 
 
-def moments(
+def chosen_times(
     command: str, request: Times, record: dict[str, Any], default: str = "test"
 ) -> list[tuple[float, int, str, bool]]:
-    """Time, nearest frame, name, and whether it is the moment of that frame.
+    """Time, nearest frame, name, and whether it is the time of that frame.
 
     command   for messages
     default   frames to take if nothing is chosen

@@ -1,4 +1,4 @@
-"""run.json and sequence.json as typed structures: what another person's run folder may say.
+"""run.json and sequence.json: run.json at the start of a run, and what another person's run folder may say.
 
 Every key that is there must have the type and the range below. A key may be missing: whoever needs it names it
 (`RunFolder.record`), because earlier versions wrote fewer.
@@ -9,7 +9,9 @@ from typing import Annotated, Any
 
 import msgspec
 
+from endotsr.config import Config
 from endotsr.errors import InputError
+from endotsr.runs.machine import machine, now, versions
 from endotsr.untrusted.names import file_name, plain_line
 from endotsr.untrusted.png import MOST_PIXELS
 
@@ -18,7 +20,7 @@ ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
 Count = Annotated[int, msgspec.Meta(ge=0, le=MOST_COUNT)]
 Side = Annotated[int, msgspec.Meta(ge=1, le=MOST_PIXELS)]
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
-Moment = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Length = Annotated[float, msgspec.Meta(ge=-1e30, le=1e30)]
 Positive = Annotated[float, msgspec.Meta(gt=0, le=1e30)]
 Text = Annotated[str, msgspec.Meta(max_length=1 << 16, pattern="^[^\\x00]*$")]
@@ -38,7 +40,7 @@ class InputPart(_Part, kw_only=True):
     height: Side | msgspec.UnsetType = msgspec.UNSET
     training_frames: Count | msgspec.UnsetType = msgspec.UNSET
     held_out_frames: Count | msgspec.UnsetType = msgspec.UNSET
-    tissue_fraction: Moment | msgspec.UnsetType = msgspec.UNSET
+    tissue_fraction: Fraction | msgspec.UnsetType = msgspec.UNSET
     static_camera: bool | msgspec.UnsetType = msgspec.UNSET
     notes: list[Text] = []
     arrays_sha256: dict[Text, Text] = {}
@@ -94,7 +96,7 @@ class SequenceRecord(_Part, kw_only=True):
     largest_depth: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | msgspec.UnsetType = msgspec.UNSET
     static_camera: bool | msgspec.UnsetType = msgspec.UNSET
     names: list[Text] | msgspec.UnsetType = msgspec.UNSET
-    times: list[Moment] | msgspec.UnsetType = msgspec.UNSET
+    times: list[Fraction] | msgspec.UnsetType = msgspec.UNSET
     train_index: list[Count] | msgspec.UnsetType = msgspec.UNSET
     test_index: list[Count] | msgspec.UnsetType = msgspec.UNSET
     cameras: list[CameraPart] | msgspec.UnsetType = msgspec.UNSET
@@ -106,6 +108,31 @@ REPORTED = (
     *(f"machine.{key}" for key in ("processor", "cores", "memory_bytes", "system")),
 )
 """Keys of run.json that a report needs."""
+
+
+def new_record(command: list[str], config: Config, threads: int, source: dict[str, Any]) -> dict[str, Any]:
+    """The entries of run.json at the start of a run.
+
+    command   command line of the run, one string a word
+    threads   kernel threads in use
+    source    `input_record` of the sequence
+    """
+    return {
+        "status": "running",
+        "command": command,
+        "started": now(),
+        "finished": None,
+        "seconds": 0.0,
+        "iterations_done": 0,
+        "lambda_lap": None,
+        "peak_memory_bytes": None,
+        "seed": config.training.seed,
+        "threads": threads,
+        "versions": versions(),
+        "machine": machine(),
+        "input": source,
+        "resumed": [],
+    }
 
 
 def check_run_record(record: dict[str, Any], path: Path) -> None:

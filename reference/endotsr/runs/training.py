@@ -19,7 +19,7 @@ from endotsr.runs.files import os_error_line, replace_file
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
-from endotsr.runs.record import new_record
+from endotsr.runs.records import new_record
 from endotsr.runs.stopping import finishing, stop_asked
 
 if TYPE_CHECKING:

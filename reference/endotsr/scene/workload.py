@@ -48,8 +48,8 @@ def gaussians(count: int, config: Config, seed: int = 7, size: float = 1.0) -> G
     quaternion = _facing(rng, count)
     opaque = rng.random(count) < OPAQUE_FRACTION
     opacity = np.where(opaque, rng.uniform(0.6, 0.98, count), rng.uniform(0.03, 0.5, count))
-    bands = (config.model.harmonics_degree + 1) ** 2
-    harmonics = rng.normal(0, 0.05, (bands, 3, count))
+    coefficients = (config.model.harmonics_degree + 1) ** 2
+    harmonics = rng.normal(0, 0.05, (coefficients, 3, count))
     harmonics[0] = rng.uniform(-1.2, 1.2, (3, count))
     scene = Gaussians(
         position=position,

@@ -113,23 +113,23 @@ def poses_of_frames(
             f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose a frame, frame"
             " numbers as stamps, or a known frame rate"
         )
-    moments = stamps[0] + (np.arange(count) / rate if times is None else times)
-    return poses_at(trajectory, moments, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
+    wanted = stamps[0] + (np.arange(count) / rate if times is None else times)
+    return poses_at(trajectory, wanted, 1.0 / rate), f"stamps are seconds; frames at {rate:g} Hz from the first one"
 
 
-def poses_at(trajectory: Trajectory, moments: FloatArray, longest: float) -> list[CameraPose | None]:
-    """Poses at moments, between the two nearest of the trajectory; None outside, and in gaps longer than `longest`."""
+def poses_at(trajectory: Trajectory, times: FloatArray, longest: float) -> list[CameraPose | None]:
+    """Poses at times, between the two nearest of the trajectory; None outside, and in gaps longer than `longest`."""
     stamps, found = trajectory.stamps, []
-    for moment in moments:
-        after = int(np.searchsorted(stamps, moment))
-        nearest = min((k for k in (after - 1, after) if 0 <= k < len(stamps)), key=lambda k: abs(stamps[k] - moment))
-        if abs(stamps[nearest] - moment) <= 1e-3 * longest:
+    for t in times:
+        after = int(np.searchsorted(stamps, t))
+        nearest = min((k for k in (after - 1, after) if 0 <= k < len(stamps)), key=lambda k: abs(stamps[k] - t))
+        if abs(stamps[nearest] - t) <= 1e-3 * longest:
             found.append(trajectory.poses[nearest])
         elif 0 < after < len(stamps) and stamps[after] - stamps[after - 1] <= 2 * longest:
-            fraction = (moment - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
+            fraction = (t - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
             found.append(pose_between(trajectory.poses[after - 1], trajectory.poses[after], fraction))
         else:
-            found.append(trajectory.poses[nearest] if abs(stamps[nearest] - moment) <= longest / 2 else None)
+            found.append(trajectory.poses[nearest] if abs(stamps[nearest] - t) <= longest / 2 else None)
     return found
 
 

@@ -1,6 +1,6 @@
-"""Motion blur: the moments of an exposure, over which a picture is integrated.
+"""Motion blur: the times of an exposure, over which a picture is integrated.
 
-In: settings. Out: the time for which the shutter is open, and the moments that are averaged.
+In: settings. Out: the time for which the shutter is open, and the times that are averaged.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ def open_span(settings: SimulatorSettings) -> float:
     return part.shutter / settings.frames if part.on else 0.0
 
 
-def moments(settings: SimulatorSettings) -> FloatArray:
-    """The moments of an exposure: middles of equal parts of the open time, relative to the time of the frame."""
+def shutter_times(settings: SimulatorSettings) -> FloatArray:
+    """The averaged times: middles of equal parts of the open time, relative to the time of the frame."""
     samples = settings.motion_blur.samples
     return open_span(settings) * ((np.arange(samples) + 0.5) / samples - 0.5)

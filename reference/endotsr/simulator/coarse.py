@@ -41,25 +41,25 @@ def see_coarsely(surface: Surface, camera: Camera, t: float) -> SurfaceView:
 
 
 def views_during(
-    surface: Surface, cameras: list[Camera], view: SurfaceView, t: float, moments: FloatArray
+    surface: Surface, cameras: list[Camera], view: SurfaceView, t: float, times: FloatArray
 ) -> Iterator[SurfaceView]:
-    """The view at every moment of an exposure: the material seen, with the position and normal of its middle.
+    """The view at every time of an exposure: the material seen, with the position and normal of its middle.
 
-    cameras  at the first moment, at t and at the last moment
+    cameras  at the first time, at t and at the last time
     view     the view at t
-    moments  relative to t, normalised time, ascending and symmetrical
+    times    relative to t, normalised time, ascending and symmetrical
 
-    The material coordinates at a pixel run along the parabola in time through those at the three cameras' moments.
+    The material coordinates at a pixel run along the parabola in time through those at the three cameras' times.
     """
     slit = surface.slit
-    cut = slit is not None and is_open(slit, t + moments[-1])
+    cut = slit is not None and is_open(slit, t + times[-1])
     sides = (1.0, -1.0) if cut else (None,)
     paths = [
-        [_node_material(surface, camera, t + at, side) for camera, at in zip(cameras, (moments[0], 0.0, moments[-1]))]
+        [_node_material(surface, camera, t + at, side) for camera, at in zip(cameras, (times[0], 0.0, times[-1]))]
         for side in sides
     ]
-    for moment in moments / moments[-1]:
-        weights = 0.5 * moment * (moment - 1), 1 - moment**2, 0.5 * moment * (moment + 1)
+    for u in times / times[-1]:
+        weights = 0.5 * u * (u - 1), 1 - u**2, 0.5 * u * (u + 1)
         found = [spread(np.asarray(sum(w * m for w, m in zip(weights, path))), cameras[1]) for path in paths]
         if slit is None or not cut:
             yield view._replace(material=found[0], wound=None)

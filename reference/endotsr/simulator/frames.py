@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.splits import time_stamps
-from endotsr.simulator.blur import moments, open_span
+from endotsr.simulator.blur import open_span, shutter_times
 from endotsr.simulator.cameras import make_cameras
 from endotsr.simulator.coarse import see_coarsely, views_during
 from endotsr.simulator.gain import camera_gain, to_display
@@ -133,7 +133,7 @@ def tissue_light(scene: SimulatedScene, eye: Eye, lamp: Camera, blocker: Blocker
     lamps = lit_by_all(settings, eye.view, lamp, blocker, eye.camera if eye.right else None)
     if open_span(settings) == 0.0 or not moves(scene):
         return shade(settings, scene.texture, eye.view, lamps, t)
-    times = moments(settings)
+    times = shutter_times(settings)
     cameras = make_cameras(settings, np.array([t + times[0], t, t + times[-1]]), eye.right)
     views = views_during(surface, cameras, eye.view, t, times)
     light = np.zeros((3, *eye.view.depth.shape))

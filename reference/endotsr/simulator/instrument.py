@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.simulator.blur import moments, open_span
+from endotsr.simulator.blur import open_span, shutter_times
 from endotsr.simulator.settings import SimulatorSettings
 
 SHAFT, WRIST, JAW = 0.042, 0.036, 0.017  # half widths, image widths
@@ -81,7 +81,7 @@ def _aspect(settings: SimulatorSettings) -> FloatArray:
 
 def _blurred(settings: SimulatorSettings, grasper: Grasper, t: float, shift: float) -> Drawing:
     """One instrument, as the mean over the exposure. Only the part of the picture around it is computed."""
-    times = [t] if open_span(settings) == 0.0 else [float(t + moment) for moment in moments(settings)]
+    times = [t] if open_span(settings) == 0.0 else [float(t + u) for u in shutter_times(settings)]
     poses = [_pose(settings, grasper, one, shift) for one in times]
     box = _box(settings, np.concatenate([pose.points for pose in poses], axis=1))
     parts = [_draw_one(settings, pose, box) for pose in poses]

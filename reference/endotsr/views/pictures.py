@@ -15,7 +15,7 @@ from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.files import check_folder_name
 from endotsr.export.placement import Placement, placed_camera
 from endotsr.export.scene import MovingScene
-from endotsr.export.times import moments
+from endotsr.export.times import chosen_times
 from endotsr.opencv import write_png
 from endotsr.report.figures import ByteImage
 from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
@@ -67,7 +67,7 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     check_request(request, scene.record, default)
     pivot_depth, _ = 1.0, scene.model
     if request.camera in TURNING:
-        time, frame, _, _ = moments("render", request.times, scene.record, default)[0]
+        time, frame, _, _ = chosen_times("render", request.times, scene.record, default)[0]
         out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
     return views_of(request, scene.record, scene.cameras, pivot_depth, default, scene.placement)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.export.placement import HERE, Placement, training_camera
-from endotsr.export.times import Times, moments
+from endotsr.export.times import Times, chosen_times
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
@@ -38,7 +38,7 @@ class ViewRequest(NamedTuple):
 
 def check_request(request: ViewRequest, record: dict[str, Any], default: str = "test") -> None:
     """Everything that can be refused without a model and its cameras. Raises: InputError."""
-    moments("render", request.times, record, default)
+    chosen_times("render", request.times, record, default)
     if request.size:
         read_size(request.size)
     if not 0.0 <= request.angle <= LARGEST_ANGLE:
@@ -72,7 +72,7 @@ def views_of(
 
     Raises: InputError for a file of cameras that cannot be used.
     """
-    wanted = moments("render", request.times, record, default)
+    wanted = chosen_times("render", request.times, record, default)
     cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth, placement)
     if any(request.offset):
         cameras = [shifted(camera, request.offset) for camera in cameras]

@@ -54,7 +54,7 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     rotation = np.empty((4, *values.shape[1:]), np.float32)
     for k, time in enumerate(times):
         camera = cameras[nearest_frame(known, float(time))]
-        values[:, k], rotation[:, k] = _moment(scene, float(time), camera, seen)
+        values[:, k], rotation[:, k] = _at_time(scene, float(time), camera, seen)
     low, high = values.min(axis=(1, 2)).astype(np.float64), values.max(axis=(1, 2)).astype(np.float64)
     high = np.where(high > low, high, low + 1)
     levels = np.array([LEVELS_16] * 6 + [LEVELS_8] * 3)[:, None, None]
@@ -64,16 +64,17 @@ def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     return Trajectories(times, rounded[:6].astype(np.uint16), rest, low, high)
 
 
-def _moment(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+def _at_time(scene: MovingScene, time: float, camera: Camera, seen: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
     """Position, log-scale and colour (9, N), and the unit quaternion (4, N), of the Gaussians that are seen."""
-    moment, degree = scene.at(time), scene.model.config.model.harmonics_degree
-    colour = harmonics_forward(moment.harmonics, moment.residual, moment.position, camera_centre(camera), degree)[0]
+    deformed, degree = scene.at(time), scene.model.config.model.harmonics_degree
+    centre = camera_centre(camera)
+    colour = harmonics_forward(deformed.harmonics, deformed.residual, deformed.position, centre, degree)[0]
     exposure = exposure_at(scene.model.frames, time)
     if exposure is not None:
         colour = exposure_forward(colour[:, None], exposure.log_gain, exposure.bias)[0][:, 0]
-    norm = np.maximum(np.linalg.norm(moment.quaternion, axis=0), 1e-12)
-    values = np.concatenate([moment.position, moment.log_scale, colour])
-    return values[:, seen], (moment.quaternion / norm)[:, seen]
+    norm = np.maximum(np.linalg.norm(deformed.quaternion, axis=0), 1e-12)
+    values = np.concatenate([deformed.position, deformed.log_scale, colour])
+    return values[:, seen], (deformed.quaternion / norm)[:, seen]
 
 
 def rotation_levels(rotation: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from endotsr.simulator.scenes import SCENES
 
 ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
 SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # a command whose options are those of another
-CHOICES = {"golden": "DOORS"}  # the table of a command module whose keys are its first words
+CHOICES = {"golden": "SUBCOMMANDS"}  # the table of a command module whose keys are its first words
 FIRST_WORDS = {
     "tradeoff": ("train",),
     "train": ("simulated",),

@@ -61,9 +61,9 @@ def open_tum(path: Path, options: SourceOptions) -> Recording:
         notes.append("no --camera: the intrinsics that the authors of the layout recommend")
     depth = None
     if (path / DEPTH_LIST).is_file():
-        moments, planes = read_list(path / DEPTH_LIST)
-        nearest = np.abs(moments[None, :] - times[:, None]).argmin(axis=1)
-        paired = [planes[k] if abs(moments[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
+        stamps, planes = read_list(path / DEPTH_LIST)
+        nearest = np.abs(stamps[None, :] - times[:, None]).argmin(axis=1)
+        paired = [planes[k] if abs(stamps[k] - t) <= LONGEST else None for k, t in zip(nearest, times)]
         depth = depth_reader(paired, STEP)
     poses: list[CameraPose | None] | None = None
     where = options.trajectory or path / TRAJECTORY
