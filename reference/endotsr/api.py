@@ -175,7 +175,8 @@ def train(
     about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)
     record = new_record(["endotsr.train"], config, threads, about) | found
-    run = Run(config, record, sources.sequence_record(sequence), [], _sequence=sequence, _state=state)
+    seen = sources.sequence_record(sequence)
+    run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message)
 
 
@@ -226,10 +227,8 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
     folder = run_folders.open_run(Path(path))
     model = load_model(folder)
     log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]
-    opened = Run(model.config, folder.record(), folder.sequence_record(*RENDERING), log)
-    opened._model, opened._folder = model, folder
-    opened._source = None if sequence is None else str(sequence)
-    return opened
+    given = "" if sequence is None else str(sequence)
+    return Run(model.config, folder.record(), folder.sequence_record(*RENDERING), log, model, given, _folder=folder)
 
 
 @dataclass(eq=False, repr=False)
@@ -240,22 +239,15 @@ class Run:
     record: dict[str, Any]  # what run.json holds: versions, machine, input hashes, status, seconds
     sequence_record: dict[str, Any]  # what sequence.json holds: times, names, split, cameras
     log: list[dict[str, Any]]  # one entry an iteration, as the lines of log.jsonl
+    model: Model  # Gaussians, spectral constants, settings and iteration: all that rendering reads
+    _source: str  # where the sequence is; "" = where the record says
+    _folder: run_folders.RunFolder | None = None  # of an opened run: what the next two are read from at their first use
     _sequence: Sequence | None = None
     _state: "TrainingState | None" = None
-    _model: Model | None = None
-    _folder: run_folders.RunFolder | None = None
-    _source: str | None = None
 
     def __repr__(self) -> str:
         planned = self.config.training.iterations
         return f"Run(iteration {self.model.iteration} of {planned}, {self.model.gaussians.count} Gaussians)"
-
-    @property
-    def model(self) -> Model:
-        """Gaussians, spectral constants, settings and iteration: all that rendering reads."""
-        if self._model is None:
-            self._model = self._model_of(self._training())
-        return self._model
 
     @property
     def iteration(self) -> int:
@@ -351,7 +343,7 @@ class Run:
         except StopTraining:
             pass
         finally:
-            self._model = None
+            self.model = _model_of(state, self.config, self.sequence_record)
             seconds = before + clock.monotonic() - began
             self.record |= self._reached(state) | {"seconds": round(seconds, 2)}
         return self
@@ -383,15 +375,6 @@ class Run:
             state = self._state = load_training(self._folder, self.config)
         return state
 
-    def _model_of(self, state: "TrainingState") -> Model:
-        import numpy as np
-
-        from endotsr.fitting.model import spectral_from
-
-        times = np.asarray(self.sequence_record["times"])[self.sequence_record["train_index"]]
-        spectral = spectral_from(self.config.model, times)
-        return Model(state.gaussians, spectral, self.config, state.iteration, state.frames)
-
     def _reached(self, state: "TrainingState") -> dict[str, Any]:
         finished = state.iteration >= self.config.training.iterations
         return {
@@ -413,6 +396,16 @@ class Run:
             allowed = f"a Camera, or a frame from 0 to {len(cameras) - 1}"
             raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
         return cameras[int(camera)]
+
+
+def _model_of(state: "TrainingState", config: Config, record: dict[str, Any]) -> Model:
+    """The model of a state; `record` is that of the sequence."""
+    import numpy as np
+
+    from endotsr.fitting.model import spectral_from
+
+    times = np.asarray(record["times"])[record["train_index"]]
+    return Model(state.gaussians, spectral_from(config.model, times), config, state.iteration, state.frames)
 
 
 def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapping[str, Any]]) -> Config:

@@ -51,11 +51,8 @@ def assemble(
         notes.append(world_note(world, files.unit))
     notes += _mask_notes(frames, files, config)
     notes.append(_depth_note(depth, near, files.depth, "scene units" if files.arbitrary else files.unit))
-    facts = frames.facts[0], with_coverage(frames.facts[1], depth, masks)
-    where = files.depth[0].parent
-    notes += guarded(files.images, facts, cameras, where, files.arbitrary, near, files.seconds, files.assumed)
-    if frames.store.note:
-        notes.append(frames.store.note)
+    notes += _guarded(frames, files, cameras, near)
+    notes += [frames.store.note] if frames.store.note else []
     if files.masks:
         notes += check_single_masks(masks, depth, images, list(map(str, files.masks)), config.allow_tissue_fraction)
     height, width = images.shape[2:]
@@ -84,6 +81,13 @@ def assemble(
         test_index=test,
         notes=notes,
     )
+
+
+def _guarded(frames: Frames, files: FrameFiles, cameras: list[Camera], near: float) -> list[str]:
+    """Notes of the checks that `endotsr check` makes too. Raises InputError for what it refuses."""
+    facts = frames.facts[0], with_coverage(frames.facts[1], frames.depth, frames.masks)
+    where = files.depth[0].parent
+    return guarded(files.images, facts, cameras, where, files.arbitrary, near, files.seconds, files.assumed)
 
 
 def check_percentiles(config: SequenceConfig) -> None:
