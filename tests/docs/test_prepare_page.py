@@ -12,7 +12,8 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guides" / "prepare.md"
 TABLES = ("any_clip", "own_pictures", "masks", "sinus", "poses", "long_clip", "one_camera")
 SECTIONS = {"common": "The common format", "endonerf": "EndoNeRF", "stereomis": "StereoMIS", "tum": "TUM",
-            "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP"}  # fmt: skip
+            "video": "Video", "points": "Points", "pictures": "Pictures", "colmap": "COLMAP", "hamlyn": "Hamlyn",
+            "scared": "SCARED", "servct": "SERV-CT", "c3vd": "C3VD", "nerfstudio": "nerfstudio"}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TABLES)

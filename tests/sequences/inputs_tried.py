@@ -12,25 +12,57 @@ import contextlib
 import io
 import sys
 import tempfile
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from common_folder import written
-from made_videos import CAMERA, HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven, write
-from raw_sources import colmap, stereomis
+from input_kinds import (
+    MATRIX,
+    OPENCV,
+    Outcome,
+    Row,
+    calibrated,
+    centred,
+    close,
+    codec,
+    colmap_folder,
+    common,
+    cut,
+    depth,
+    depth_is_true,
+    each,
+    exif,
+    exported,
+    folder_of,
+    frozen,
+    half_excluded,
+    joined,
+    kalibr_text,
+    mask,
+    masked,
+    one_camera,
+    public,
+    ros_text,
+    scope,
+    scratched,
+    size,
+    stereomis_folder,
+    text_file,
+    timed,
+    trailing,
+    united_masks,
+    video,
+    view_is_kept,
+)
+from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
 from test_stated_depth import WRONG as NO_LENGTHS
-from test_stated_depth import recording as with_depth
 from test_stated_depth import true_depth
 
 from endotsr.cli.main import main
-from endotsr.opencv import read_png, write_png
-from endotsr.opencv.pictures import write_jpeg
-from endotsr.sequences.sequence_file import FILE_NAME, read_sequence_file
+from endotsr.opencv import write_png
+from endotsr.sequences.sequence_file import read_sequence_file
 
 WRONG = "WRONG IN SILENCE"
 LONGEST = 200  # characters of a message in the table
@@ -39,260 +71,6 @@ NOT_HERE = {  # codecs that no package here encodes, so that no recording of the
     "DV and DVCPRO": "their encoders take broadcast sizes alone",
     "DICOM and endoscope formats of a vendor": "no open encoder",
 }
-
-
-class Row(NamedTuple):
-    """One kind of input."""
-
-    kind: str
-    make: Callable[[Path], list[str]]  # makes the input in a folder; the words of the command
-    expected: str  # right, told or refused
-    said: str = ""  # a part of what is printed
-    check: Callable[[Path], bool] = lambda folder: True  # of what was written
-
-
-class Outcome(NamedTuple):
-    """What a command did."""
-
-    row: Row
-    command: str
-    outcome: str
-    message: str
-
-
-def close(frames, tolerance=10.0):
-    """The written pictures are these."""
-
-    def check(folder: Path) -> bool:
-        files = sorted((folder / "o/images").iterdir())
-        apart = [np.abs(read_png(f).astype(int) - p.astype(int)).mean() for f, p in zip(files, frames, strict=True)]
-        return max(apart) < tolerance
-
-    return check
-
-
-def timed(milliseconds):
-    """The written times are these."""
-    return lambda folder: np.allclose(
-        read_sequence_file(folder / "o").times or [], np.array(milliseconds) / 1e3, atol=2e-3
-    )
-
-
-def size(width, height):
-    """The written size is this, and so is that of the camera."""
-
-    def check(folder: Path) -> bool:
-        camera, seen = read_sequence_file(folder / "o").camera, read_png(folder / "o/images/000000.png")
-        return (camera.width, camera.height) == (width, height) == (seen.shape[1], seen.shape[0])
-
-    return check
-
-
-def prepare(name: str, *words: str, camera=CAMERA):
-    return lambda folder: ["prepare", str(folder / name), "--out", str(folder / "o"), *camera, *words]
-
-
-def video(name: str, frames=None, *words: str, change=lambda path: None, **how):
-    """A video as the input of `prepare`."""
-
-    def make(folder: Path) -> list[str]:
-        write(folder / name, pictures() if frames is None else frames, **how)
-        change(folder / name)
-        return prepare(name, *words)(folder)
-
-    return make
-
-
-def codec(kind: str, name: str, code: str, layout="yuv420p", **how) -> Row:
-    return Row(f"video, {kind}", video(name, None, codec=code, layout=layout, **how), "right", "", close(pictures()))
-
-
-def cut(part: float, whole=None):
-    def change(path: Path) -> None:
-        data = path.read_bytes()
-        path.write_bytes(data[: int(len(data) * part)])
-
-    return change
-
-
-def scratched(path: Path) -> None:
-    """Bytes in the middle of the pictures are overwritten."""
-    data = bytearray(path.read_bytes())
-    middle = len(data) // 2
-    data[middle : middle + 4000] = np.random.default_rng(0).integers(0, 256, 4000).astype(np.uint8).tobytes()
-    path.write_bytes(data)
-
-
-def files(folder: Path, name: str, frames, ending="png", start=0) -> None:
-    (folder / name).mkdir()
-    for i, frame in enumerate(frames):
-        path = folder / name / f"{i + start:04d}.{ending}"
-        write_png(path, frame) if ending == "png" else write_jpeg(path, frame)
-
-
-def folder_of(frames, *words: str, ending="png", change=lambda folder: None):
-    def make(folder: Path) -> list[str]:
-        files(folder, "clip", frames, ending)
-        change(folder)
-        return prepare("clip", *words)(folder)
-
-    return make
-
-
-def masked(frames, *words: str, count=12):
-    def change(folder: Path) -> None:
-        files(folder, "m", frames[:count])
-
-    def make(folder: Path) -> list[str]:
-        return [*folder_of(pictures(), change=change)(folder), "--masks", str(folder / "m"), *words]
-
-    return make
-
-
-def mask(value=255):
-    plane = np.zeros((HEIGHT, WIDTH), np.uint8)
-    plane[:, :40] = value
-    return plane
-
-
-def half_excluded(folder: Path) -> bool:
-    return abs((read_png(folder / "o/masks/000003.png") > 0).mean() - 40 / WIDTH) < 0.01
-
-
-def exif(folder: Path) -> None:
-    from PIL import Image
-
-    for file in (folder / "clip").iterdir():
-        with Image.open(file) as opened:
-            data = opened.getexif()
-            data[0x0112] = 6
-            opened.save(file, exif=data, quality=95)
-
-
-def renamed(folder: Path) -> None:
-    (folder / "clip/0005.png").rename(folder / "clip/0105.png")
-
-
-def depth(values, *words, name="depth", kind="npy"):
-    def make(folder: Path) -> list[str]:
-        return [*with_depth(folder, values, name, kind), *words]
-
-    return make
-
-
-def depth_is_true(folder: Path) -> bool:
-    entry = read_sequence_file(folder / "o").depth
-    return (
-        entry is not None and np.abs(read_png(folder / "o/depth/000002.png") * entry.scale - true_depth(2)).max() < 0.03
-    )
-
-
-def one_camera(values, *words, points=0):
-    """A clip from one camera with the files of a network, and true depth at some points beside it."""
-
-    def make(folder: Path) -> list[str]:
-        import test_relative_depth as one
-
-        where, given = one.clip(folder, values)
-        if points:
-            one.sparse(where, points)
-        return ["depth", str(where), "--given", str(given), "--kind", "relative", *words]
-
-    return make
-
-
-def common(*words: str, command="check", **changes):
-    """A folder in the common format."""
-
-    def make(folder: Path) -> list[str]:
-        change = changes.pop("change", None)
-        written(folder / "clip", **changes)
-        if change:
-            change(folder / "clip")
-        return [command, str(folder / "clip"), *words]
-
-    return make
-
-
-def each(name, change):
-    def done(clip: Path) -> None:
-        for file in sorted((clip / name).iterdir()):
-            write_png(file, change(read_png(file)))
-
-    return done
-
-
-def text(old, new):
-    return lambda clip: (clip / FILE_NAME).write_text((clip / FILE_NAME).read_text().replace(old, new))
-
-
-def frozen(clip: Path) -> None:
-    first = read_png(clip / "images/000000.png")
-    each("images", lambda x: first)(clip)
-
-
-def stereomis_folder(*words, change=lambda raw: None):
-    def make(folder: Path) -> list[str]:
-        stereomis(folder / "raw")
-        change(folder / "raw")
-        return prepare("raw", *words, camera=())(folder)
-
-    return make
-
-
-def colmap_folder(*words):
-    def make(folder: Path) -> list[str]:
-        colmap(folder / "raw", False)
-        return prepare("raw", *words, camera=())(folder)
-
-    return make
-
-
-def scope(folder: Path) -> list[str]:
-    """A round field of view with an instrument, as a video."""
-    from test_propose_masks import scene, through_a_scope
-
-    write(folder / "a.mp4", through_a_scope(scene("pulling")[0])[0], options={"crf": "20"})
-    return ["masks", str(folder / "a.mp4"), "--out", str(folder / "o")]
-
-
-def view_is_kept(folder: Path) -> bool:
-    return all(0.3 < (read_png(file) > 0).mean() < 0.8 for file in (folder / "o/masks").iterdir())
-
-
-def exported(name: str, *words: str):
-    def make(folder: Path) -> list[str]:
-        sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
-        from made_up_model import moving_scene
-
-        from endotsr.export.files import export
-
-        export(moving_scene(), folder / "a.npz")
-        return ["export", str(folder / "a.npz"), "--out", str(folder / name), *words]
-
-    return make
-
-
-def text_file(name: str, content: bytes):
-    def make(folder: Path) -> list[str]:
-        (folder / name).write_bytes(content)
-        return prepare(name)(folder)
-
-    return make
-
-
-def joined(folder: Path) -> list[str]:
-    """A transport stream whose pictures change their size in the middle."""
-    small = [picture(i, 96, 64) for i in range(6)]
-    parts = [write(folder / f"{k}.ts", frames, "mpeg2video") for k, frames in enumerate((pictures(6), small))]
-    (folder / "a.ts").write_bytes(b"".join(part.read_bytes() for part in parts))
-    return prepare("a.ts")(folder)
-
-
-def trailing(count):
-    return lambda folder: read_sequence_file(folder / "o").frames == count
-
-
 DEINTERLACED = [picture(2 * i) for i in range(12)]
 STEREO = [np.hstack([p, p]) for p in pictures()]
 ROWS = [
@@ -406,6 +184,34 @@ ROWS = [
         "near tissue is bright"),
     Row("one camera, no depth at all", video("a.mp4"), "told", "--kind relative"),
     Row("depth beside COLMAP", colmap_folder("--depth", "d"), "refused", "does not read --depth"),
+    Row("Hamlyn", public("hamlyn", "--baseline", "5"), "told", "half a pixel was added", centred),
+    Row("SERV-CT", public("servct"), "told", "no training as one scene", centred),
+    Row("SCARED", public("scared"), "told", "read as world-to-camera",
+        lambda folder: len(read_sequence_file(folder / "o").poses.matrices) == 4),
+    Row("C3VD", public("c3vd", "--scale", "0.1"), "told", "straightened to a pinhole camera", size(135, 108)),
+    Row("nerfstudio", public("nerfstudio"), "told", "unit of lengths unknown", centred),
+    Row("nerfstudio, fisheye", public("nerfstudio", camera_model="OPENCV_FISHEYE"), "refused", "camera_model"),
+    Row("nerfstudio, a picture missing", public("nerfstudio",
+        change=lambda raw: (raw / "images/frame_00002.png").unlink()), "refused", "frame_00002.png"),
+    Row("nerfstudio, out and for COLMAP", public("nerfstudio", "--also", "nerfstudio", "colmap"), "told",
+        "points of the prior depth", centred),
+    Row("calibration, ROS", calibrated("a.yaml", ros_text), "told", "half a pixel was added", centred),
+    Row("calibration, ROS, fisheye", calibrated("a.yaml", lambda: ros_text(distortion_model="equidistant")), "refused",
+        "allowed: plumb_bob"),
+    Row("calibration, Kalibr", calibrated("a.yaml", kalibr_text), "told", "half a pixel was added", centred),
+    Row("calibration, Kalibr, of another size", calibrated("a.yaml", lambda: kalibr_text(resolution=[128, 128])),
+        "refused", "the calibration is of 128x128"),
+    Row("calibration, matrix K as text", calibrated("K.txt", lambda: MATRIX), "told", "half a pixel was added",
+        centred),
+    Row("calibration, OpenCV YAML", calibrated("a.yaml", lambda: OPENCV), "told", "half a pixel was added", centred),
+    Row("calibration, a hostile tag in YAML", calibrated("a.yaml", lambda: "K: !!python/object/apply:os.getcwd []"),
+        "refused", "not YAML"),
+    Row("frames by second and frames left out", video("a.mp4", None, "--frames", "0s:0.24s", "--drop", "1"), "told",
+        "not evenly spaced", close([picture(i) for i in (0, 2, 3, 4, 5)])),
+    Row("frames beyond the end", video("a.mp4", None, "--frames", "0s:9s"), "refused", "ends after 0.440 seconds"),
+    Row("crop", video("a.mp4", None, "--crop", "8", "4", "64", "48"), "told", "the intrinsics follow", size(64, 48)),
+    Row("crop outside", video("a.mp4", None, "--crop", "100", "4", "64", "48"), "refused", "leaves the pictures"),
+    Row("masks united", united_masks, "told", "also excluded is", half_excluded),
     Row("StereoMIS, a mask missing, --gaps drop", stereomis_folder("--gaps", "drop",
         change=lambda raw: (raw / "masks/000002l.png").unlink()), "told", "not evenly spaced",
         timed((0, 40, 120, 160, 200))),

@@ -35,8 +35,8 @@ class PrepareOptions:
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
     """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; the pictures are straightened"""
-    calibration: Annotated[Path | None, Option("FILE.ini")] = None
-    """stereo calibration with StereoLeft and StereoRight; the pair is rectified"""
+    calibration: Annotated[Path | None, Option("FILE")] = None
+    """calibration of one camera or of a pair, which is rectified: ini, YAML of OpenCV, ROS or Kalibr, or a matrix K"""
     baseline: float | None = None
     """distance of the cameras of a pair that is rectified already, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
@@ -61,8 +61,14 @@ class PrepareOptions:
     """read these files as lengths even if they look like disparity or a relative depth"""
     points: Literal["interpolated", "sparse", "none"] = "interpolated"
     """depth from the points of a reconstruction (COLMAP): between the points, at the points, or none"""
-    frames: Annotated[str, Option("A:B[:S]")] = ""
-    """frame range of the source"""
+    frames: Annotated[str, Option("A:B[:S],...")] = ""
+    """frames or seconds of the source: 0:10,12,30s:45s"""
+    drop: Annotated[str, Option("N,...")] = ""
+    """frames or seconds that are left out, such as 10,11"""
+    crop: Annotated[tuple[int, ...], Option("X Y WIDTH HEIGHT")] = ()
+    """window of the pictures, pixels of the source; the intrinsics follow"""
+    unite_masks: Annotated[tuple[Path, ...], Option("FOLDER ...")] = ()
+    """further masks, one a frame or one file for all frames: what any of them excludes is excluded"""
     rate: float | None = None
     """frames a second to keep"""
     source_rate: float | None = None
@@ -75,6 +81,10 @@ class PrepareOptions:
     """frames without mask or pose while others have one: drop leaves them out, fill interpolates"""
     pictures: Literal["png", "jpg"] = "png"
     """format of the written pictures"""
+    also: tuple[Literal["nerfstudio", "colmap"], ...] = ()
+    """descriptions for other programs beside sequence.toml: transforms.json, or a COLMAP model in sparse/0"""
+    replace: bool = False
+    """replace FOLDER if `prepare` wrote it; it may be the source"""
     json: JsonFile = None
     """also write what was found and done as JSON"""
 
@@ -82,20 +92,30 @@ class PrepareOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(PrepareOptions, words, "prepare")
+    from endotsr.sequences.editing import cropped, united
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.prepare import PrepareSettings, prepare
     from endotsr.sequences.sequence_file import RIGHT
     from endotsr.sequences.writing import refuse_existing
 
-    refuse_existing(options.out)
+    if not options.replace:
+        refuse_existing(options.out)
     _check_numbers(options)
     settings = PrepareSettings(
-        options.frames, options.rate, options.scale, options.gaps, options.pictures, options.points
+        options.frames, options.drop, options.rate, options.scale, options.gaps, options.pictures, options.points
     )
     recording = open_recording(options.source, _stated(options))
+    if options.unite_masks:
+        recording = united(recording, options.unite_masks, _stated(options))
+    if options.crop:
+        recording = cropped(recording, options.crop)
     print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
     refuse_unwritable(options.json)
-    found, notes = prepare(recording, options.out, settings)
+    found, notes = prepare(recording, options.out, settings, replace=options.replace)
+    if options.also:
+        from endotsr.sequences.for_others import describe_for
+
+        notes += describe_for(options.out, options.also)
     for note in notes:
         print(f"  {note}")
     camera = found.camera

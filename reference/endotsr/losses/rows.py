@@ -7,7 +7,7 @@ number of threads, and one thread adds the row totals, so a loss is bitwise repr
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.kernels.arrays import BoolArray
 from endotsr.kernels.jit import jit
 
 
@@ -28,7 +28,7 @@ def _row_total(row):
 row_total = jit(_row_total)
 
 
-def check_image(name: str, image: FloatArray, mask: BoolArray) -> FloatArray:
+def check_image(name: str, image: NDArray, mask: BoolArray) -> NDArray:
     """`image` (C, H, W) as a contiguous array. Raises ValueError unless H, W are those of the boolean mask."""
     check_mask(mask)
     if image.ndim != 3 or image.shape[1:] != mask.shape:

@@ -24,7 +24,15 @@ from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.read_frames import FrameFiles
 from endotsr.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
-from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
+from endotsr.sequences.sequence_file import (
+    FILE_NAME,
+    IMAGES,
+    RIGHT,
+    SequenceFile,
+    read_poses,
+    read_poses_with_gaps,
+    read_sequence_file,
+)
 from endotsr.sequences.splits import parse_frame_range, split_frames
 from endotsr.splatting.camera import Camera
 
@@ -48,8 +56,11 @@ def recognises(path: Path) -> bool:
     return (path / FILE_NAME).is_file()
 
 
-def list_contents(folder: Path) -> Contents:
-    """List and pair the files. Raises InputError for a file without its partner or a number that disagrees."""
+def list_contents(folder: Path, poses: bool = True) -> Contents:
+    """List and pair the files; without the poses, their faults do not matter.
+
+    Raises:  InputError for a file without its partner, a number that disagrees, or a pose that is none.
+    """
     folder = Path(folder)
     found = read_sequence_file(folder)
     images = list_pictures(folder / IMAGES, PICTURE_ENDINGS)
@@ -61,7 +72,9 @@ def list_contents(folder: Path) -> Contents:
     for other in (right, masks, depth):
         if other:
             check_pairing(images, other)
-    return Contents(folder, found, images, right, masks, depth, read_poses(found, folder / FILE_NAME))
+    return Contents(
+        folder, found, images, right, masks, depth, read_poses(found, folder / FILE_NAME) if poses else None
+    )
 
 
 def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, range]:
@@ -182,9 +195,10 @@ def _colour(contents: Contents, path: Path) -> NDArray[np.uint8]:
 
 
 def open_common(folder: Path) -> Recording:
-    """The whole folder as a recording, nothing decoded yet. Raises InputError."""
-    contents = list_contents(folder)
+    """The whole folder as a recording, nothing decoded yet; a pose that is none becomes a gap. Raises InputError."""
+    contents = list_contents(folder, poses=False)
     found = contents.file
+    poses, faults = read_poses_with_gaps(found, folder / FILE_NAME)
     scale = found.to_scene(found.depth.unit) * found.depth.scale if found.depth else 1.0
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
@@ -211,11 +225,13 @@ def open_common(folder: Path) -> Recording:
         proposed=bool(found.masks and found.masks.proposed and contents.masks),
         depth=depth if contents.depth else None,
         depth_clipped=bool(found.depth and found.depth.clipped),
+        depth_method=found.depth.method if found.depth else "given",
+        depth_assumed=found.depth.assumed if found.depth else "",
         unit="arbitrary" if found.arbitrary else "mm",
         lens=found.camera.lens(folder),
         baseline=found.camera.baseline * found.to_scene(found.unit) or None,
-        poses=list(contents.poses) if contents.poses else None,
+        poses=poses,
         rate=found.frame_rate or None,
         times=None if found.times is None else np.array(found.times, np.float64),
-        notes=[f"source: {found.source}"] if found.source else [],
+        notes=[*([f"source: {found.source}"] if found.source else []), *faults],
     )

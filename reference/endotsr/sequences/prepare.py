@@ -19,11 +19,13 @@ from endotsr.opencv.pictures import write_jpeg
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.sequences.checks.guard import notes_of
 from endotsr.sequences.depth_files import CLIPPED
+from endotsr.sequences.editing import chosen_frames, without
 from endotsr.sequences.files import shortened
 from endotsr.sequences.points import depth_from_points
 from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, PicturePair, Recording
 from endotsr.sequences.sequence_file import (
     DEPTH,
+    FILE_NAME,
     FORMAT,
     IMAGES,
     MASKS,
@@ -35,11 +37,11 @@ from endotsr.sequences.sequence_file import (
     SequenceFile,
     write_sequence_file,
 )
-from endotsr.sequences.splits import evenly_spaced, parse_frame_range
+from endotsr.sequences.splits import evenly_spaced
 from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
-from endotsr.sequences.writing import new_folder
+from endotsr.sequences.writing import new_folder, replaced_folder
 
 DEPTH_LEVELS = 65535 // 8  # of the 16 bits for the usual largest depth of a frame; eight times more still fits
 LARGEST = 99.8  # percentile of a frame that counts as its largest depth; single values may be outliers
@@ -50,7 +52,8 @@ OnFrame = Callable[[int, int], None]
 class PrepareSettings:
     """What is made of a recording."""
 
-    frames: str = ""  # start:stop[:step] of the source
+    frames: str = ""  # of the source; see `editing.chosen_frames`
+    drop: str = ""  # frames that are left out, in the same words
     rate: float | None = None  # frames a second to keep
     scale: float = 1.0
     gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
@@ -59,11 +62,16 @@ class PrepareSettings:
 
 
 def prepare(
-    recording: Recording, out: Path, settings: PrepareSettings, on_frame: OnFrame = lambda i, n: None
+    recording: Recording,
+    out: Path,
+    settings: PrepareSettings,
+    on_frame: OnFrame = lambda i, n: None,
+    replace: bool = False,
 ) -> tuple[SequenceFile, list[str]]:
     """Write the frames to the new folder `out`. Returns `sequence.toml` and the notes.
 
     on_frame  called with (frames written, frames in all)
+    replace   whether a folder that `prepare` wrote may be replaced, once the new one is whole
 
     Raises:  InputError; nothing is left behind then.
     """
@@ -71,7 +79,7 @@ def prepare(
     chosen = select_frames(recording, settings, notes)
     chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
     refuse_no_lengths(recording, chosen)
-    with new_folder(Path(out)) as folder:
+    with replaced_folder(Path(out), FILE_NAME) if replace else new_folder(Path(out)) as folder:
         found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
     return found, notes
@@ -79,8 +87,9 @@ def prepare(
 
 def select_frames(recording: Recording, settings: PrepareSettings, notes: list[str]) -> list[int]:
     """The frame range, thinned to the wanted rate. Raises InputError."""
-    text = settings.frames.strip()
-    frames = list(parse_frame_range(text, recording.count) if text else range(recording.count))
+    frames = without(chosen_frames(settings.frames, recording), settings.drop, recording)
+    if not frames:
+        raise InputError(f"{recording.where}: no frame is left")
     if settings.rate is None:
         return frames
     if recording.rate is None:
@@ -280,7 +289,7 @@ def _file_of(
     unit = "arbitrary" if recording.unit == ARBITRARY else "mm"
     if (recording.depth or recording.points) and not depth_scale:
         notes.append("no frame has depth: none is written")
-    method = "given" if recording.depth else f"points, {settings.points}"
+    method = recording.depth_method if recording.depth else f"points, {settings.points}"
     clipped = list(CLIPPED) if recording.depth and (settings.scale < 1 or recording.depth_clipped) else []
     times, rate = written_times(recording, chosen, settings.rate, notes)
     return SequenceFile(
@@ -292,7 +301,9 @@ def _file_of(
         frame_rate=rate,
         times=times,
         masks=MaskEntry(proposed=recording.proposed) if recording.masks is not None else None,
-        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method) if depth_scale else None,
+        depth=DepthEntry(unit=unit, scale=depth_scale, clipped=clipped, method=method, assumed=recording.depth_assumed)
+        if depth_scale
+        else None,
         poses=PoseEntry(matrices=[pose_row(pose) for pose in poses]) if poses else None,
     )
 

@@ -9,7 +9,7 @@ tissue, a depth of 0 means no depth.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,8 @@ class Recording:
     depth: Callable[[int], NDArray[np.float32] | None] | None = None  # in `unit`
     stated_depth: StatedDepth | None = None  # where `depth` comes from, if the user named it
     depth_clipped: bool = False  # to the percentiles of a training, before it was reduced
+    depth_method: str = "given"  # in words
+    depth_assumed: Literal["", "scale and shift", "shape"] = ""  # what is not measured of the depth
     points: Callable[[int], FloatArray] | None = None  # (n, 3) world positions that a frame sees, in `unit`
     unit: str = "mm"
     lens: Lens | None = None

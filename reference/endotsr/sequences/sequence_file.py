@@ -212,6 +212,28 @@ def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
     return [_pose(row, entry, scale, f"{path}: poses.matrices: frame {i}") for i, row in enumerate(entry.matrices)]
 
 
+def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
+    """As `read_poses`, with None in place of a pose that is none, and the reasons.
+
+    Raises:  InputError for their number.
+    """
+    try:
+        every = read_poses(found, path)
+        return (None if every is None else [*every]), []
+    except InputError:
+        if found.poses is None or len(found.poses.matrices) != found.frames:
+            raise
+    poses: list[CameraPose | None] = []
+    faults = []
+    for i, row in enumerate(found.poses.matrices):
+        try:
+            poses.append(_pose(row, found.poses, found.to_scene(found.unit), f"{path}: poses.matrices: frame {i}"))
+        except InputError as error:
+            poses.append(None)
+            faults.append(str(error))
+    return poses, faults
+
+
 def _pose(row: list[float], entry: PoseEntry, scale: float, where: str) -> CameraPose:
     if len(row) != 12:
         raise InputError(f"{where}: {len(row)} numbers; allowed: 12, the rows of a 3x4 matrix")

@@ -203,6 +203,8 @@ def with_stated(recording: Recording, options: SourceOptions) -> Recording:
         masks=masks or recording.masks,
         depth=depth or recording.depth,
         depth_clipped=recording.depth_clipped and depth is None,
+        depth_method="given" if depth else recording.depth_method,
+        depth_assumed="" if depth else recording.depth_assumed,
         proposed=recording.proposed and masks is None,
     )
 
@@ -212,29 +214,14 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
 
     Raises:  InputError for a calibration of another size (proportional sizes are scaled).
     """
-    from endotsr.sequences.calibration import read_rig
+    from endotsr.sequences.calibrations import lens_or_rig
 
     if options.calibration is not None:
-        rig = read_rig(options.calibration)
-        return None, Rig(
-            fitted_lens(rig.left, width, height, options.calibration),
-            fitted_lens(rig.right, width, height, options.calibration),
-            rig.rotation,
-            rig.translation,
-        )
+        return lens_or_rig(options.calibration, width, height)
     if options.camera is None:
         return None, None
     fx, fy, cx, cy = options.camera
     return checked_lens(Lens(fx, fy, cx, cy, width, height, options.distortion), where), None
-
-
-def fitted_lens(lens: Lens, width: int, height: int, where: object) -> Lens:
-    """The lens for pictures of this size. Raises InputError if they have other proportions than the calibration."""
-    if abs(lens.width * height - lens.height * width) > max(lens.width, width) // 100:
-        raise InputError(
-            f"{where}: the calibration is of {lens.width}x{lens.height} pixels, the pictures have {width}x{height}"
-        )
-    return lens.scaled(width, height)
 
 
 def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:

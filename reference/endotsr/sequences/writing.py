@@ -30,6 +30,29 @@ def new_folder(path: Path) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def replaced_folder(path: Path, mark: str) -> Iterator[Path]:
+    """As `new_folder`, for a folder that may exist: it stays until the block is done, and goes then.
+
+    mark   a file that a folder of this program holds
+
+    Raises:  InputError if something else is there.
+    """
+    if not path.exists():
+        with new_folder(path) as folder:
+            yield folder
+        return
+    if not (path / mark).is_file() or path.is_symlink():
+        raise InputError(f"{path}: is not replaced: it holds no {mark}; choose another --out")
+    old = path.with_name(f".old-{os.getpid()}-{path.name}")
+    fresh = path.with_name(f".fresh-{os.getpid()}-{path.name}")
+    with new_folder(fresh) as folder:
+        yield folder
+    os.rename(path, old)
+    os.rename(fresh, path)
+    shutil.rmtree(old, ignore_errors=True)
+
+
 def refuse_existing(path: Path) -> None:
     """Raises InputError if something is there, unless it is an empty folder."""
     if path.is_dir() and not any(path.iterdir()):

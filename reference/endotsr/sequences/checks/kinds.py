@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 Level = Literal["refusal", "warning", "note"]
 
 REFUSED = "a training refuses it"
-LEAVE_OUT = "leave the frame out (prepare --frames, or delete it)"
+LEAVE_OUT = "leave the frame out: endotsr prepare CLIP --out CLIP --replace --drop FRAME"
 ONE_CAMERA = (
     "one camera: endotsr depth --given FILES --kind relative (inverse depth of a network, not metric), a COLMAP model,"
     " or endotsr depth --flat"
@@ -37,7 +37,7 @@ KINDS: dict[str, Kind] = {
                        "supply the missing frames, or cut the clip there"),
     "uneven-times": Kind("note", "the times of the training are those of sequence.toml", "none needed"),
     # pictures
-    "picture": Kind("refusal", REFUSED, "copy or export the file again"),
+    "picture": Kind("refusal", REFUSED, f"copy or export the file again, or {LEAVE_OUT}"),
     "no-picture": Kind("refusal", "there is nothing to reconstruct",
                        "look at the pictures, and decode or export them again"),
     "constant-clip": Kind("refusal", "nothing moves, and every held-out frame is a copy of a training frame",
@@ -57,7 +57,7 @@ KINDS: dict[str, Kind] = {
                      "supply masks (endotsr prepare --masks), or let them be proposed (endotsr masks)"),
     "proposed-masks": Kind("note", "what the program missed becomes tissue, and nobody has looked at it",
                            "look at proposed_masks.png"),
-    "mask": Kind("refusal", REFUSED, "export the mask again"),
+    "mask": Kind("refusal", REFUSED, f"export the mask again, or {LEAVE_OUT}"),
     "mask-values": Kind("refusal", REFUSED, "store two values"),
     "tissue-fraction": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
     "polarity": Kind("refusal", REFUSED, "set the excluded value as said, or mend the masks"),
@@ -69,7 +69,7 @@ KINDS: dict[str, Kind] = {
                      f"a stereo pair: endotsr depth; {ONE_CAMERA}; empty files: check their scale"),
     "assumed-depth": Kind("warning", "lengths and other viewpoints are no measurements",
                           "take scale and shift from points of a reconstruction, or from a stereo pair"),
-    "depth-file": Kind("refusal", REFUSED, "export the depth again"),
+    "depth-file": Kind("refusal", REFUSED, f"export the depth again, or {LEAVE_OUT}"),
     "depth-values": Kind("refusal", REFUSED, "store lengths"),
     "frame-without-depth": Kind("note", "it takes no part in the initialisation", "none needed if these are few"),
     "little-depth": Kind("warning", "the scene is initialised there only", "another stereo method, or wider ranges"),
@@ -90,14 +90,14 @@ KINDS: dict[str, Kind] = {
                                 " hold disparity or an inverse depth",
                                 "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
     # cameras
-    "cameras": Kind("refusal", REFUSED, "mend the poses"),
+    "cameras": Kind("refusal", REFUSED, f"mend the poses; of one frame: {LEAVE_OUT}"),
     "distortion": Kind("refusal", "the model is a pinhole camera", "straighten them with endotsr prepare"),
     "field-of-view": Kind("warning", "the focal length may belong to another picture size or be in millimetres",
                           "state the focal length in pixels of these pictures"),
     "principal-point": Kind("warning", "the calibration may belong to another picture size", "check width and height"),
     "pixel-shape": Kind("warning", "pixels are rarely that oblong; pictures may have been stretched",
                         "check the calibration against the picture size"),
-    "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", "check this pose, or leave the frame out"),
+    "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", f"check this pose, or {LEAVE_OUT}"),
     "pose-turn": Kind("warning", "between neighbouring frames this is most likely a wrong pose",
                       "check axes and direction of the trajectory"),
     "pose-unit": Kind("warning", "the poses may be in metres beside a depth in millimetres",

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
+from endotsr.sequences.calibrations.stored import HALF_A_PIXEL
 from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Recording, StatedDepth
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions
@@ -72,6 +73,9 @@ def open_recording(path: Path, options: SourceOptions) -> Recording:
         raise InputError(f"{path}: not found")
     refuse_unused(layout, Path(path), options)
     recording = layout.open(Path(path), options)
+    if options.calibration is not None:
+        said = f"{options.calibration.name}: {HALF_A_PIXEL}"
+        recording = replace(recording, notes=[*recording.notes, said])
     if options.depth is not None:
         factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
         stated = StatedDepth(options.depth, options.depth_scale * factor, options.trust_depth)

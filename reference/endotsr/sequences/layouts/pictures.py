@@ -1,14 +1,16 @@
 """A plain folder of pictures, or one picture: png or jpg, one a frame, alone or as stereo pairs.
 
-A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`) is a stereo recording.
+A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
+or with `000_left.png` beside `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording.
 Everything else about it is stated on the command line.
 """
 
+import re
 from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.files import check_pairing
+from endotsr.sequences.files import check_pairing, frame_numbers
 from endotsr.sequences.layouts import STATEMENTS, Layout
 from endotsr.sequences.recording import CameraPose, Recording, colour_picture
 from endotsr.sequences.source_options import SourceOptions
@@ -23,7 +25,9 @@ from endotsr.sequences.sources import (
 )
 from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
 
-PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"))
+PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
+         ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
+SIDE = re.compile(r"(?:^|[-_. ])(left|right|l|r)(?:[-_. ]|$)|(?<=\d)(l|r)$", re.IGNORECASE)  # in the stem of a name
 
 
 def recognises(path: Path) -> bool:
@@ -46,7 +50,26 @@ def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
                 both = both[0], files_of(path / right, PICTURE_ENDINGS)
                 check_pairing(*both)
             return both
-    return files_of(path, PICTURE_ENDINGS), []
+    sides = _sides(path) if path.is_dir() else None
+    return sides if sides else (files_of(path, PICTURE_ENDINGS), [])
+
+
+def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
+    """The left and the right files of one folder by their names; None unless every name says its side."""
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURE_ENDINGS)
+    found: dict[str, list[Path]] = {"l": [], "r": []}
+    for file in files:
+        side = SIDE.search(file.stem)
+        if side is None:
+            return None
+        found[(side[1] or side[2])[0].lower()].append(file)
+    if not (found["l"] and found["r"]):
+        return None
+    for one in found.values():
+        order = dict(zip(one, frame_numbers(one) or []))
+        one.sort(key=lambda file, order=order: order.get(file, ()))
+    check_pairing(found["l"], found["r"])
+    return found["l"], found["r"]
 
 
 def open_pictures(path: Path, options: SourceOptions) -> Recording:

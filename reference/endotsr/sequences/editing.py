@@ -1,0 +1,139 @@
+"""Editing a recording before it is written: frames by number or by second, a crop, and masks united.
+
+Comes in: a `Recording` and the words of a user; goes out: frame numbers, or a `Recording` that hands out less.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.recording import Lens, Picture, PicturePair, Recording
+from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.sources import masks_are_proposed, stated_masks
+
+ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
+
+
+def chosen_frames(text: str, recording: Recording) -> list[int]:
+    """The frames of a list such as `0:10,12,2.5s:8s`, ascending and each once; "" selects all.
+
+    Frames count as in Python's slices, and negative numbers from the end. Seconds count from the first frame; the end
+    is left out as that of a slice is.
+
+    Raises:  InputError for a part that is neither, selects nothing, or lies outside of the recording.
+    """
+    if not text.strip():
+        return list(range(recording.count))
+    found: set[int] = set()
+    for part in text.split(","):
+        frames = _seconds(part.strip(), recording) if "s" in part else _numbers(part.strip(), recording.count)
+        if not frames:
+            raise InputError(f"--frames {part.strip()!r}: selects nothing of {recording.count} frames; {ALLOWED}")
+        found.update(frames)
+    return sorted(found)
+
+
+def without(frames: list[int], text: str, recording: Recording) -> list[int]:
+    """The frames that are not among those of a list. Raises InputError."""
+    dropped = set(chosen_frames(text, recording)) if text.strip() else set()
+    return [i for i in frames if i not in dropped]
+
+
+def _numbers(part: str, count: int) -> list[int]:
+    words = part.split(":")
+    try:
+        numbers = [int(word) if word.strip() else None for word in words]
+    except ValueError:
+        numbers = []
+    if not 1 <= len(numbers) <= 3 or (len(numbers) == 3 and numbers[2] is not None and numbers[2] < 1):
+        raise InputError(f"--frames {part!r}: no frames; {ALLOWED}")
+    for bound in numbers[:2]:
+        if bound is not None and not -count <= bound <= count - (len(numbers) == 1):
+            raise InputError(f"--frames {part!r}: {bound} lies outside the {count} frames of the source")
+    if len(numbers) == 1:
+        return [] if numbers[0] is None else [numbers[0] % count]
+    return list(range(count)[slice(*numbers)])
+
+
+def _seconds(part: str, recording: Recording) -> list[int]:
+    """The frames from one second up to another."""
+    if recording.times is None and not recording.rate:
+        raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ beside seconds")
+    words = part.split(":")
+    try:
+        bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]
+    except ValueError:
+        bounds = []
+    if len(bounds) != 2 or any(word.strip() and not word.strip().endswith("s") for word in words):
+        raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
+    first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
+    times = recording.times if recording.times is not None else np.arange(recording.count) / (recording.rate or 1.0)
+    moments: FloatArray = times - times[0]
+    if np.isfinite(last) and last > moments[-1] + 1.5 / (recording.rate or 1.0):
+        raise InputError(f"--frames {part!r}: the source ends after {moments[-1]:.3f} seconds")
+    return np.flatnonzero((moments >= first - 1e-9) & (moments < last - 1e-9)).tolist()
+
+
+def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:
+    """The recording seen through a window x, y, width, height of its pictures; the principal point moves with it.
+
+    Raises:  InputError for a window that is empty; one that leaves the pictures is refused when a picture is read.
+    """
+    if len(window) != 4 or min(window[:2]) < 0 or min(window[2:]) < 1:
+        raise InputError(f"--crop {' '.join(map(str, window))}: allowed: X Y WIDTH HEIGHT in pixels, inside a picture")
+    x, y, width, height = window
+
+    def cut(plane: NDArray, what: str) -> NDArray:
+        if x + width > plane.shape[1] or y + height > plane.shape[0]:
+            raise InputError(
+                f"{recording.where}: --crop {x} {y} {width} {height} leaves the {what} of"
+                f" {plane.shape[1]}x{plane.shape[0]} pixels"
+            )
+        return np.ascontiguousarray(plane[y : y + height, x : x + width])
+
+    def picture(found: Picture) -> Picture:
+        return cut(found, "pictures")
+
+    def lens(old: Lens) -> Lens:
+        return old._replace(cx=old.cx - x, cy=old.cy - y, width=width, height=height)
+
+    masks, depth, rig = recording.masks, recording.depth, recording.rig
+    return replace(
+        recording,
+        pictures=lambda wanted: (
+            PicturePair(picture(pair.left), None if pair.right is None else picture(pair.right))
+            for pair in recording.pictures(wanted)
+        ),
+        masks=None if masks is None else lambda i: None if (plane := masks(i)) is None else cut(plane, "masks"),
+        depth=None if depth is None else lambda i: None if (plane := depth(i)) is None else cut(plane, "depth"),
+        lens=None if recording.lens is None else lens(recording.lens),
+        rig=None if rig is None else rig._replace(left=lens(rig.left), right=lens(rig.right)),
+        notes=[*recording.notes, f"cropped to {width}x{height} pixels from ({x}, {y}); the intrinsics follow"],
+    )
+
+
+def united(recording: Recording, folders: tuple[Path, ...], options: SourceOptions) -> Recording:
+    """The recording whose masks exclude what its own or any of these folders exclude. Raises InputError."""
+    lens = recording.lens or (recording.rig.left if recording.rig else None)
+    if lens is None:
+        raise InputError(f"{recording.where}: the intrinsics are unknown; allowed: --camera or --calibration")
+    frames = [recording.where / f"{name}.png" for name in recording.names]
+    more = [stated_masks(replace(options, masks=folder), frames, lens.width, lens.height) for folder in folders]
+    every = [mask for mask in (recording.masks, *more) if mask is not None]
+
+    def mask(i: int) -> NDArray[np.bool_] | None:
+        planes = [plane for plane in (one(i) for one in every) if plane is not None]
+        return np.logical_and.reduce(planes) if len(planes) == len(every) else None
+
+    names = ", ".join(folder.name for folder in folders)
+    proposed = any(masks_are_proposed(replace(options, masks=folder)) for folder in folders)
+    return replace(
+        recording,
+        masks=mask,
+        proposed=recording.proposed or proposed,
+        notes=[*recording.notes, f"masks: also excluded is what {names} exclude"],
+    )

@@ -1,0 +1,58 @@
+"""YAML from a file: plain values, and the matrices that OpenCV writes."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import read_text
+
+LARGEST_FILE = 1 << 20  # bytes
+DIRECTIVE = "%YAML"  # of OpenCV, with a colon that YAML does not know
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping of a file; a matrix of OpenCV is a mapping with rows, cols and data.
+
+    Raises:  InputError if the file cannot be read, or holds no mapping. No object is made from a tag.
+    """
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Plain values alone."""
+
+    Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _matrix)
+    text = read_text(path, LARGEST_FILE)
+    if text.startswith(DIRECTIVE):
+        text = text.partition("\n")[2]
+    try:
+        found = yaml.load(text, Loader)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise InputError(f"{path}: not YAML: {str(error).splitlines()[0] if str(error) else 'too deep'}") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: holds no keys; allowed: YAML of the form `key: value`")
+    return found
+
+
+def _matrix(loader: Any, node: Any) -> dict[Any, Any]:
+    return loader.construct_mapping(node, True)
+
+
+def matrix(value: Any, where: str, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
+    """Finite numbers: a list, a list of rows, or a mapping with `data`; of one of these shapes (-1: any length).
+
+    Raises:  InputError naming the place and the shapes.
+    """
+    stored = value.get("data") if isinstance(value, dict) else value
+    try:
+        numbers = np.array(stored, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.full(1, np.nan)
+    for shape in shapes:
+        if numbers.size == np.prod(shape) or (-1 in shape and numbers.size):
+            if np.isfinite(numbers).all():
+                return numbers.reshape(shape)
+    allowed = " or ".join("x".join(str(n) if n > 0 else "n" for n in shape) for shape in shapes)
+    raise InputError(f"{where}: allowed: {allowed} finite numbers")
