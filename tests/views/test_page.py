@@ -186,8 +186,41 @@ def keys_pressed(file, *keys):
 def test_keys_play_turn_and_change_the_frame(opened):
     times = opened[0].record["times"]
     said = keys_pressed(opened[1], ".", ",", ",", "ArrowLeft", "0", "+", "x", " ", " ")
-    assert [time for time, _, _ in said[:3]] == [f"t = {t:.3f}" for t in (times[1], times[0], times[-1])]
+    assert [time for time, _, _ in said[:3]] == [f"frame {i} of 64, t = {times[i - 1]:.3f}" for i in (2, 1, 64)]
     assert [view.split(",")[0] for _, view, _ in said[2:7]] == [
         "View of the camera", "Turned view", "View of the camera", "Turned view", "Turned view"
     ]  # fmt: skip
     assert [label for _, _, label in said[6:]] == ["Play", "Stop", "Play"]
+
+
+def test_the_view_that_is_asked_for_is_drawn_and_a_distance_is_that_of_the_rendered_surface(opened):
+    """The page is opened at a shifted view; two pixels give the distance of the points that the reference renders."""
+    scene, file = opened
+    still, shifted = drawn(file, "t=0.5"), drawn(file, "t=0.5&right=6&down=-3")
+    assert psnr(still[8:-8, 8:-16], shifted[5:-11, 14:-10]) > psnr(still[8:-8, 8:-16], shifted[8:-8, 8:-16])
+    out = scene.render(0.5, CAMERA)
+    depth = normalised_depth(out)
+    solid = np.argwhere(out.opacity > 0.9)
+    (row, column), (other, across) = solid[len(solid) // 4], solid[3 * len(solid) // 4]
+    points = [
+        np.array([(u + 0.5 - CAMERA.cx) / CAMERA.fx, (v + 0.5 - CAMERA.cy) / CAMERA.fy, 1.0]) * depth[v, u]
+        for v, u in ((row, column), (other, across))
+    ]
+    content = dom(file, f"t=0.5&measure={column},{row},{across},{other}")
+    said = re.search(r'id="length"[^>]*>Distance ([\d.]+) mm on the rendered surface', content)
+    assert said, re.search(r'id="length"[^>]*>[^<]*', content)
+    assert float(said[1]) == pytest.approx(np.linalg.norm(points[0] - points[1]), rel=0.02)
+    assert "no measurement" in content
+
+
+def test_the_page_names_the_frame(opened):
+    content = dom(opened[1], "t=0.5")
+    assert re.search(r'id="time">frame \d+ of 64, t = 0.500<', content)
+
+
+def test_the_error_layer_stays_when_time_moves(tmp_path):
+    sequence = simulate(SimulatorSettings(width=64, height=48, frames=20)).sequence
+    write_page(tmp_path / "a.html", moving_scene(), "a", 8, sequence)
+    held = sequence.times[sequence.test_index]
+    content = dom(tmp_path / "a.html", f"layer=error&t={held[1] + 0.01}")
+    assert f"Held-out frame {sequence.names[sequence.test_index[1]]}" in content

@@ -41,6 +41,7 @@ const canvas = element("scene");
 canvas.width = about.width;
 canvas.height = about.height;
 element("stage").style.setProperty("--widest", `calc(72vh * ${about.width / about.height})`);  // no scrolling
+element("stage").style.setProperty("--whole", `calc(94vh * ${about.width / about.height})`);  // of a full screen
 const gl = canvas.getContext("webgl2", {antialias: false, preserveDrawingBuffer: true});
 if (!gl) return fail("This page needs WebGL 2, which this browser does not offer.");
 const precise = gl.getExtension("EXT_color_buffer_float") !== null;
@@ -216,7 +217,8 @@ gl.vertexAttribDivisor(item, 1);
 const nothing = gl.createVertexArray();
 
 // ---------------------------------------------------------------- time, camera, order
-const state = {time: 0, yaw: 0, pitch: 0, closer: 1, layer: 0, playing: false, orbiting: false, phase: 0};
+const state = {time: 0, yaw: 0, pitch: 0, closer: 1, right: 0, down: 0, layer: 0, playing: false, orbiting: false,
+  phase: 0, speed: 1, clock: 0};  // right, down: shift of the picture, pixels; clock: time while the error layer waits
 
 function keysAt(time) {
   const times = about.times;
@@ -251,6 +253,8 @@ function cameraNow() {  // the observed camera, turned about the pivot on its ax
   const pivot = [0, 0, about.pivot_depth], t = numbers.slice(9, 12);
   const moved = apply(turn, [t[0], t[1], t[2] - pivot[2]]);
   moved[2] += pivot[2] * state.closer;
+  moved[0] += state.right * pivot[2] * state.closer / numbers[12];  // pixels at the pivot
+  moved[1] += state.down * pivot[2] * state.closer / numbers[13];
   return {rotation: multiply(turn, numbers.slice(0, 9)), translation: moved, lens: numbers.slice(12, 16)};
 }
 
@@ -277,7 +281,7 @@ function sortByDepth(camera, [k0, k1, f]) {  // from far to near: two passes of 
 }
 
 // ---------------------------------------------------------------- a picture
-function draw() {
+function draw(layer = state.layer) {
   const camera = cameraNow(), keys = keysAt(state.time), {made, at} = splat, raster = about.raster;
   const size = [about.width, about.height];
   gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
@@ -306,7 +310,7 @@ function draw() {
   gl.uniform1f(at.low_pass, raster.low_pass);
   gl.uniform1f(at.cutoff, raster.alpha_cutoff);
   gl.uniform1f(at.alpha_max, raster.alpha_max);
-  gl.uniform1i(at.layer, state.layer);
+  gl.uniform1i(at.layer, layer);
   gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, N);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   gl.disable(gl.BLEND);
@@ -322,20 +326,35 @@ function draw() {
 }
 
 // ---------------------------------------------------------------- the page
+const LAYERS = ["colour", "depth", "opacity", "error"];
 let held = null;  // the held-out frame that is shown beside the scene
-const moved = () => state.yaw !== 0 || state.pitch !== 0 || state.closer !== 1;
+const moved = () => state.yaw !== 0 || state.pitch !== 0 || state.closer !== 1 || state.right !== 0 || state.down !== 0;
 const short = (number) => Number(number.toPrecision(4)).toString();
 
 function describe() {
   element("slider").value = state.time;
-  const frame = about.frames.names[nearestFrame(state.time)];
-  element("time").textContent = "t = " + state.time.toFixed(3);
+  const i = nearestFrame(state.time), frame = about.frames.names[i];
+  element("time").textContent = "frame " + (i + 1) + " of " + about.frames.names.length + ", t = " + state.time.toFixed(3);
   element("shown").textContent = (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame;
+  clearTimeout(addressed);
+  addressed = setTimeout(address, 200);
 }
+
+let addressed = 0;
+function address() {  // the address opens the page at this view
+  const view = new URLSearchParams({t: state.time.toFixed(4)});
+  if (state.layer) view.set("layer", LAYERS[state.layer]);
+  for (const [name, rest] of [["yaw", 0], ["pitch", 0], ["closer", 1], ["right", 0], ["down", 0]])
+    if (state[name] !== rest) view.set(name, short(state[name]));
+  if (held) view.set("held_out", about.held_out.indexOf(held));
+  try { history.replaceState(null, "", "#" + view); } catch (refused) { /* the page works without */ }
+}
+
+const nearestHeld = (time) => about.held_out.reduce((a, b) => Math.abs(b.time - time) < Math.abs(a.time - time) ? b : a);
 
 function choose(layer) {
   state.layer = layer;
-  element("layer").value = ["colour", "depth", "opacity", "error"][layer];
+  element("layer").value = LAYERS[layer];
   element("legend").hidden = !(layer in MAPS);
   if (layer in MAPS) {
     useMap(MAPS[layer]);
@@ -352,41 +371,51 @@ function leave() {  // no frame has this time and camera
   held = null;
   element("beside").hidden = true;
   element("stage").classList.remove("two");
-  element("layer").options[3].disabled = true;
   if (state.layer === 3) choose(0);
   for (const chip of element("chips").querySelectorAll("button")) chip.classList.remove("on");
 }
 
-function go(time) {
+function go(time) {  // in the error layer: to the nearest held-out frame, which alone has an error
+  if (state.layer === 3) {
+    const frame = nearestHeld(time);
+    if (frame !== held) visit(frame, true);
+    return;
+  }
+  unmark();
   state.time = time;
   if (held && held.time !== time) leave();
 }
 
-async function visit(frame, chip) {
-  stop();
-  look(0, 0, 1);
+async function visit(frame, error = false) {
+  if (!error) stop();
+  look(0, 0, 1, 0, 0);
   leave();
+  unmark();
   state.time = frame.time;
   held = frame;
-  chip.classList.add("on");
+  element("chips").querySelectorAll("button")[about.held_out.indexOf(frame)].classList.add("on");
   element("truth").src = frame.picture;
   element("truth_name").textContent = "Held-out frame " + frame.name + "; grey is excluded";
   element("beside").hidden = false;
   element("stage").classList.add("two");
   const bytes = await (await fetch(frame.picture)).blob();
   const picture = await createImageBitmap(bytes, {premultiplyAlpha: "none", colorSpaceConversion: "none"});
+  if (held !== frame) return;  // another one was chosen meanwhile
   gl.activeTexture(gl.TEXTURE5);
   gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-  element("layer").options[3].disabled = false;
+  if (error) choose(3);
   draw();
 }
 
-function look(yaw, pitch, closer) {
+function look(yaw, pitch, closer, right = state.right, down = state.down) {
   const most = 1.2;
   state.yaw = Math.max(-most, Math.min(most, yaw));
   state.pitch = Math.max(-most, Math.min(most, pitch));
   state.closer = Math.max(0.2, Math.min(4, closer));
+  state.right = Math.max(-about.width, Math.min(about.width, right));
+  state.down = Math.max(-about.height, Math.min(about.height, down));
+  unmark();
   if (moved() && held) leave();
 }
 
@@ -400,7 +429,10 @@ let before = 0;
 function tick(now) {
   const seconds = Math.min((now - before) / 1000, 0.1);
   before = now;
-  if (state.playing) go((state.time + seconds / 4) % 1);
+  if (state.playing) {
+    state.clock = ((state.layer === 3 ? state.clock : state.time) + state.speed * seconds / 4) % 1;
+    go(state.clock);
+  }
   if (state.orbiting) {
     state.phase += seconds * 0.8;
     look(0.2 * Math.sin(state.phase), 0.12 * Math.cos(state.phase), state.closer);
@@ -412,6 +444,7 @@ function tick(now) {
 function toggle(name, button) {
   const running = state.playing || state.orbiting;
   state[name] = !state[name];
+  state.clock = state.time;
   element("play").textContent = state.playing ? "Stop" : "Play";
   element("orbit").classList.toggle("on", state.orbiting);
   if (!running) requestAnimationFrame((now) => { before = now; tick(now); });
@@ -419,9 +452,75 @@ function toggle(name, button) {
 
 element("play").onclick = () => toggle("playing");
 element("orbit").onclick = () => toggle("orbiting");
-element("reset").onclick = () => { state.orbiting = false; element("orbit").classList.remove("on"); look(0, 0, 1); draw(); };
+element("reset").onclick = () => { state.orbiting = false; element("orbit").classList.remove("on"); look(0, 0, 1, 0, 0); draw(); };
 element("slider").oninput = (event) => { go(Number(event.target.value)); draw(); };
-element("layer").onchange = (event) => { choose(event.target.selectedIndex); draw(); };
+element("layer").onchange = (event) => {
+  const layer = event.target.selectedIndex;
+  if (layer === 3 && !held) return visit(nearestHeld(state.time), true);
+  choose(layer);
+  draw();
+};
+element("speed").onchange = (event) => { state.speed = Number(event.target.value); };
+element("full").onclick = () => document.fullscreenElement ? document.exitFullscreen() : element("stage").requestFullscreen();
+element("picture").onclick = () => {
+  draw();
+  const link = document.createElement("a");
+  link.href = canvas.toDataURL("image/png");
+  link.download = document.title + " t=" + state.time.toFixed(3) + " " + LAYERS[state.layer] + ".png";
+  link.click();
+};
+
+// ---------------------------------------------------------------- a distance
+let marks = null;  // points of a measurement in the world of the scene, or null
+function unmark() {
+  if (!marks) return;
+  marks = [];
+  element("length").textContent = "Measure: click two points of the surface.";
+}
+
+function surface(x, y) {  // the point of the rendered surface at a pixel of the picture, or null
+  draw(1);
+  const sum = new Float32Array(4), bytes = new Uint8Array(4);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+  if (precise) gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.FLOAT, sum);
+  else {
+    gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    sum.set([...bytes].map((v) => v / 255));
+  }
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  draw();
+  if (sum[3] < 0.5) return null;
+  const [low, high] = about.depth_range, z = low + sum[0] / sum[3] * (high - low);
+  const {rotation: r, translation: t, lens} = cameraNow();
+  const p = [(x + 0.5 - lens[2]) * z / lens[0] - t[0], (y + 0.5 - lens[3]) * z / lens[1] - t[1], z - t[2]];
+  return [0, 1, 2].map((k) => r[k] * p[0] + r[3 + k] * p[1] + r[6 + k] * p[2]);
+}
+
+function mark(x, y) {
+  const point = surface(x, y);
+  if (marks.length === 2) marks = [];
+  if (point) marks.push(point);
+  element("length").textContent = !point ? "No surface there: click a point of the tissue."
+    : marks.length < 2 ? "First point set: click the second one."
+    : "Distance " + short(Math.hypot(...marks[0].map((v, k) => v - marks[1][k]))) + " " + about.unit +
+      " on the rendered surface at this time. It is as accurate as the depth that the scene was trained with, and no measurement.";
+}
+
+element("measure").onclick = () => {
+  marks = marks ? null : [];
+  element("measure").classList.toggle("on", marks !== null);
+  canvas.classList.toggle("aim", marks !== null);
+  element("length").hidden = !marks;
+  if (marks) { stop(); unmark(); }
+};
+canvas.onclick = (event) => {
+  if (!marks) return;
+  const box = canvas.getBoundingClientRect();
+  mark(Math.min(about.width - 1, Math.floor((event.clientX - box.left) * about.width / box.width)),
+    Math.min(about.height - 1, Math.floor((event.clientY - box.top) * about.height / box.height)));
+};
+canvas.oncontextmenu = (event) => event.preventDefault();
+
 const fingers = new Map();  // pointers that are down: one turns the scene, two bring it closer
 const apart = () => { const [a, b] = [...fingers.values()]; return Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1])); };
 canvas.onpointerdown = (event) => {
@@ -435,7 +534,11 @@ canvas.onpointermove = (event) => {
   const before = fingers.size === 2 ? apart() : 1;
   fingers.set(event.pointerId, now);
   if (fingers.size === 2) look(state.yaw, state.pitch, state.closer * before / apart());
-  if (fingers.size === 1)
+  const pixels = about.width / canvas.getBoundingClientRect().width;
+  if (marks) return;
+  if (fingers.size === 1 && (event.shiftKey || event.buttons === 2)) look(state.yaw, state.pitch, state.closer,
+    state.right + (now[0] - last[0]) * pixels, state.down + (now[1] - last[1]) * pixels);
+  else if (fingers.size === 1)
     look(state.yaw - (now[0] - last[0]) * 0.004, state.pitch - (now[1] - last[1]) * 0.004, state.closer);
   draw();
 };
@@ -460,7 +563,9 @@ document.onkeydown = (event) => {  // buttons, slider and list keep their own ke
   const turn = TURNS[event.key];
   if (!turn && !KEYS[event.key]) return;
   event.preventDefault();
-  if (turn) look(state.yaw + turn[0], state.pitch + turn[1], state.closer * turn[2]);
+  if (turn && event.shiftKey && event.key.startsWith("Arrow")) look(state.yaw, state.pitch, state.closer,
+    state.right + 200 * turn[0], state.down + 200 * turn[1]);
+  else if (turn) look(state.yaw + turn[0], state.pitch + turn[1], state.closer * turn[2]);
   else KEYS[event.key]();
   draw();
 };
@@ -468,26 +573,33 @@ for (const frame of about.held_out) {
   const chip = document.createElement("button");
   chip.textContent = frame.time.toFixed(3);
   chip.title = frame.name;
-  chip.onclick = () => visit(frame, chip);
+  chip.onclick = () => visit(frame, state.layer === 3);
   element("chips").append(chip);
   element("chips").hidden = false;
+  element("layer").options[3].disabled = false;
 }
 element("note").textContent = N.toLocaleString("en") + " Gaussians, " + K + " key times, lengths in " + about.unit +
   ". Between key times the page interpolates. Drag to turn the scene; the wheel or two fingers bring it closer. " +
-  "Keys: space plays, arrows turn, + and - bring it closer, comma and full stop change the frame, o orbits, 0 resets.";
+  "Shift or the right button moves it. Keys: space plays, arrows turn, with shift they move, + and - bring it closer, comma and full stop change the frame, o orbits, 0 resets.";
 if (K < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
 
 // `#t=0.4&layer=depth&yaw=0.2` opens the page at a moment; `probe` adds the drawn picture and its time as text.
 const asked = new URLSearchParams(location.hash.slice(1));
 state.time = Math.max(0, Math.min(1, Number(asked.get("t")) || 0));
-look(Number(asked.get("yaw")) || 0, Number(asked.get("pitch")) || 0, 1);
-const layer = ["colour", "depth", "opacity"].indexOf(asked.get("layer"));
-choose(layer > 0 ? layer : 0);
+const wish = (name, rest = 0) => Number(asked.get(name)) || rest;
+look(wish("yaw"), wish("pitch"), wish("closer", 1), wish("right"), wish("down"));
+const layer = LAYERS.indexOf(asked.get("layer"));
+choose(layer > 0 && layer < 3 ? layer : 0);
 draw();
 if (asked.has("held_out")) {
-  const k = Number(asked.get("held_out")), chips = element("chips").querySelectorAll("button");
-  if (chips[k]) await visit(about.held_out[k], chips[k]);
-  if (asked.get("layer") === "error") { choose(3); draw(); }
+  const frame = about.held_out[Number(asked.get("held_out"))];
+  if (frame) await visit(frame, asked.get("layer") === "error");
+} else if (asked.get("layer") === "error" && about.held_out.length) await visit(nearestHeld(state.time), true);
+if (asked.has("measure")) {  // two pixels, `measure=10,20,30,40`
+  const [a, b, c, d] = asked.get("measure").split(",").map(Number);
+  element("measure").onclick();
+  mark(a, b);
+  mark(c, d);
 }
 if (asked.has("probe")) {
   const text = document.createElement("pre"), pixel = new Uint8Array(4), milliseconds = [];
