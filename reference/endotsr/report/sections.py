@@ -55,6 +55,12 @@ def _card(value: str, unit: str, label: str) -> str:
     return f'<div class="card"><b>{value}{suffix}</b><span>{parts.text(label)}</span></div>'
 
 
+BESIDE_BASELINES = (
+    "A baseline makes one picture from its neighbours. It gives no geometry, no other viewpoint, no depth and no tissue"
+    " behind the instrument, and for a single missing frame it can still predict the pixels better."
+)
+
+
 def _verdict(data: ReportData) -> str:
     """One sentence: the tissue PSNR of the model above or below the best baseline."""
     ours = _mean(data, "held_out").get("psnr_tissue")
@@ -68,7 +74,7 @@ def _verdict(data: ReportData) -> str:
     return (
         f'<p class="lead">On tissue the model is <b class="{kind}">{abs(ours - best):.2f} dB {word}</b> the strongest '
         f"baseline without a model ({parts.text(label[0].lower() + label[1:])}, {best:.2f} dB); "
-        f"it is above {beaten} of {len(rows)} baselines.</p>"
+        f"it is above {beaten} of {len(rows)} baselines. {BESIDE_BASELINES}</p>"
     )
 
 
