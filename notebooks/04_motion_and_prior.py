@@ -260,6 +260,14 @@ text = definition_of_prior.matern_penalty_reverse(0.7, (C, rho))
 np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rtol=1e-13)
 
 # %% [markdown]
+# ## Play: correlation length and penalty
+#
+# A trajectory is fitted to noisy frames by least squares with the penalty of {eq}`eq-4`. A small penalty fits the noise; a
+# large one removes the beat. A longer correlation length moves weight to the high frequencies.
+#
+# <div class="widget" data-widget="matern">The figure is live in the built book.</div>
+
+# %% [markdown]
 # ## The gradient check
 #
 # The weights span five decades, and the gradient is small by construction ($10^{-7}$ with 30 000 Gaussians). A check

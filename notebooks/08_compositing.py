@@ -371,6 +371,14 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
+# ## Play: three opacities
+#
+# Drag the orange handles. The grey box is the light that reaches a Gaussian, and the coloured part is the light that it
+# absorbs. The loss is half the squared distance to the target colour. Set one opacity to 1 and compare with (8.3).
+#
+# <div class="widget" data-widget="compositing">The figure is live in the built book.</div>
+
+# %% [markdown]
 # ## The gradient check
 #
 # A difference is taken only between two ends with the same discrete decisions (order, contributors, clamp).

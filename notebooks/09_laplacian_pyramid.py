@@ -302,6 +302,14 @@ for rule in ("co_sited", "half_pixel"):
     assert not np.any(found[:, ~mask])
 
 # %% [markdown]
+# ## Play: paint an instrument
+#
+# Paint excluded pixels in the first panel. The other panels show the values of each band that no excluded pixel enters.
+# One excluded pixel removes a neighbourhood of values, whose width in pixels about doubles from band to band.
+#
+# <div class="widget" data-widget="masks">The figure is live in the built book.</div>
+
+# %% [markdown]
 # ## The gradient check
 
 # %%

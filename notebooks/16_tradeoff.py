@@ -224,6 +224,14 @@ axis.set(
 plt.show()
 
 # %% [markdown]
+# ## Play: cutoff and stop
+#
+# 160 Gaussians are blended from front to back. Move the cutoff below 1e-5: the error vanishes while the visits grow. Move
+# the stop above 1e-2: the picture loses what lies behind.
+#
+# <div class="widget" data-widget="cutoff">The figure is live in the built book.</div>
+
+# %% [markdown]
 # ## Exercise
 #
 # The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you expect at $10^{-7}$, and why is this
