@@ -1,4 +1,4 @@
-"""One simulated scene through two layouts, one command a step, and the table of what the way costs.
+"""One simulated scene through two layouts, one command a step, and the table of the cost of each input route.
 
     python docs/pages/any_clip.py                measure, a few minutes on two cores
     python docs/pages/any_clip.py --ways stereo  measure one way again

@@ -168,6 +168,7 @@ def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
     """Every generated part of the page by name; a part without its measurement says so."""
     makers = {
+        "answer": (effects_parts.answer, "train"),
         "costs": (effects_parts.costs, "bench"),
         "detections": (effects_parts.detections, "detect"),
         "amplitudes": (effects_parts.amplitudes, "detect"),

@@ -3,6 +3,7 @@
 import math
 import re
 
+import effects_parts
 import effects_study
 import pytest
 from effects_parts import ANSWERED
@@ -103,3 +104,30 @@ def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
     text = effects.fragments({"detect": result})["detections"]
     first = effects_study.FIRST_SEED
     assert f"seeds {first} to {first}, which no threshold was set with" in text
+
+
+def test_five_of_five_has_a_lower_limit_of_55_percent():
+    detect = {
+        "clips": 5,
+        "frames": 40,
+        "first_seed": 200,
+        "seeds": 5,
+        "noise": 0.01,
+        "machine": {},
+        "date": "2026-01-01",
+    }
+    counts = {"detected": 5, "positives": 5, "false": 0, "negatives": 50}
+    detect["machine"] = {"processor": "none", "cores": 1}
+    assert "| smoke | 5 of 5 | 55% | 0 of 50 | 5.8% |" in effects_parts.detections(
+        detect | {"effects": {"smoke": counts}}
+    )
+
+
+def test_the_answer_follows_the_results():
+    one = {"psnr": 30.0, "seconds": 10.0, "numbers": 11, "gaussians": 100}
+    half = one | {"psnr": 30.5, "seconds": 5.0}
+    pairs = lambda auto: [{"everything": one, "auto": auto}] * 3
+    same = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(one)}})
+    assert "saves 50% of the time" in same and "+0.50 dB" in same and "`clip`, there is nothing to save" in same
+    other = effects_parts.answer({"real": ["clip"], "scenes": {"still": pairs(half), "clip": pairs(half)}})
+    assert "nothing to save" not in other and "it saves 50% of the time (+0.50 dB)" in other

@@ -116,7 +116,7 @@ def under_the_mask(dtype):
     naive="`mean(x*x) - mean(x)**2`",
     bound=1000,
     why="In float32 the variance of a wall lit at 0.95 is a difference of numbers near 0.9. Its error is as large "
-    "as the variance itself, and the result is sometimes negative. The form with sum and difference of the "
+    "as the variance itself, and the result is sometimes negative. Using the sum and the difference of the "
     "images subtracts no moments.",
 )
 def similarity(dtype):
