@@ -101,4 +101,15 @@ WRONG_PORTS = [
         "adam",
         edit(SOURCE, "(np.sqrt(v) * root + epsilon)", "(np.sqrt(v) * root)"),
     ),
+    port(
+        "adam_epsilon_before_correction",
+        "Epsilon added before the bias correction",
+        "(sqrt(v) + eps) / sqrt(1 - beta2^k); right: eps added afterwards",
+        "adam",
+        edit(
+            SOURCE,
+            "rate, root, float(beta1), float(beta2), float(epsilon))",
+            "rate, root, float(beta1), float(beta2), float(epsilon) * root)",
+        ),
+    ),
 ]

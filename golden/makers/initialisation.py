@@ -17,7 +17,7 @@ OPERATIONS = ("initialisation",)
 LENS = {"fx": 7.0, "fy": 9.0, "cx": 2.75, "cy": 2.25, "width": 6, "height": 5}
 
 
-def _frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
+def frames(seeds: Seeds, count: int, train: list[int]) -> dict[str, Made]:
     """Each frame differs from a common depth map by a step of its own, clearly more or less than the threshold of 5."""
     height, width = int(LENS["height"]), int(LENS["width"])
     shape = (count, height, width)
@@ -52,20 +52,20 @@ def cases() -> list[Spec]:
         settings = {"camera": LENS, "initialisation": written_initialisation(drawn), "model": model}
         return Spec("initialisation", case, "initialisation", title, flags, settings, inputs)
 
-    one = _frames(Seeds("initialisation", "one_point"), 1, [0])
+    one = frames(Seeds("initialisation", "one_point"), 1, [0])
     alone = np.zeros(one["masks"].array.shape, bool)
     alone[0, 2, 3] = True
     one["masks"] = given(alone, "True at (2, 3) only")
     one["prior_depths"] = changed(one["prior_depths"], (0, 2, 3), 44.0, "(2, 3) is 44")
-    long = _frames(Seeds("initialisation", "long_clip"), 152, [*range(1, 8), 150, 151])
+    long = frames(Seeds("initialisation", "long_clip"), 152, [*range(1, 8), 150, 151])
     kept = long["masks"].array & (np.arange(30).reshape(5, 6) % 7 == 0)
     long["masks"] = given(kept, f"{long['masks'].recipe} and (6 y + x) % 7 = 0")
     flags = ("backprojected_at_corner", "initialised_from_test_frames", "moved_pixels_ignored", "holes_initialised",
              "points_left_in_camera", "mean_distance_for_scale", "neighbours_count_itself",
              "initial_colour_without_y00", "initial_opacity_as_logit")  # fmt: skip
-    frames = _frames(Seeds("initialisation", "frames"), 6, [2, 3, 5])
+    short = frames(Seeds("initialisation", "frames"), 6, [2, 3, 5])
     return [
-        spec("frames", "Depth maps of three training frames of six, lifted with their own cameras", flags, frames),
+        spec("frames", "Depth maps of three training frames of six, lifted with their own cameras", flags, short),
         spec("long_clip", "Of 152 frames every second one is visited", ("long_clip_every_frame",), long),
         spec("one_point", "A single point: the floor of the scale", ("single_point_without_floor",), one),
     ]  # fmt: skip

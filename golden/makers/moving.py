@@ -20,9 +20,11 @@ def model_settings(**changes: Any) -> dict[str, Any]:
     return msgspec.to_builtins(msgspec.structs.replace(model, **changes))
 
 
-def moving_inputs(seeds: Seeds, degree: int, static: bool, count: int = COUNT) -> dict[str, Made]:
+def moving_inputs(
+    seeds: Seeds, degree: int, static: bool, count: int = COUNT, frequencies: int = FREQUENCIES
+) -> dict[str, Made]:
     """Raw parameters of every component, off zero."""
-    shape, atoms = (10, BASES, count), 2 * FREQUENCIES
+    shape, atoms = (10, BASES, count), 2 * frequencies
     centre = seeds.uniform("fdm_centre", 0.1, 0.7, *shape)
     return scene_inputs(seeds, count, degree, pose(static)) | {
         "fdm_weight": seeds.uniform("fdm_weight", -0.08, 0.08, *shape, unit="raw parameter"),

@@ -24,7 +24,8 @@ WEIGHTS = {
 }  # fmt: skip
 
 
-def _image_inputs(seeds: Seeds) -> dict[str, Made]:
+def image_inputs(seeds: Seeds) -> dict[str, Made]:
+    """An observed frame with mask, prior depth and edges."""
     edges = np.zeros((HEIGHT, WIDTH), bool)
     edges[2 : HEIGHT - 2, 9] = True
     prior = seeds.uniform("prior_depth", 2.0, 7.0, HEIGHT, WIDTH, unit="scene unit")
@@ -50,7 +51,7 @@ def _spec(
     change: Callable[[dict[str, Made]], None] | None = None,
 ) -> Spec:
     seeds = Seeds(family, case)
-    inputs = moving_inputs(seeds, degree, static) | _image_inputs(seeds)
+    inputs = moving_inputs(seeds, degree, static) | image_inputs(seeds)
     if change:
         change(inputs)
     settings = {

@@ -5,7 +5,7 @@ no rotation, since its nine entries are independent. One case turns by more than
 angle at which the closed forms lose digits.
 """
 
-from makers.making import Seeds, Spec
+from makers.making import Made, Seeds, Spec
 from makers.wrong import edit, port
 
 OPERATIONS = ("pose",)
@@ -17,9 +17,10 @@ def cases() -> list[Spec]:
     return [_case(name, largest, title) for name, (largest, title) in angles.items()]
 
 
-def _case(name: str, largest: float, title: str) -> Spec:
+def pose_inputs(name: str, largest: float) -> dict[str, Made]:
+    """A pose, a rotation vector with entries up to `largest`, and gradients."""
     seeds = Seeds("pose", name)
-    inputs = {
+    return {
         "rotation": seeds.uniform("rotation", -1.0, 1.0, 3, 3),
         "translation": seeds.uniform("translation", -2.0, 2.0, 3, unit="scene"),
         "rotation_vector": seeds.uniform("rotation_vector", 0.5 * largest, largest, 3, unit="rad"),
@@ -27,8 +28,11 @@ def _case(name: str, largest: float, title: str) -> Spec:
         "d_corrected_rotation": seeds.uniform("d_corrected_rotation", -1.0, 1.0, 3, 3),
         "d_corrected_translation": seeds.uniform("d_corrected_translation", -1.0, 1.0, 3),
     }
+
+
+def _case(name: str, largest: float, title: str) -> Spec:
     shown = FLAGS if name == "wide" else FLAGS[:-1]  # the factors hardly change with a small angle
-    return Spec("pose", name, "pose", title, shown, {}, inputs)
+    return Spec("pose", name, "pose", title, shown, {}, pose_inputs(name, largest))
 
 
 # ---- mistakes ----

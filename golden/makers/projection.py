@@ -6,25 +6,12 @@ off axis on all sides, behind the camera and just inside the near plane; one cas
 
 import numpy as np
 
-from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.settings import PAPER
-from makers.making import Made, Seeds, Spec, given
-from makers.views import PRESETS, lens_settings, pose, seen_at, spread_points
+from makers.making import Seeds, Spec, given
+from makers.views import PRESETS, lens_settings, pose, seen_at, shape_inputs, spread_points
 from makers.wrong import edit, port, with_raster
 
 OPERATIONS = ("projection",)
-
-
-def _shape_inputs(seeds: Seeds, count: int) -> dict[str, Made]:
-    quaternion = seeds.uniform("quaternion", -1.0, 1.0, 4, count).array
-    rotation = covariance_forward(quaternion, np.zeros((3, count)))[0].rotation
-    return {
-        "rotation": given(rotation, f"R of uniform(-1, 1) quaternions, seed {seeds.seed('quaternion')}"),
-        "scale": seeds.uniform("scale", 0.2, 1.0, 3, count, unit="scene unit"),
-        "d_mean2d": seeds.uniform("d_mean2d", -1.0, 1.0, 2, count, unit="loss per px"),
-        "d_covariance2d": seeds.uniform("d_covariance2d", -1.0, 1.0, 3, count, unit="loss per px^2"),
-        "d_depth": seeds.uniform("d_depth", -1.0, 1.0, count, unit="loss per scene unit"),
-    }
 
 
 def _preset(name: str) -> Spec:
@@ -35,7 +22,7 @@ def _preset(name: str) -> Spec:
     points[1, :5] = z[:5] * [0.1, 0.1, 1.1, -1.1, 1.1]
     points[2, 5:8] = [-3.0, 0.1875, 0.21875]
     points[:2, 5:8] = 0.03125
-    inputs = _shape_inputs(seeds, 12) | {"position": seen_at(points, cast)} | cast
+    inputs = shape_inputs(seeds, 12) | {"position": seen_at(points, cast)} | cast
     flags = ("pixel_corner_mean", "low_pass_missing", "near_plane_zero", "pose_inverted", "shape_rotation_ignored",
              "shape_not_turned_by_camera", "jacobian_without_depth_column", "jacobian_gradient_dropped",
              *(("jacobian_clamp_missing",) if name != "exact" else ("jacobian_clamped",)),
@@ -47,7 +34,7 @@ def _preset(name: str) -> Spec:
 
 def _needle() -> Spec:
     seeds, cast = Seeds("projection", "needle"), pose()
-    inputs = _shape_inputs(seeds, 4) | {"position": seen_at(spread_points(seeds, 4), cast)} | cast
+    inputs = shape_inputs(seeds, 4) | {"position": seen_at(spread_points(seeds, 4), cast)} | cast
     inputs["scale"] = given(np.array([[20.0] * 4, [1e-3] * 4, [2e-3] * 4]), "20, 1e-3, 2e-3", "scene unit")
     return Spec("projection", "needle", "projection", "Needles: long axes of hundreds of pixels",
                 ("shape_rotation_ignored",), lens_settings(PAPER), inputs)  # fmt: skip

@@ -38,6 +38,8 @@ FAMILIES = (
     "scene",
     "objective",
     "training",
+    "other_settings",
+    "extremes",
 )
 
 

@@ -45,9 +45,9 @@ def _settings() -> Config:
     )  # fmt: skip
 
 
-def _first_gaussians(seeds: Seeds) -> dict[str, Made]:
+def _first_gaussians(seeds: Seeds, degree: int) -> dict[str, Made]:
     """One faint Gaussian, which is pruned, and five small ones, which are cloned."""
-    inputs = scene_inputs(seeds, COUNT, 2, pose(static=True))
+    inputs = scene_inputs(seeds, COUNT, degree, pose(static=True))
     for name in ("rotation_matrix", "translation"):
         del inputs[name]
     inputs["opacity_logit"] = changed(inputs["opacity_logit"], 3, -5.0, "[3] is -5: pruned")
@@ -61,7 +61,8 @@ def _first_gaussians(seeds: Seeds) -> dict[str, Made]:
     }
 
 
-def _clip(seeds: Seeds) -> dict[str, Made]:
+def clip(seeds: Seeds) -> dict[str, Made]:
+    """Frames with masks, depths, stamps and poses."""
     height, width = int(LENS["height"]), int(LENS["width"])
     grey = seeds.uniform("images", 0.0, 256.0, FRAMES, 3, height, width).array
     moved = np.stack([np.array([0.02 * k, -0.01 * k, 0.015625 * k]) for k in range(FRAMES)])
@@ -79,9 +80,10 @@ def _clip(seeds: Seeds) -> dict[str, Made]:
     }  # fmt: skip
 
 
-def _inputs(seeds: Seeds, iterations: int) -> dict[str, Made]:
+def trajectory_inputs(seeds: Seeds, iterations: int, degree: int = 2) -> dict[str, Made]:
+    """What a trajectory reads."""
     order = seeds.uniform("frame_order", 0.0, 10.0, iterations).array
-    return _first_gaussians(seeds) | _clip(seeds) | {
+    return _first_gaussians(seeds, degree) | clip(seeds) | {
         "frame_order": given(np.floor(order).astype(np.int64), f"floor of uniform(0.0, 10.0) seed "
                              f"{seeds.seed('frame_order')}; positions within train_index", "frame"),
         "split_noise": seeds.uniform("split_noise", -1.5, 1.5, 2, 3, 32),
@@ -94,7 +96,7 @@ def _out_of_view() -> Spec:
     Without residuals: where a Gaussian has no gradient but rounding, Adam moves a coefficient by a whole rate.
     """
     seeds, config = Seeds("training", "out_of_view"), _settings()
-    inputs = _inputs(seeds, SHORT)
+    inputs = trajectory_inputs(seeds, SHORT)
     k = np.arange(FRAMES)
     sideways = 4.0 * (k % 2) * (1 - 2 * (k // 2 % 2))
     recipe = "(4, 0, k / 64) for k % 4 = 1, (-4, 0, k / 64) for k % 4 = 3, else (0, 0, k / 64)"
@@ -119,7 +121,7 @@ def cases() -> list[Spec]:
              "laplacian_ramp_late", "residual_steps_from_start", "statistics_from_start", "moments_not_gathered",
              "frame_order_of_all_frames", "densified_before_the_step")  # fmt: skip
     title = "Calibration, then twenty iterations: densification at 6 and 12, residuals from 9 on, detail ramp, degree 2"
-    inputs = _inputs(Seeds("training", "twenty_iterations"), ITERATIONS)
+    inputs = trajectory_inputs(Seeds("training", "twenty_iterations"), ITERATIONS)
     return [Spec("training", "twenty_iterations", "training", title, flags, settings, inputs), _out_of_view()]
 
 

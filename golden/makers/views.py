@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
 from endotsr.stages.requests import raster_dict
 from makers.making import Made, Seeds, changed, given, permutation, single
@@ -35,6 +36,19 @@ def seen_at(points: np.ndarray, cast: dict[str, Made]) -> Made:
     return given(world, "W^T (p - d) of points p in camera axes, see *Recipes* in README.md", "scene unit")
 
 
+def shape_inputs(seeds: Seeds, count: int) -> dict[str, Made]:
+    """Rotations, semi-axes and gradients by what `projection` gives."""
+    quaternion = seeds.uniform("quaternion", -1.0, 1.0, 4, count).array
+    rotation = covariance_forward(quaternion, np.zeros((3, count)))[0].rotation
+    return {
+        "rotation": given(rotation, f"R of uniform(-1, 1) quaternions, seed {seeds.seed('quaternion')}"),
+        "scale": seeds.uniform("scale", 0.2, 1.0, 3, count, unit="scene unit"),
+        "d_mean2d": seeds.uniform("d_mean2d", -1.0, 1.0, 2, count, unit="loss per px"),
+        "d_covariance2d": seeds.uniform("d_covariance2d", -1.0, 1.0, 3, count, unit="loss per px^2"),
+        "d_depth": seeds.uniform("d_depth", -1.0, 1.0, count, unit="loss per scene unit"),
+    }
+
+
 def spread_points(seeds: Seeds, count: int, reach: float = 0.3) -> np.ndarray:
     """Camera-space points at well separated depths whose order is not the index order."""
     z = single(3.0 + 0.35 * permutation(seeds.seed("order"), count))
@@ -49,8 +63,9 @@ def lens_settings(raster: RasterSettings, **more: Any) -> dict[str, Any]:
 
 
 def preset_of(raster: RasterSettings) -> str:
-    """The name of a preset with these settings."""
-    return next(name for name, preset in PRESETS.items() if preset == raster)
+    """The name of the preset that these settings start from: the one that shares the most of them."""
+    same = {name: sum(a == b for a, b in zip(raster, preset, strict=True)) for name, preset in PRESETS.items()}
+    return max(same, key=lambda name: (PRESETS[name].support == raster.support, same[name]))
 
 
 def logit_of(opacity: list[float]) -> Made:

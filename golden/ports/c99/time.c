@@ -179,6 +179,8 @@ void matern(Request *request)
     *out_real(request, "penalty", 1) = (real)penalty;
 }
 
+#define SMALLEST_BASIS 0x1p-60
+
 void deformation(Request *request)
 {
     const real *weight = in_real(request, "fdm_weight"), *centre = in_real(request, "fdm_centre");
@@ -192,7 +194,9 @@ void deformation(Request *request)
     for (long at = 0; at < all; at++) {
         long channel = at / (bases * count) * count + at % count;
         real step = t - centre[at], square = width[at] * width[at] + floor_of_square, u = step * step / square;
-        real e = quartic ? exp(-u * u) : exp(-u / 2), up = weight[at] * e * d_offsets[channel] / square;
+        real e = quartic ? exp(-u * u) : exp(-u / 2);
+        e = e < (real)SMALLEST_BASIS ? 0 : e; /* exactly 0, in the value and in all gradients */
+        real up = weight[at] * e * d_offsets[channel] / square;
         offsets[channel] += weight[at] * e;
         d_weight[at] = e * d_offsets[channel];
         d_centre[at] = quartic ? 4 * up * u * step : up * step;

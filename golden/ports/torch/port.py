@@ -46,7 +46,8 @@ def matern(i, s):
 def deformation(i, s):
     square = i["fdm_width"] ** 2 + 1e-4
     u = (i["t"] - i["fdm_centre"]) ** 2 / square
-    basis = torch.exp(-(u**2)) if s["basis"] == "quartic" else torch.exp(-u / 2)
+    power = u**2 if s["basis"] == "quartic" else u / 2
+    basis = torch.where(power > 60 * math.log(2), torch.zeros_like(power), torch.exp(-power))
     return {"offsets": (i["fdm_weight"] * basis).sum(1)}
 
 

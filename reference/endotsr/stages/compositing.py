@@ -179,7 +179,7 @@ def _blocks_answer(settings: Settings) -> bool:
     return compositing_blocks.supports(raster_of(settings))
 
 
-DRAWN, REVERSED = "splatting_oracle.render", "splatting_oracle.composite_reverse"
+DRAWN, REVERSED = "render.render_forward", "compositing.composite_reverse"
 UNITS = dict(zip(IMAGES, ("display", "scene unit", "1")))
 RAW_UNITS = {
     "position": "scene unit",
@@ -206,7 +206,7 @@ STAGES = [
         },
         forward=_composite,
         asked={
-            **{name: Asked(1, unit, oracle="splatting_oracle.composite") for name, unit in UNITS.items()},
+            **{name: Asked(1, unit, oracle="compositing.composite_forward") for name, unit in UNITS.items()},
             "d_mean2d": Asked(2, "loss per px", "last", REVERSED),
             "d_covariance2d": Asked(2, "loss per px^2", "last", REVERSED),
             "d_opacity_logit": Asked(2, "loss", "last", REVERSED),

@@ -283,7 +283,8 @@ def _objective(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
     assert isinstance(loss.lambda_lap, float)
     config = Config(model=model_of(settings), loss=loss)
     frame = objective.Frame(inputs["observed"], inputs["mask"], inputs["prior_depth"], settings["t"], camera)
-    weights = objective.LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, loss.lambda_lap)
+    laplacian = loss.lambda_lap if config.model.laplacian else 0.0
+    weights = objective.LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, laplacian)
     exposed = (inputs["exposure_log_gain"], inputs["exposure_bias"]) if "exposure_bias" in inputs else None
     found = view.view_gradients(
         _gaussians(inputs), _spectral(inputs, settings), objective.frame_targets(frame, config), weights, config,
@@ -376,7 +377,8 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     raster: Any = raster_settings(config)
     gaussians = _gaussians(inputs)
     spectral = moving.spectral_from(config.model, sequence.times[sequence.train_index])
-    weight = train.calibrated_weight(gaussians, spectral, sequence, config, raster)
+    given = config.loss.lambda_lap
+    weight = train.calibrated_weight(gaussians, spectral, sequence, config, raster) if given == "auto" else given
     config = msgspec.structs.replace(config, loss=msgspec.structs.replace(config.loss, lambda_lap=float(weight)))
     state, tape, log = train.start(gaussians), Tape(inputs["frame_order"], inputs["split_noise"]), []
     counts = [gaussians.opacity_logit.size]

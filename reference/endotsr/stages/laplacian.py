@@ -100,7 +100,7 @@ def _calibration(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 PER_DISPLAY = "loss per display unit"
-MASKS = "laplacian_oracle.masks_by_impulse_response"
+MASKS = "laplacian.support_masks"
 
 STAGES = [
     Stage(
@@ -111,10 +111,10 @@ STAGES = [
         inputs={"rendered": "display", "observed": "display", "mask": "1"},
         forward=_laplacian,
         asked={
-            **{f"band_{j}": Asked(1, "display", oracle="laplacian_oracle.pyramid") for j in range(1, LEVELS + 1)},
+            **{f"band_{j}": Asked(1, "display", oracle="laplacian.laplacian_levels") for j in range(1, LEVELS + 1)},
             **{f"valid_{j}": Asked(1, scale="exact", oracle=MASKS) for j in range(1, LEVELS + 1)},
-            "loss": Asked(1, "display", oracle="laplacian_oracle.loss"),
-            "d_rendered": Asked(2, PER_DISPLAY, oracle="laplacian_oracle.loss_gradient"),
+            "loss": Asked(1, "display", oracle="laplacian.laplacian_loss_forward"),
+            "d_rendered": Asked(2, PER_DISPLAY, oracle="laplacian.laplacian_loss_reverse"),
         },
         reverse=_laplacian_reverse,
         extra=_bands,
@@ -131,7 +131,7 @@ STAGES = [
         asked={
             "g_rgb": Asked(1, PER_DISPLAY),
             "g_lap": Asked(1, PER_DISPLAY),
-            "lambda_lap": Asked(1, oracle="calibration_oracle.view_median_weight"),
+            "lambda_lap": Asked(1, oracle="calibration.calibrate"),
             "refused": Asked(1, scale="exact"),
         },
     ),

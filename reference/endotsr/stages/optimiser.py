@@ -110,13 +110,14 @@ def _initialisation(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    """Calibrate on the first Gaussians, then train; components A and S are activated, densification happens."""
+    """Train; components A and S are activated, densification happens. `auto` calibrates on the first Gaussians."""
     dtype = real_of({"position": inputs["position"]})
     config = config_of(settings, dtype)
     sequence = sequence_of(inputs, settings["camera"])
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
     shop = workshop(sequence, config)
-    weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap
+    given = config.loss.lambda_lap
+    weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
     log = [training_step(state, shop) | _sizes(state) for _ in range(config.training.iterations)]
@@ -145,7 +146,8 @@ def _total(array: NDArray) -> float:
 
 
 EXACT = "exact"
-TERMS = {"term_l1": "l1", "term_ssim": "ssim", "term_depth": "depth", "term_laplacian": "laplacian",
+TERMS = {"term_l1": "l1", "term_ssim": "ssim", "term_depth": "depth",
+         "term_smoothness": "smoothness", "term_laplacian": "laplacian",
          "term_penalty": "matern_penalty"}  # fmt: skip
 SQUARES = tuple(f"square_{name}" for name in Gaussians._fields)
 STATE = ("first_moments", "second_moments", "gradient_sum", "visits")
@@ -154,7 +156,7 @@ RATES = [
     "position", "quaternion", "log_scale", "opacity_logit", "harmonics_base", "harmonics_rest", "fdm_weight_position",
     "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
 ]  # fmt: skip
-DENSITY = "fitting_oracle.density"
+DENSITY = "density_control.densify"
 FRAMES = {"images": "display / 255", "masks": "1", "prior_depths": "scene unit", "times": "1", "train_index": "frame"}
 POSES = {"rotation_matrices": "1", "translations": "scene unit"}
 RAW = {"position": "scene unit", "quaternion": "1", "log_scale": "1", "opacity_logit": "1"}
@@ -181,10 +183,10 @@ STAGES = [
         inputs={"iteration": "1"},
         forward=_schedule,
         asked={
-            **{f"rate_{name}": Asked(1, "per step", oracle="fitting_oracle.schedule") for name in RATES},
-            "laplacian_weight": Asked(1, oracle="fitting_oracle.schedule"),
+            **{f"rate_{name}": Asked(1, "per step", oracle="schedules.learning_rates") for name in RATES},
+            "laplacian_weight": Asked(1, oracle="schedules.learning_rates"),
             **{
-                name: Asked(1, scale=EXACT, oracle="fitting_oracle.schedule")
+                name: Asked(1, scale=EXACT, oracle="schedules.learning_rates")
                 for name in ("degree", "residuals", "smoothness", "gathers", "densifies")
             },
         },
@@ -215,17 +217,17 @@ STAGES = [
         inputs={**FRAMES, **POSES},
         forward=_initialisation,
         asked={
-            "count": Asked(1, scale=EXACT, oracle="fitting_oracle.initialisation"),
-            "position": Asked(1, "scene unit", "last", "fitting_oracle.initialisation"),
-            "log_scale": Asked(1, oracle="fitting_oracle.initialisation"),
-            "harmonics": Asked(1, "display / Y00", oracle="fitting_oracle.initialisation"),
+            "count": Asked(1, scale=EXACT, oracle="initialisation.initialise"),
+            "position": Asked(1, "scene unit", "last", "initialisation.initialise"),
+            "log_scale": Asked(1, oracle="initialisation.initialise"),
+            "harmonics": Asked(1, "display / Y00", oracle="initialisation.initialise"),
             **{name: Asked(1) for name in ("quaternion", "opacity_logit", "fdm_weight", "fdm_centre", "fdm_width")},
         },
     ),
     Stage(
         name="training",
         equation="6",
-        text="calibration and twenty iterations",
+        text="calibration and some iterations",
         function="endotsr.fitting.trainer.training_step",
         inputs={
             **RAW,

@@ -119,7 +119,7 @@ def _harmonics_variant(degree: int) -> Variant:
 
 
 POSE_UNITS = {"rotation_matrix": "1", "translation": "scene unit"}
-PROJECTED = "splatting_oracle.project"
+PROJECTED = "projection.projection_forward"
 
 STAGES = [
     Stage(
@@ -130,7 +130,7 @@ STAGES = [
         inputs={"quaternion": "1", "log_scale": "1"},
         forward=_covariance,
         asked={
-            "rotation": Asked(1, "1", "last", "splatting_oracle.rotation"),
+            "rotation": Asked(1, "1", "last", "covariance.rotation_of"),
             "scale": Asked(1, "scene unit", "last"),
             "d_quaternion": Asked(2, "loss", "last"),
             "d_log_scale": Asked(2, "loss", "last"),
@@ -173,7 +173,7 @@ STAGES = [
         },
         forward=_harmonics,
         asked={
-            "colour": Asked(1, "display", oracle="splatting_oracle.colour"),
+            "colour": Asked(1, "display", oracle="harmonics.harmonics_forward"),
             "d_harmonics": Asked(2, "loss"),
             "d_residual": Asked(2, "loss"),
             "d_position": Asked(2, "loss per scene unit"),

@@ -191,9 +191,9 @@ STAGES = [
         inputs={"appearance_coefficients": "1", "phi_bar": "1"},
         forward=_appearance,
         asked={
-            "residual": Asked(1, "display / Y00", oracle="residuals_oracle.colour_residual"),
-            "d_appearance_coefficients": Asked(2, "loss", "last", "residuals_oracle.colour_gradients"),
-            "d_phi_bar": Asked(2, "loss", oracle="residuals_oracle.colour_gradients"),
+            "residual": Asked(1, "display / Y00", oracle="appearance.appearance_forward"),
+            "d_appearance_coefficients": Asked(2, "loss", "last", "appearance.appearance_reverse"),
+            "d_phi_bar": Asked(2, "loss", oracle="appearance.appearance_reverse"),
         },
         reverse=_appearance_reverse,
         variants=(
@@ -213,9 +213,9 @@ STAGES = [
         inputs={"motion_coefficients": "scene unit", "phi": "1"},
         forward=_motion,
         asked={
-            "translation": Asked(1, "scene unit", oracle="residuals_oracle.linear"),
-            "d_motion_coefficients": Asked(2, "loss per scene unit", "last", "residuals_oracle.linear_gradients"),
-            "d_phi": Asked(2, "loss", oracle="residuals_oracle.linear_gradients"),
+            "translation": Asked(1, "scene unit", oracle="motion.motion_forward"),
+            "d_motion_coefficients": Asked(2, "loss per scene unit", "last", "motion.motion_reverse"),
+            "d_phi": Asked(2, "loss", oracle="motion.motion_reverse"),
         },
         reverse=_motion_reverse,
         variants=(Variant("motion", _motion_inputs, blocks=split_blocks(_each_atom("motion_coefficients"))),),
@@ -229,8 +229,8 @@ STAGES = [
         forward=_matern,
         asked={
             "rho": Asked(1, oracle="matern_oracle.weights"),
-            "penalty": Asked(1, "scene unit^2", oracle="matern_oracle.penalty"),
-            "d_motion_coefficients": Asked(2, "loss per scene unit", oracle="matern_oracle.penalty_gradient"),
+            "penalty": Asked(1, "scene unit^2", oracle="matern.matern_penalty_forward"),
+            "d_motion_coefficients": Asked(2, "loss per scene unit", oracle="matern.matern_penalty_reverse"),
         },
         reverse=_matern_reverse,
         extra=lambda inputs, settings, saved: {"rho": _weights(inputs, settings)},

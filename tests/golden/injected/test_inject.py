@@ -35,7 +35,7 @@ def test_the_mistakes_are_many_known_and_of_every_family():
     flags = [m.flag for of in MISTAKES.values() for m in of]
     assert len(flags) >= 80 and set(flags) <= set(KNOWN)
     touched = {name for name, family in zip(FAMILIES, families()) for w in family.WRONG_PORTS if w.flag in flags}
-    assert touched == set(FAMILIES)
+    assert touched == set(FAMILIES) - {"other_settings"}  # cases alone
     assert sum("training" in m.operations for m in MISTAKES["reference"]) >= 10
 
 

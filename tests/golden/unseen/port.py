@@ -417,7 +417,7 @@ def projected(i, s, k):
 
 def projection(i, s, k):
     mean, cover, _, z, seen = projected(i, s, k)
-    keep = lambda a: np.where(seen, a, 0)  # noqa: E731
+    keep = lambda a: np.where(seen, a, 0)
     return {"visible": seen, "mean2d": keep(mean), "covariance2d": keep(cover), "depth": keep(z)}
 
 
@@ -540,11 +540,11 @@ def composite(i, s, k):
 
 def calibration(i, s, k):
     axes = (1, 2, 3)
-    root = lambda g: np.sqrt((g**2).mean(axes))  # noqa: E731
+    root = lambda g: np.sqrt((g**2).mean(axes))
     if k("norm", "rms") == "mean":
-        root = lambda g: np.abs(g).mean(axes)  # noqa: E731
+        root = lambda g: np.abs(g).mean(axes)
     if k("norm", "rms") == "sum":
-        root = lambda g: np.sqrt((g**2).sum(axes))  # noqa: E731
+        root = lambda g: np.sqrt((g**2).sum(axes))
     rgb, lap = root(i["d_photometric"].real), root(i["d_laplacian"].real)
     if k("rms over valid", False):
         n = np.array([max((g != 0).sum(), 1) for g in i["d_photometric"].real])
@@ -584,9 +584,9 @@ def schedule(i, s, k):
     c = s["config"]
     o, loss, den, tr = c["optimiser"], c["loss"], c["density"], c["training"]
     it, total, act = i["iteration"].astype(float), tr["iterations"], tr["residual_activation"]
-    decay = lambda tau: o["final_factor"] ** np.clip(tau, 0, 1)  # noqa: E731
+    decay = lambda tau: o["final_factor"] ** np.clip(tau, 0, 1)
     if k("linear decay", False):
-        decay = lambda tau: 1 + (o["final_factor"] - 1) * np.clip(tau, 0, 1)  # noqa: E731
+        decay = lambda tau: 1 + (o["final_factor"] - 1) * np.clip(tau, 0, 1)
     moving = decay((it - k("decay from", 0)) / total)
     late = decay((it - act) / max(total - act, 1)) if o["restart_residual_schedule"] != k("restart", False) else moving
     late = np.where(it > act + k("residual shift", 0), late, 0)

@@ -1,0 +1,143 @@
+"""Settings that a port may not hard-code: the values that each takes in the cases, and the cases that refuse each one.
+
+In: the golden cases. Out: for every setting of the configuration and of the rasteriser, the values that some case
+gives, and for each of these values, and the published one, a case that refuses a port that always uses it. Such a port
+is the reference, asked with the one setting replaced. A value that no case refuses is a gap.
+"""
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.golden.contract import all_operations
+from endotsr.golden.judge.compare import judged
+from endotsr.golden.judge.format import Case
+from endotsr.golden.judge.store import Golden
+from endotsr.golden.reference import reference, stored
+from endotsr.splatting.settings import PRESETS, RasterSettings
+
+Place = tuple[str, ...]  # keys of the settings of a case, from the outside in
+
+SECTIONS = ("model", "raster", "loss", "optimiser", "density", "initialisation", "training")
+FREE = {
+    "model.deformation": "a rigid scene has no arrays of the deformation, and their absence says so",
+    "model.exposure": "an option that is off in every preset; its equation has a family of its own",
+    "model.pose_correction": "an option that is off in every preset; its equation has a family of its own",
+    "optimiser.exposure": "a rate of that option",
+    "optimiser.pose": "a rate of that option",
+    "raster.preset": "the name of eleven values, each of which is a setting of the cases",
+    "initialisation.first_frame_points": "how many candidates are drawn; the cases take every candidate",
+    "initialisation.other_frame_points": "how many candidates are drawn; the cases take every candidate",
+    "initialisation.motion": "tracked motion needs optical flow, which no case has",
+    "training.visits_per_frame": "the length of a run; a case states its number of iterations",
+    "training.bridge_fraction": "times between frames need optical flow, which no case has",
+    "training.seed": "random draws are inputs of the cases",
+    "training.threads": "changes no result",
+    "training.precision": "the precision is that of the request",
+    "training.checkpoint_every": "changes no result",
+}
+"""Settings that no case has to move, each with the reason. The sections `sequence` and `preset` belong to the reader."""
+ALONE = {
+    "appearance": "model.beta", "matern": "model.correlation_length", "deformation": "model.basis",
+    "laplacian": "loss.upsampling", "calibration": "loss.gradient_ratio",
+    "smoothness": "loss.total_variation_factor",
+}  # fmt: skip
+"""Operation -> the setting of the configuration that its one setting is."""
+OTHERS = {"rate": "", "beta1": "optimiser.beta1", "beta2": "optimiser.beta2", "epsilon": "optimiser.epsilon",
+          "count": "model.frequencies", "low": "model.frequency_min", "high": "model.frequency_max"}  # fmt: skip
+
+
+class Row(NamedTuple):
+    """A setting, and for each value a case that refuses a port which always uses it; "" where none does."""
+
+    setting: str
+    refused_by: dict[str, str]
+
+    @property
+    def gaps(self) -> list[str]:
+        """Values that a port may hard-code, unnoticed."""
+        return [value for value, case in self.refused_by.items() if not case]
+
+
+def wanted_settings() -> dict[str, Any]:
+    """Every setting that a case has to move, with its published value."""
+    config = msgspec.to_builtins(Config())
+    found = {f"{section}.{key}": value for section in SECTIONS for key, value in config[section].items()}
+    raster = RasterSettings()._asdict()
+    deviations = raster.pop("deviations")._asdict()
+    found |= {f"raster.{key}": value for key, value in raster.items()}
+    found |= {f"raster.deviations.{key}": value for key, value in deviations.items()}
+    return {name: value for name, value in found.items() if name not in FREE}
+
+
+def places(case: Case, setting: str) -> Iterator[Place]:
+    """Where the settings of a case hold a setting."""
+    path = tuple(setting.split("."))
+    for start in ((), ("config",)):
+        if _at(case.settings, (*start, *path)) is not None:
+            yield (*start, *path)
+    for key in case.settings:
+        if ALONE.get(case.operation) == setting and key == path[-1]:
+            yield (key,)
+        elif case.operation in ("adam", "frequencies") and OTHERS.get(key) == setting:
+            yield (key,)
+
+
+def _at(settings: Mapping[str, Any], place: Place) -> Any:
+    """The value of a setting, None where there is none; that of the preset where the setting says so."""
+    value: Any = settings
+    for key in place:
+        if not isinstance(value, Mapping) or key not in value:
+            return None
+        value = value[key]
+    return getattr(PRESETS[settings["config"]["raster"]["preset"]], place[-1]) if value == "preset" else value
+
+
+def with_value(settings: Mapping[str, Any], place: Place, value: Any) -> dict[str, Any]:
+    """The settings with one of them replaced."""
+    out = copy.deepcopy(dict(settings))
+    inner = out
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    return out
+
+
+def refuses(golden: Golden, case: Case, settings: dict[str, Any], precision: str) -> bool:
+    """Whether a case refuses the reference, asked with other settings."""
+    with np.errstate(all="ignore"):
+        try:
+            found = reference(all_operations()[case.operation], golden.inputs(case), settings, precision, "definition")
+        except (InputError, ValueError, IndexError, AssertionError):
+            return True
+    for name, output in case.outputs.items():
+        answers = [golden.array(case, output.answer(k)) for k in range(case.answers)]
+        got = stored(found[name]) if name in found else None
+        if got is None or not any(
+            got.shape == right.shape and judged(got, right, output.compare, precision).passed for right in answers
+        ):
+            return True
+    return False
+
+
+def row_of(golden: Golden, setting: str, published: Any, precision: str = "float64") -> Row:
+    """Every value of a setting in the cases, and the published one, with the first case that refuses it."""
+    held = [(case, place) for case in golden.cases for place in places(case, setting)]
+    values = {msgspec.json.encode(v).decode(): v for v in (published, *(_at(c.settings, p) for c, p in held))}
+    refused = {}
+    for text, value in values.items():
+        others = [(case, place) for case, place in held if _at(case.settings, place) != value]
+        wrong = (c.name for c, p in others if refuses(golden, c, with_value(c.settings, p, value), precision))
+        refused[text] = next(wrong, "")
+    return Row(setting, refused)
+
+
+def table(golden: Golden, precision: str = "float64") -> list[Row]:
+    """A row for every setting that a case has to move."""
+    order = sorted(golden.cases, key=lambda case: case.level)
+    return [row_of(golden._replace(cases=order), name, value, precision) for name, value in wanted_settings().items()]
