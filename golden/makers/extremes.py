@@ -32,7 +32,8 @@ def _deep_saturation() -> Spec:
     d = seeds.uniform("d_residual", 0.5, 1.0, 3, 7)
     power = np.round(2 * size / np.log(2.0))
     coefficients = given(np.stack([first, second.array], axis=1),
-                         f"[:, 0] is 10 + 10 n / 3, negated where 7 c + n is odd; [:, 1] is {second.recipe}")  # fmt: skip
+                         "[:, 0] is 10 + 10 n / 3, negated where 7 c + n is odd; [:, 1] is "
+                         + second.recipe)  # fmt: skip
     inputs = {
         "appearance_coefficients": coefficients,
         "phi_bar": given([1.0, 0.25], "1, 1/4"),

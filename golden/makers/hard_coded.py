@@ -41,7 +41,7 @@ FREE = {
     "training.precision": "the precision is that of the request",
     "training.checkpoint_every": "changes no result",
 }
-"""Settings that no case has to move, each with the reason. The sections `sequence` and `preset` belong to the reader."""
+"""Settings that no case has to move, each with the reason. `preset` and the section `sequence` belong to the reader."""
 ALONE = {
     "appearance": "model.beta", "matern": "model.correlation_length", "deformation": "model.basis",
     "laplacian": "loss.upsampling", "calibration": "loss.gradient_ratio",

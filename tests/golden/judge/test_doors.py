@@ -203,6 +203,8 @@ def test_failures_alone_are_listed_with_the_level_that_they_stop(golden, answere
         value = read_plain(folder / case.name / f"{name}.npy")
         (target / f"{name}.npy").write_bytes(npy_bytes(value if name != "d_motion_coefficients" else 7 * value))
     lines = as_table(judge(golden, tmp_path, precision, level=2, only="matern")).splitlines()
+    assert lines[0].startswith("first wrong: operation matern, equation (4), level 2, d_motion_coefficients alone")
+    lines = lines[lines.index("") + 1 :]
     assert lines[1].split()[:3] == ["matern/published", "1", "0/3"] and "matern/short" in lines[2]
     assert lines[2].split()[1:3] == ["2", "2/3"]
     assert "  matern/published: rho, penalty, d_motion_coefficients" in lines

@@ -30,7 +30,8 @@ def as_json(report: Report) -> bytes:
 def as_table(report: Report, *, everything: bool = False) -> str:
     """The report for a terminal: the cases that did not pass, or all of them."""
     shown = [case for case in report.cases if everything or case.status != "passed"]
-    lines = [f"{'case':<32} {'level':>5} {'outputs':>8}  verdict"] if shown else []
+    lines = [*report.diagnosis, *([""] if report.diagnosis else [])]
+    lines += [f"{'case':<32} {'level':>5} {'outputs':>8}  verdict"] if shown else []
     for case in shown:
         good = sum(o.status == "passed" for o in case.outputs)
         lines.append(f"{case.name:<32} {_level(case):>5} {good:>4}/{len(case.outputs):<3}  {_summary(case)}")

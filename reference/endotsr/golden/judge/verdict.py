@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.golden.judge.compare import Verdict, judged, misses
+from endotsr.golden.judge.diagnose import diagnosis
 from endotsr.golden.judge.format import LEVELS, Case, Output, Precision
 from endotsr.golden.judge.npy import Refused, read_plain, read_text
 from endotsr.golden.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
+from endotsr.golden.judge.relate import relations
 from endotsr.golden.judge.store import Golden
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
+LARGEST_RELATED = 20_000  # entries of an output for which relations are sought
 
 Status = Literal["passed", "refused", "missing", "not ported"]
 
@@ -30,6 +33,8 @@ class OutputReport(msgspec.Struct, kw_only=True):
     index: tuple[int, ...] = ()
     got: float | None = None
     expected: float | None = None
+    forms: list[str] = []
+    """relations to the expected array that hold to the tolerance, the most telling first"""
 
 
 class CaseReport(msgspec.Struct, kw_only=True):
@@ -67,6 +72,8 @@ class Report(msgspec.Struct, kw_only=True):
     cases: list[CaseReport]
     suspects: list[Suspect]
     notes: list[str]
+    diagnosis: list[str] = []
+    """the first wrong operation and how its outputs relate to the expected ones; empty where nothing is refused"""
 
     @property
     def passed(self) -> bool:
@@ -140,6 +147,7 @@ def conclude(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
         claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
         suspects=suspects_of(golden, merged(r.evidence for r in reports)), notes=notes,
+        diagnosis=diagnosis(golden.cases, reports),
     )  # fmt: skip
 
 
@@ -177,6 +185,7 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
     tries = [_held_against(golden, case, taken, precision, answer) for answer in range(case.answers)]
     best = min(range(case.answers), key=lambda k: misses((o.level, o.status == "passed") for o in tries[k][0]))
     found, seen = tries[best]
+    _relate(golden, case, found, seen, precision)
     evidence = evidence_of(case, seen, precision)
     scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
     return CaseReport(
@@ -184,6 +193,23 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
         looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
         made_for=list(case.flags), answer=best, first_wrong=_first_wrong(case, found), evidence=evidence,
     )  # fmt: skip
+
+
+def _relate(
+    golden: Golden, case: Case, found: list[OutputReport], seen: dict[str, Taken], precision: Precision
+) -> None:
+    """Write the forms of the refused outputs."""
+    refused = [(o, seen[o.name]) for o in found if o.status == "refused" and seen[o.name].got is not None]
+    if not refused:
+        return
+    others = golden.inputs(case) | {name: one.expected for name, one in seen.items()}
+    for output, taken in refused:
+        rule, got = case.outputs[output.name].compare, taken.got
+        if got is None or rule.kind == "identical" or got.size > LARGEST_RELATED:
+            continue
+        tolerance = rule.float64 if precision == "float64" else rule.float32
+        rest = {name: array for name, array in others.items() if name != output.name}
+        output.forms = [r.text for r in relations(got, taken.expected, rule.scale, tolerance, rest)]
 
 
 def _held_against(

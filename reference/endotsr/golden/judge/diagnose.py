@@ -1,0 +1,48 @@
+"""Where a port goes wrong first, in words that need no list of mistakes.
+
+In: the verdicts on all cases, with the relations of every refused output. Out: lines that name the first wrong
+operation with its equation and level, its direction, its outputs and cases, and the relations that hold in all of them.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from endotsr.golden.judge.format import Case
+
+
+def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
+    """Lines on the first operation with a refused output, by level and then in the order of the cases; [] = none.
+
+    reports   case reports of the judge, whose outputs hold their forms
+    """
+    known = {case.name: case for case in cases}
+    wrong = [(o.level, k, r.name) for k, r in enumerate(reports) for o in r.outputs if o.status == "refused"]
+    wrong = [one for one in wrong if one[2] in known]
+    if not wrong:
+        return []
+    first = known[min(wrong)[2]]
+    mine = [r for r in reports if r.name in known and known[r.name].operation == first.operation and r.outputs]
+    refused = [(r, o) for r in mine for o in r.outputs if o.status == "refused"]
+    place = f"operation {first.operation}" + (f", equation ({first.equation})" if first.equation else "")
+    lines = [f"first wrong: {place}, level {min(wrong)[0]}, {_direction(mine, refused)}"]
+    for name in dict.fromkeys(o.name for _, o in refused):
+        forms = [o.forms for _, o in refused if o.name == name]
+        shared = [form for form in forms[0] if all(form in other for other in forms)]
+        text = "; ".join(shared[:2]) or "; ".join(forms[0][:1]) or "no simple relation to the expected array"
+        lines.append(f"  {name}: {text}")
+    bad = list(dict.fromkeys(r.name for r, _ in refused))
+    if 2 * len(bad) <= len(mine):
+        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:4])
+        lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}")
+    return lines
+
+
+def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:
+    """Forward, reverse alone, or one output alone."""
+    names = {o.name for _, o in refused}
+    everything = {o.name for r in mine for o in r.outputs}
+    if len(names) == 1 and len(everything) > 1:
+        return f"{next(iter(names))} alone; its other outputs are right"
+    if all(name.startswith("d_") for name in names):
+        return "reverse alone; its forward outputs are right"
+    return "forward" if not any(name.startswith("d_") for name in names) else "forward and reverse"
