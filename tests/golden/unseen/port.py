@@ -359,11 +359,13 @@ def covariance(i, s, k):
     if k("not normalised", False):
         unit = q
     w, x, y, z = unit[[3, 0, 1, 2]] if k("w last", False) else unit
-    r = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    r = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     if k("rotation transposed", False):
         r = r.swapaxes(0, 1)
     limit = k("log-scale limit", 40)
@@ -421,20 +423,39 @@ def projection(i, s, k):
     return {"visible": seen, "mean2d": keep(mean), "covariance2d": keep(cover), "depth": keep(z)}
 
 
-C = {"1": math.sqrt(3 / (4 * math.pi)), "2a": math.sqrt(15 / (4 * math.pi)), "2b": math.sqrt(5 / (16 * math.pi)),
-     "2c": math.sqrt(15 / (16 * math.pi)), "3a": math.sqrt(35 / (32 * math.pi)), "3b": math.sqrt(105 / (4 * math.pi)),
-     "3c": math.sqrt(21 / (32 * math.pi)), "3d": math.sqrt(7 / (16 * math.pi)),
-     "3e": math.sqrt(105 / (16 * math.pi))}  # fmt: skip
+C = {
+    "1": math.sqrt(3 / (4 * math.pi)),
+    "2a": math.sqrt(15 / (4 * math.pi)),
+    "2b": math.sqrt(5 / (16 * math.pi)),
+    "2c": math.sqrt(15 / (16 * math.pi)),
+    "3a": math.sqrt(35 / (32 * math.pi)),
+    "3b": math.sqrt(105 / (4 * math.pi)),
+    "3c": math.sqrt(21 / (32 * math.pi)),
+    "3d": math.sqrt(7 / (16 * math.pi)),
+    "3e": math.sqrt(105 / (16 * math.pi)),
+}
 
 
 def basis(n, count, k):
     x, y, z = n
-    rows = [Y00 + 0 * x, -C["1"] * y, C["1"] * z, -C["1"] * x,
-            C["2a"] * x * y, -C["2a"] * y * z, C["2b"] * (2 * z * z - x * x - y * y), -C["2a"] * x * z,
-            C["2c"] * (x * x - y * y), -C["3a"] * y * (3 * x * x - y * y), C["3b"] * x * y * z,
-            -C["3c"] * y * (4 * z * z - x * x - y * y), C["3d"] * z * (2 * z * z - 3 * x * x - 3 * y * y),
-            -C["3c"] * x * (4 * z * z - x * x - y * y), C["3e"] * z * (x * x - y * y),
-            -C["3a"] * x * (x * x - 3 * y * y)]  # fmt: skip
+    rows = [
+        Y00 + 0 * x,
+        -C["1"] * y,
+        C["1"] * z,
+        -C["1"] * x,
+        C["2a"] * x * y,
+        -C["2a"] * y * z,
+        C["2b"] * (2 * z * z - x * x - y * y),
+        -C["2a"] * x * z,
+        C["2c"] * (x * x - y * y),
+        -C["3a"] * y * (3 * x * x - y * y),
+        C["3b"] * x * y * z,
+        -C["3c"] * y * (4 * z * z - x * x - y * y),
+        C["3d"] * z * (2 * z * z - 3 * x * x - 3 * y * y),
+        -C["3c"] * x * (4 * z * z - x * x - y * y),
+        C["3e"] * z * (x * x - y * y),
+        -C["3a"] * x * (x * x - 3 * y * y),
+    ]
     rows = [k("basis times", {}).get(j, 1) * row for j, row in enumerate(rows)]
     if k("basis order", None):
         rows = [rows[j] for j in k("basis order", None)]
@@ -531,8 +552,20 @@ def composite(i, s, k):
     a, b, c = i["covariance2d"]
     det = a * c - b * b
     seen = np.ones(len(i["depth"]), bool)
-    return blended(i["mean2d"], i["covariance2d"], det, i["depth"], seen, i["opacity_logit"], i["colour"],
-                   i["background"], s["raster"], s["width"], s["height"], k)  # fmt: skip
+    return blended(
+        i["mean2d"],
+        i["covariance2d"],
+        det,
+        i["depth"],
+        seen,
+        i["opacity_logit"],
+        i["colour"],
+        i["background"],
+        s["raster"],
+        s["width"],
+        s["height"],
+        k,
+    )
 
 
 # ---- decisions ----
@@ -602,16 +635,26 @@ def schedule(i, s, k):
     position = o["position"] * moving if k("position decays", True) else o["position"] + 0 * it
     factor = k("position factor", o["deformation_position_factor"])
     first = loss["smoothness_from"] + k("smooth shift", 0)
-    one = {"rate_position": position, "rate_quaternion": o["rotation"] * hold, "rate_log_scale": o["scale"] * hold,
-           "rate_opacity_logit": o["opacity"] * hold, "rate_harmonics_base": o["harmonics_base"] * hold,
-           "rate_harmonics_rest": k("rest", o["harmonics_rest"]) * hold, "rate_fdm_weight_position": fdm * factor * moving,
-           "rate_fdm_weight_other": fdm * moving, "rate_fdm_centre": fdm * moving, "rate_fdm_width": fdm * moving,
-           "rate_appearance_coefficients": fdm * o["appearance_factor"] * late,
-           "rate_motion_coefficients": fdm * o["spectral_motion_factor"] * late,
-           "laplacian_weight": lap * ramp * c["model"]["laplacian"], "degree": degree.astype(int),
-           "residuals": on & (c["model"]["appearance"] | c["model"]["spectral_motion"]),
-           "smoothness": (it >= first) & (loss["smoothness_weight"] > 0), "gathers": gathers,
-           "densifies": densifies}  # fmt: skip
+    one = {
+        "rate_position": position,
+        "rate_quaternion": o["rotation"] * hold,
+        "rate_log_scale": o["scale"] * hold,
+        "rate_opacity_logit": o["opacity"] * hold,
+        "rate_harmonics_base": o["harmonics_base"] * hold,
+        "rate_harmonics_rest": k("rest", o["harmonics_rest"]) * hold,
+        "rate_fdm_weight_position": fdm * factor * moving,
+        "rate_fdm_weight_other": fdm * moving,
+        "rate_fdm_centre": fdm * moving,
+        "rate_fdm_width": fdm * moving,
+        "rate_appearance_coefficients": fdm * o["appearance_factor"] * late,
+        "rate_motion_coefficients": fdm * o["spectral_motion_factor"] * late,
+        "laplacian_weight": lap * ramp * c["model"]["laplacian"],
+        "degree": degree.astype(int),
+        "residuals": on & (c["model"]["appearance"] | c["model"]["spectral_motion"]),
+        "smoothness": (it >= first) & (loss["smoothness_weight"] > 0),
+        "gathers": gathers,
+        "densifies": densifies,
+    }
     return {name: np.broadcast_to(value, it.shape) for name, value in one.items()}
 
 
@@ -672,10 +715,18 @@ def density(i, s, k):
     kept[: len(keep)] = True
     if k("clones keep moments", False):
         kept[: len(old)] = True
-    return {"extent": np.array(extent, float), "mean_gradient": mean, "pruned": pruned, "cloned": cloned,
-            "split": split, "count": np.array(len(parent)), "parent": parent, "moments_kept": kept,
-            "position_after": np.concatenate([i["position"].real[:, old], kids], 1),
-            "log_scale_after": np.concatenate([i["log_scale"].real[:, old], kid_scale], 1)}  # fmt: skip
+    return {
+        "extent": np.array(extent, float),
+        "mean_gradient": mean,
+        "pruned": pruned,
+        "cloned": cloned,
+        "split": split,
+        "count": np.array(len(parent)),
+        "parent": parent,
+        "moments_kept": kept,
+        "position_after": np.concatenate([i["position"].real[:, old], kids], 1),
+        "log_scale_after": np.concatenate([i["log_scale"].real[:, old], kid_scale], 1),
+    }
 
 
 def initialisation(i, s, k):
@@ -694,8 +745,9 @@ def initialisation(i, s, k):
             take = take & (~usable[train[0]] | moved)
             if k("moved only", False):
                 take = usable[frame] & usable[train[0]] & moved
-        p = np.array([(x - camera["cx"]) * depth / camera["fx"], (y - camera["cy"]) * depth / camera["fy"],
-                      depth + 0 * x])  # fmt: skip
+        p = np.array(
+            [(x - camera["cx"]) * depth / camera["fx"], (y - camera["cy"]) * depth / camera["fy"], depth + 0 * x]
+        )
         p = p[:, take] - i["translations"].real[frame][:, None]
         r = i["rotation_matrices"].real[frame]
         points.append((r if k("lifted with W", False) else r.T) @ p)
@@ -712,17 +764,24 @@ def initialisation(i, s, k):
     h0[0] = (colours - k("colour zero", 0.5)) / Y00
     b = model["bases"]
     centre = np.linspace(0, 1, b) if k("centres at ends", True) else (np.arange(b) + 0.5) / b
-    return {"count": np.array(n), "position": points, "log_scale": np.tile(np.log(np.maximum(mean, 1e-7)) / 2, (3, 1)),
-            "harmonics": h0, "quaternion": np.tile(np.array([[1.0], [0], [0], [0]]), n),
-            "opacity_logit": np.full(n, math.log(k("opacity", 0.1) / (1 - k("opacity", 0.1)))),
-            "fdm_weight": np.zeros((10, b, n)), "fdm_centre": np.tile(centre[:, None], (10, 1, n)),
-            "fdm_width": np.full((10, b, n), k("width", model["initial_width"]))}  # fmt: skip
+    return {
+        "count": np.array(n),
+        "position": points,
+        "log_scale": np.tile(np.log(np.maximum(mean, 1e-7)) / 2, (3, 1)),
+        "harmonics": h0,
+        "quaternion": np.tile(np.array([[1.0], [0], [0], [0]]), n),
+        "opacity_logit": np.full(n, math.log(k("opacity", 0.1) / (1 - k("opacity", 0.1)))),
+        "fdm_weight": np.zeros((10, b, n)),
+        "fdm_centre": np.tile(centre[:, None], (10, 1, n)),
+        "fdm_width": np.full((10, b, n), k("width", model["initial_width"])),
+    }
 
 
 def scene(i, s, k):
     model, t = s["model"], s["t"]
-    omega = frequencies({}, {"count": model["frequencies"], "low": model["frequency_min"],
-                             "high": model["frequency_max"]}, k)["omega"]  # fmt: skip
+    omega = frequencies(
+        {}, {"count": model["frequencies"], "low": model["frequency_min"], "high": model["frequency_max"]}, k
+    )["omega"]
     phi = waves(t, omega, k)
     mean, rms, dead = statistics(i["times"].real[i["train_index"]], omega, k)
     bar = np.where(dead, 0, (phi - mean) / np.where(dead, 1, rms))
@@ -731,8 +790,12 @@ def scene(i, s, k):
     if k("channels swapped", False):
         offsets = np.concatenate([offsets[:3], offsets[6:10], offsets[3:6]])
     tint = appearance(i | {"phi_bar": phi if k("raw atoms for colour", False) else bar}, model, k)["residual"]
-    return {"position_at_t": moved, "quaternion_at_t": i["quaternion"] + offsets[3:7],
-            "log_scale_at_t": i["log_scale"] + offsets[7:], "residual_at_t": tint}  # fmt: skip
+    return {
+        "position_at_t": moved,
+        "quaternion_at_t": i["quaternion"] + offsets[3:7],
+        "log_scale_at_t": i["log_scale"] + offsets[7:],
+        "residual_at_t": tint,
+    }
 
 
 def render(i, s, k):
@@ -758,9 +821,33 @@ def boxed(mean, cover, seen, logit, raster, width, height):
     return inside
 
 
-STAGES = (frequencies, dictionary, atoms, appearance, motion, matern, deformation, exposure, pose, masked_l1,
-          masked_ssim, normalised_depth, smoothness, laplacian, covariance, projection, harmonics, composite,
-          calibration, adam, schedule, density, initialisation, scene, render)  # fmt: skip
+STAGES = (
+    frequencies,
+    dictionary,
+    atoms,
+    appearance,
+    motion,
+    matern,
+    deformation,
+    exposure,
+    pose,
+    masked_l1,
+    masked_ssim,
+    normalised_depth,
+    smoothness,
+    laplacian,
+    covariance,
+    projection,
+    harmonics,
+    composite,
+    calibration,
+    adam,
+    schedule,
+    density,
+    initialisation,
+    scene,
+    render,
+)
 OPERATIONS = {f.__name__: f for f in STAGES}
 
 
@@ -798,6 +885,8 @@ def gradients(f, taken, given, settings, wrong):
             moved = np.array(array)
             moved[at] += 1j * STEP
             out = f(sources | {name: moved}, settings, Choices(wrong))
-            slope[at] = sum(np.where(np.imag(out[n]) == 0, 0, d * np.imag(out[n])).sum() for n, d in given.items()) / STEP
+            slope[at] = (
+                sum(np.where(np.imag(out[n]) == 0, 0, d * np.imag(out[n])).sum() for n, d in given.items()) / STEP
+            )
         found[f"d_{name}"] = slope
     return found
