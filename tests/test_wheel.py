@@ -48,7 +48,7 @@ def test_the_metadata_is_complete(wheel):
 
 
 # Distributions whose import has another name.
-IMPORTED_AS = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL", "scikit-image": "skimage"}
+IMPORTED_AS = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL", "scikit-image": "skimage", "pyyaml": "yaml"}
 INDIRECT = {"llvmlite": "numba", "pytest": "test", "dask": "distributed"}  # comes with; pytest calls the door for ports
 
 

@@ -5,6 +5,8 @@ cut, an epsilon that is not small, views of the calibration that fall between tw
 in its box but hidden by others.
 """
 
+from typing import Any
+
 import msgspec
 import numpy as np
 
@@ -110,7 +112,7 @@ def _hidden_in_training() -> Spec:
     inputs = trajectory_inputs(Seeds("training", "hidden"), 4, 0)
     five = slice(0, 5)
 
-    def put(name: str, values: object, recipe: str, at: object = (slice(None), five)) -> None:
+    def put(name: str, values: Any, recipe: str, at: object = (slice(None), five)) -> None:
         inputs[name] = changed(inputs[name], at, values, recipe)
 
     put(

@@ -44,7 +44,7 @@ RESERVED = {
     "moment": {"definition", "fitting", "losses", "stages"},
     "moments": {"definition", "fitting", "losses", "stages"},
     "band": {"definition", "equations", "stages"},
-    "bands": {"definition", "equations", "stages"},
+    "bands": {"definition", "equations", "fitting", "stages"},
     "door": {"golden"},
 }
 # Whole identifiers: the same letters are right inside `lambda_msp`, `lambda_lap` and `g_lap`.

@@ -28,7 +28,8 @@ def test_exponential_decay_end_points_middle_and_clip():
     assert decay(3000, 6000, 1.6e-3, 1.6e-5) == pytest.approx(1.6e-4, rel=1e-14)
     assert decay(9000, 6000, 1.0, 0.01) == pytest.approx(0.01, rel=1e-14)
     assert decay(-5, 6000, 1.0, 0.01) == 1.0
-    assert decay(1, 0, 1.0, 0.01) == pytest.approx(0.01)
+    assert decay(1, 0, 1.0, 0.01) == pytest.approx(0.01) and decay(1, -3, 1.0, 0.01) == pytest.approx(0.01)
+    assert decay(0, 0, 1.0, 0.01) == decay(-2, -3, 1.0, 0.01) == 1.0, "nothing is annealed that begins after the end"
     assert decay(0, 1, 1.0, 0.01) == 1.0
     assert decay(1, 10, 0.0, 0.0) == decay(1, 10, 1.0, 0.0) == decay(0, 10, 1.0, 0.0) == decay(0, 10, 0.0, 1.0) == 0.0
 

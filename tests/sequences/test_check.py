@@ -297,7 +297,7 @@ def test_an_inverted_picture_of_depth_is_found_by_the_stereo_pair(tmp_path):
 def test_cost_grows_with_the_clip_up_to_the_limit():
     small, large = (estimated_cost(n, 640, 512, 6000, memory=8.0) for n in (60, 120))
     assert large.sequence_bytes == pytest.approx(2 * small.sequence_bytes) and not large.file_bytes
-    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 20.3))
+    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 7.3))
     long = estimated_cost(2000, 640, 512, 6000, memory=4.0, between=True)
     assert long.file_bytes == long.sequence_bytes == 2000 * 640 * 512 * 9
     assert long.total_bytes == pytest.approx(4e9 / 2 + 1.2e9)

@@ -29,7 +29,7 @@ def test_what_is_asked_for_is_kept():
 
 def test_a_run_of_full_size_needs_what_was_measured():
     """Runs of this size were measured at 1.7 (paper) and 2.3 GB (sharp)."""
-    assert 2.3e9 < run_bytes(FULL) < 3.5e9
+    assert 2.0e9 < run_bytes(FULL) < 3.5e9
 
 
 def test_memory_of_this_machine_is_found():

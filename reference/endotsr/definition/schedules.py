@@ -2,8 +2,8 @@
 
 
 def decay(step, steps, final):
-    """final^tau, tau = clip(step / steps, 0, 1)."""
-    return final ** min(max(step / steps, 0), 1) if steps > 0 else final
+    """final^tau, tau = clip(step / steps, 0, 1); without steps, tau = [step > 0]."""
+    return final ** (min(max(step / steps, 0), 1) if steps > 0 else step > 0)
 
 
 def residuals_active(iteration, config):

@@ -10,10 +10,13 @@ from endotsr.scene.gaussians import DEFORMATION_CHANNELS, POSITION_CHANNELS
 
 
 def exponential_decay(step: int, steps: int, initial: float, final: float) -> float:
-    """initial^(1 - tau) final^tau, tau = clip(step / steps, 0, 1), 1 if steps = 0; 0 if an end is not positive."""
+    """initial^(1 - tau) final^tau, tau = clip(step / steps, 0, 1); 0 if an end is not positive.
+
+    Edges: without steps, steps <= 0, tau is 0 up to step 0 and 1 from step 1 on.
+    """
     if initial <= 0.0 or final <= 0.0:
         return 0.0
-    fraction = min(max(step / steps, 0.0), 1.0) if steps > 0 else 1.0
+    fraction = min(max(step / steps, 0.0), 1.0) if steps > 0 else float(step > 0)
     return initial * (final / initial) ** fraction
 
 

@@ -72,10 +72,10 @@ def _seconds(part: str, recording: Recording) -> list[int]:
         raise InputError(f"--frames {part!r}: no span of seconds; {ALLOWED}")
     first, last = -np.inf if bounds[0] is None else bounds[0], np.inf if bounds[1] is None else bounds[1]
     times = recording.times if recording.times is not None else np.arange(recording.count) / (recording.rate or 1.0)
-    moments: FloatArray = times - times[0]
-    if np.isfinite(last) and last > moments[-1] + 1.5 / (recording.rate or 1.0):
-        raise InputError(f"--frames {part!r}: the source ends after {moments[-1]:.3f} seconds")
-    return np.flatnonzero((moments >= first - 1e-9) & (moments < last - 1e-9)).tolist()
+    elapsed: FloatArray = times - times[0]
+    if np.isfinite(last) and last > elapsed[-1] + 1.5 / (recording.rate or 1.0):
+        raise InputError(f"--frames {part!r}: the source ends after {elapsed[-1]:.3f} seconds")
+    return np.flatnonzero((elapsed >= first - 1e-9) & (elapsed < last - 1e-9)).tolist()
 
 
 def cropped(recording: Recording, window: tuple[int, ...]) -> Recording:

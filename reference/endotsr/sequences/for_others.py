@@ -25,7 +25,7 @@ POINTS, FRAMES_OF_POINTS = 2000, 16  # points of a frame; frames that give point
 THOUSANDTHS = 1e3  # nerfstudio reads depth files as thousandths of the unit of its matrices
 
 
-class Point(NamedTuple):
+class SeenPoint(NamedTuple):
     """A point of the prior depth, and where its frame sees it."""
 
     position: FloatArray  # (3,) in the unit of the sequence
@@ -107,12 +107,12 @@ def _colmap(folder: Path, recording: Recording) -> str:
     return f"{MODEL}: {len(poses)} images, {len(points)} points of the prior depth, lengths of sequence.toml"
 
 
-def _points(recording: Recording, lens: Lens, poses: list[CameraPose]) -> list[Point]:
+def _points(recording: Recording, lens: Lens, poses: list[CameraPose]) -> list[SeenPoint]:
     """Some pixels with depth, on tissue, of some frames."""
     if recording.depth is None:
         return []
     chosen = np.unique(np.linspace(0, recording.count - 1, FRAMES_OF_POINTS).astype(int)).tolist()
-    found: list[Point] = []
+    found: list[SeenPoint] = []
     for i, pair in zip(chosen, recording.pictures(chosen)):
         depth, tissue = recording.depth(i), recording.masks(i) if recording.masks else None
         assert depth is not None
@@ -122,5 +122,5 @@ def _points(recording: Recording, lens: Lens, poses: list[CameraPose]) -> list[P
         for row, column in zip(rows.tolist(), columns.tolist()):
             z, u, v = float(depth[row, column]), column + 0.5, row + 0.5
             view = np.array([(u - lens.cx) * z / lens.fx, (v - lens.cy) * z / lens.fy, z])
-            found.append(Point(rotation @ view + centre, pair.left[row, column], i, np.array([u, v])))
+            found.append(SeenPoint(rotation @ view + centre, pair.left[row, column], i, np.array([u, v])))
     return found

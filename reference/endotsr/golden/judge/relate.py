@@ -38,7 +38,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
     index: tuple[int, ...] = ()
 
 
-class Pair:
+class OutputPair:
     """A wrong output beside the expected one."""
 
     def __init__(self, got: NDArray, expected: NDArray, kind: str, tolerance: float) -> None:
@@ -59,9 +59,9 @@ class Pair:
         with np.errstate(all="ignore"):
             return bool((np.abs(self.got - self.expected) > DIFFERS * FITS * self.unit).any())
 
-    def part(self, axis: int, index: int) -> "Pair":
+    def part(self, axis: int, index: int) -> "OutputPair":
         """One index of an axis."""
-        found = object.__new__(Pair)
+        found = object.__new__(OutputPair)
         for name in ("got", "expected", "unit", "wrong"):
             setattr(found, name, np.take(getattr(self, name), index, axis))
         return found
@@ -75,12 +75,12 @@ def relations(
     kind, tolerance   as of the rule of the output
     others            the other arrays of the case: inputs, and what is expected of the other outputs
     """
-    pair = Pair(got, expected, kind, tolerance)
+    pair = OutputPair(got, expected, kind, tolerance)
     if not pair.wrong.any():
         return []
     broken = ~np.isfinite(pair.got)
     if broken.any():
-        return [Relation(kind="nan", text=f"{_share(broken)} not finite")]
+        return [Relation(kind="nan", text=f"{_part_of(broken)} not finite")]
     if not pair.telling:
         return [Relation(kind="entries", text="the difference is of the size of rounding")]
     search = (_times, _orders, _signs, _clamps, _axes, _plus, _matrices, _arrays, _regions, _entries)
@@ -96,7 +96,7 @@ def number_text(value: float) -> str:
     return f"{value:.6g}"
 
 
-def _times(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _times(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     square = float((pair.expected**2).sum())
     if not square:
         return
@@ -108,7 +108,7 @@ def _times(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
         yield Relation(kind="times", text=text, value=factor)
 
 
-def _orders(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _orders(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     shape = pair.got.shape
     if len(shape) >= 2 and shape[0] == shape[1] and pair.close(pair.expected.swapaxes(0, 1)):
         yield Relation(kind="transposed", text="transposed")
@@ -120,7 +120,7 @@ def _orders(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
             yield Relation(kind="order", text=text, index=order)
 
 
-def _order_of(pair: Pair, axis: int) -> tuple[int, ...] | None:
+def _order_of(pair: OutputPair, axis: int) -> tuple[int, ...] | None:
     """Which expected slice stands at each place of an axis; None where they are no permutation, or in order."""
     rows = [np.moveaxis(a, axis, 0).reshape(a.shape[axis], -1) for a in (pair.got, pair.expected, pair.unit)]
     near = np.abs(rows[0][:, None] - rows[1][None]) <= FITS * (rows[2][:, None] + rows[2][None])
@@ -135,14 +135,14 @@ def _order_of(pair: Pair, axis: int) -> tuple[int, ...] | None:
     return None if order == sorted(order) else tuple(order)
 
 
-def _signs(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _signs(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     with np.errstate(all="ignore"):
         alike = bool((np.abs(np.abs(pair.got) - np.abs(pair.expected)) <= FITS * pair.unit).all())
     if alike:
-        yield Relation(kind="sign", text=f"{_share(pair.wrong)} {_have(pair.wrong)} the opposite sign")
+        yield Relation(kind="sign", text=f"{_part_of(pair.wrong)} {_have(pair.wrong)} the opposite sign")
 
 
-def _matrices(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _matrices(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """A 3 x 3 matrix between the two, which may be one of the pose."""
     if pair.got.shape[:1] != (3,):
         return
@@ -165,7 +165,7 @@ def _matrices(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
             yield Relation(kind="matrix", text=f"multiplied by the matrix {np.round(matrix, 3).tolist()}")
 
 
-def _clamps(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _clamps(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """Equal, up to a bound that one of the two respects."""
     if pair.got.size < 2 or pair.wrong.all():
         return
@@ -180,7 +180,7 @@ def _clamps(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
             yield Relation(kind="clamp", text=f"{text} {side} {number_text(bound) if bound else '0'}", value=bound)
 
 
-def _axes(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _axes(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """Wrong at some indices of an axis only, and what holds there."""
     for axis, size in enumerate(pair.got.shape):
         if pair.got.ndim == 1 and size > LARGEST_PERMUTED:
@@ -194,7 +194,7 @@ def _axes(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
         yield Relation(kind="axis", text=where, index=(axis, *(int(k) for k in bad)))
 
 
-def _inside(pair: Pair) -> str:
+def _inside(pair: OutputPair) -> str:
     if pair.got.size < 2:
         return ""
     for one in (_times, _orders, _signs, _plus):
@@ -203,7 +203,7 @@ def _inside(pair: Pair) -> str:
     return ""
 
 
-def _plus(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _plus(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """A constant added, to every entry or to those of one index of the first axis."""
     off = pair.got - pair.expected
     if off.size < 2:
@@ -228,7 +228,7 @@ TRANSFORMS = {
 }  # fmt: skip
 
 
-def _arrays(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _arrays(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """Another array of the case in place of the output, as a factor of it, or added to it."""
     if pair.got.size < 2:
         return
@@ -251,12 +251,12 @@ def _arrays(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
                     break
 
 
-def _fits_shape(factor: NDArray, pair: Pair) -> bool:
+def _fits_shape(factor: NDArray, pair: OutputPair) -> bool:
     shape = pair.got.shape
     return bool(factor.size > 1 and factor.shape == shape[len(shape) - factor.ndim :] and np.isfinite(factor).all())
 
 
-def _regions(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
     """Wrong under the mask only, on tissue only, or near the border only."""
     if pair.got.ndim < 2:
         return
@@ -274,11 +274,11 @@ def _regions(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
             return
 
 
-def _entries(pair: Pair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
-    yield Relation(kind="entries", text=f"{_share(pair.wrong)} {_have(pair.wrong)} another value")
+def _entries(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+    yield Relation(kind="entries", text=f"{_part_of(pair.wrong)} {_have(pair.wrong)} another value")
 
 
-def _share(where: NDArray) -> str:
+def _part_of(where: NDArray) -> str:
     count = int(where.sum())
     return "every entry" if count == where.size else f"{count} of {where.size} entries"
 

@@ -1,7 +1,7 @@
 """Calibrations as other programs write them, one file a format.
 
-A module of `FORMATS` has a function `read`: from the path and, of a YAML file, its keys, to a `Calibration`, or None if
-the file is in another format. Every format here has OpenCV's pixels, whose centres lie at integers; half a pixel is
+A module of `FORMATS` has a function `read`: from the path and, of a YAML file, its keys, to a `StoredCalibration`,
+or None if the file is in another format. Every format here has OpenCV's pixels, whose centres lie at integers; half a pixel is
 added to cx and cy to get this project's, whose edges do. Pairs: x_right = rotation @ x_left + translation.
 
 Comes in: a path and the size of the pictures; goes out: a `Lens`, or a `Rig` of a pair.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration
 from endotsr.sequences.recording import Lens, Rig, lens_of_matrix
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.untrusted.yaml import read_yaml
@@ -29,7 +29,7 @@ def formats() -> tuple[ModuleType, ...]:
     return (stereo_ini, matrix_text, kalibr, ros, opencv_yaml)
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: Path) -> StoredCalibration:
     """The calibration of a file, or of a folder with one file for left and one for right.
 
     Raises:  InputError naming the file, the key and what is allowed.

@@ -6,22 +6,22 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics, distortion_of
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration, distortion_of
 from endotsr.untrusted.yaml import matrix
 
 ABOUT = "camchain.yaml of Kalibr (pinhole, radtan), metres"
 MODELS = {"camera_model": ("pinhole",), "distortion_model": ("radtan", "none")}
 
 
-def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
+def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
     """The first camera, or the first two. Raises InputError for another model than pinhole with radtan."""
     if not isinstance(keys.get("cam0"), dict):
         return None
     left = _camera(path, keys["cam0"], "cam0")
     if not isinstance(keys.get("cam1"), dict):
-        return Calibration(left)
+        return StoredCalibration(left)
     motion = matrix(keys["cam1"].get("T_cn_cnm1"), f"{path}: cam1: T_cn_cnm1", (4, 4))
-    return Calibration(left, _camera(path, keys["cam1"], "cam1"), motion[:3, :3], 1000.0 * motion[:3, 3])
+    return StoredCalibration(left, _camera(path, keys["cam1"], "cam1"), motion[:3, :3], 1000.0 * motion[:3, 3])
 
 
 def _camera(path: Path, keys: dict[str, Any], name: str) -> Intrinsics:

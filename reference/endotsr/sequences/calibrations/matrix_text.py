@@ -7,16 +7,16 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration
 from endotsr.untrusted.files import read_text
 
 ABOUT = "FILE.txt with a camera matrix K of 3x3 numbers"
 LARGEST_FILE = 1 << 16  # bytes
 
 
-def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
+def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
     """One camera without distortion. Raises InputError."""
-    return Calibration(Intrinsics(read_matrix(path))) if path.suffix.lower() == ".txt" else None
+    return StoredCalibration(Intrinsics(read_matrix(path))) if path.suffix.lower() == ".txt" else None
 
 
 def read_matrix(path: Path) -> FloatArray:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics, distortion_of
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration, distortion_of
 from endotsr.untrusted.yaml import matrix
 
 ABOUT = "FILE.yaml of OpenCV (camera_matrix, or M1 D1 M2 D2 R T in millimetres)"
@@ -19,7 +19,7 @@ PAIRS = (("M1", "D1", "M2", "D2"), ("K1", "D1", "K2", "D2"), ("cameraMatrix1", "
 SIZES = (("image_width", "image_height"), ("image_Width", "image_Height"), ("width", "height"))
 
 
-def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
+def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
     """The camera or the pair of the file. Raises InputError for a key that a pair lacks."""
     size = _size(keys)
     for left, left_distortion, right, right_distortion in PAIRS:
@@ -27,7 +27,7 @@ def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
             for name in ("R", "T"):
                 if name not in keys:
                     raise InputError(f"{path}: {name} is missing beside {left} and {right}")
-            return Calibration(
+            return StoredCalibration(
                 _camera(path, keys, left, left_distortion, size),
                 _camera(path, keys, right, right_distortion, size),
                 matrix(keys["R"], f"{path}: R", (3, 3)),
@@ -35,7 +35,7 @@ def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
             )
     for name, distortion in ONE:
         if name in keys:
-            return Calibration(_camera(path, keys, name, distortion, size))
+            return StoredCalibration(_camera(path, keys, name, distortion, size))
     return None
 
 

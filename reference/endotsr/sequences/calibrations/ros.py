@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics, distortion_of
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration, distortion_of
 from endotsr.untrusted.yaml import matrix, read_yaml
 
 ABOUT = "camera_info of ROS, FILE.yaml or a folder with left.yaml and right.yaml, metres"
@@ -18,10 +18,10 @@ MODELS = ("plumb_bob", "rational_polynomial")
 MARK = "projection_matrix"
 
 
-def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
+def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
     """One camera, or the pair of a folder. Raises InputError for another model of distortion, or no baseline."""
     if not path.is_dir():
-        return Calibration(_camera(path, keys)) if MARK in keys else None
+        return StoredCalibration(_camera(path, keys)) if MARK in keys else None
     files = [path / f"{side}.yaml" for side in ("left", "right")]
     if not all(file.is_file() for file in files):
         return None
@@ -32,7 +32,9 @@ def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
     if projection[0, 3] >= 0:
         raise InputError(f"{files[1]}: {MARK}: Tx = {projection[0, 3]:g}; allowed: below 0, -fx times the baseline")
     across = np.array([1000.0 * projection[0, 3] / projection[0, 0], 0.0, 0.0])
-    return Calibration(_camera(files[0], left), _camera(files[1], right), turns[1].T @ turns[0], turns[1].T @ across)
+    return StoredCalibration(
+        _camera(files[0], left), _camera(files[1], right), turns[1].T @ turns[0], turns[1].T @ across
+    )
 
 
 def _camera(path: Path, keys: dict[str, Any]) -> Intrinsics:

@@ -4,18 +4,18 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.sequences.calibration import read_rig
-from endotsr.sequences.calibrations.stored import Calibration, Intrinsics
+from endotsr.sequences.calibrations.stored import Intrinsics, StoredCalibration
 from endotsr.sequences.recording import Lens, opencv_matrix
 
 ABOUT = "FILE.ini with StereoLeft and StereoRight, millimetres"
 
 
-def read(path: Path, keys: dict[str, Any]) -> Calibration | None:
+def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
     """The pair of the file. Raises InputError."""
     if path.suffix.lower() != ".ini":
         return None
     rig = read_rig(path)
-    return Calibration(_stored(rig.left), _stored(rig.right), rig.rotation, rig.translation)
+    return StoredCalibration(_stored(rig.left), _stored(rig.right), rig.rotation, rig.translation)
 
 
 def _stored(lens: Lens) -> Intrinsics:

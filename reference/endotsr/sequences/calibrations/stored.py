@@ -18,7 +18,7 @@ class Intrinsics(NamedTuple):
     size: tuple[int, int] | None = None  # width, height; None: the file does not say
 
 
-class Calibration(NamedTuple):
+class StoredCalibration(NamedTuple):
     """What a file holds."""
 
     left: Intrinsics
