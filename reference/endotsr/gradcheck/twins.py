@@ -22,6 +22,7 @@ BOUND = 2e-14  # of the scale, for every output that is not in BOUNDS
 BOUNDS = {
     "objective": (1e-13, "a gradient is a sum over Gaussians and pixels in which large terms cancel"),
     "render": (1e-12, "a gradient is a sum over pixels in which large terms cancel; short needles"),
+    "training": (1e-13, "roundings of one iteration are inputs of the next"),
     "render of a long needle": (1e-5, "the definition inverts Sigma, and loses (length / width)^2 roundings"),
 }
 LONG_NEEDLE = "golden render/long_needle"  # a row of its own

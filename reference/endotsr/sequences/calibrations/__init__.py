@@ -1,8 +1,8 @@
 """Calibrations as other programs write them, one file a format.
 
 A module of `FORMATS` has a function `read`: from the path and, of a YAML file, its keys, to a `StoredCalibration`,
-or None if the file is in another format. Every format here has OpenCV's pixels, whose centres lie at integers; half a pixel is
-added to cx and cy to get this project's, whose edges do. Pairs: x_right = rotation @ x_left + translation.
+or None if the file is in another format. Every format here has OpenCV's pixels, whose centres lie at integers; half a
+pixel is added to cx and cy to get this project's, whose edges do. Pairs: x_right = rotation @ x_left + translation.
 
 Comes in: a path and the size of the pictures; goes out: a `Lens`, or a `Rig` of a pair.
 """
