@@ -29,6 +29,7 @@ FILES = sorted(file.stem for file in FOLDER.glob("*.py") if file.stem not in NOT
 NOTICED_BY_NOBODY = {
     "half = half + 1e-5": "the margin of the box: the cutoff decides",
     "constant = decay(": "rates are not annealed in `paper`; test_training.py compares the schedules of every preset",
+    "return max(1, (d.until": "no case grows to a budget; test_definition_training.py compares every iteration",
     "centres = np.array([-camera": "the extent is made of distances, which keep no sign",
     "return np.sort(squared": "the cases have one point or many; test_training.py compares two and three",
     "if k > first and count > 150": "the first frame of the cases is 0; test_training.py has another",
