@@ -33,6 +33,7 @@ myst_heading_anchors = 3
 # The notebooks (copied to docs/notebooks) are pages, and run when the book is built: at the small size of the
 # tests, or with ENDOTSR_NOTEBOOK_SIZE=full at the size of the text. ENDOTSR_DOCS_EXECUTE=0 leaves the pictures out.
 os.environ.setdefault("ENDOTSR_NOTEBOOK_SIZE", "small")
+os.environ.pop("MPLBACKEND", None)  # with a backend from outside, the pages of the notebooks have no figure
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode = "off" if os.environ.get("ENDOTSR_DOCS_EXECUTE") == "0" else "cache"
 nb_execution_raise_on_error = True

@@ -171,16 +171,17 @@ runs = {
 
 # %%
 scores = {}
-print(f"{'clip':12s} {'variant':8s} training  held out   trajectory error   at rest")
+lines = [f"{'clip':12s} {'variant':8s} training  held out   trajectory error   at rest"]
 for (name, variant), run in runs.items():
     metrics = run.evaluate()
     found = {part: metrics[part]["mean"]["psnr_tissue"] for part in ("training", "held_out")}
     motion = trajectory_error(run.model, clips[name].sequence, clips[name].true_positions)
     scores[name, variant] = found["training"], found["held_out"], motion.pixels
-    print(
+    lines.append(
         f"{name:12s} {variant:8s} {found['training']:5.2f} dB  {found['held_out']:5.2f} dB"
         f"   {motion.pixels:8.2f} px      {motion.motion_pixels:6.2f} px"
     )
+print("\n".join(lines))
 
 
 def gain(name, variant):
