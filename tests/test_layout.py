@@ -60,7 +60,7 @@ def test_equations_know_nothing_but_kernels():
 
 
 def test_the_trainer_knows_no_file_format():
-    known = {"sequences.sequence", "sequences.splits", "sequences.between", "sequences.halved"}
+    known = {"sequences.sequence", "sequences.splits", "sequences.between", "sequences.smaller"}
     assert {b for a, b in house.imports() if house.room(a) == "fitting" and house.room(b) == "sequences"} <= known
 
 

@@ -65,7 +65,7 @@ UNDIFFERENTIATED = {
         "none: it is an option of training that is not part of the paper",
     ),
     "b17": Undifferentiated(
-        ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.halved.halved"),
+        ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.smaller.halved"),
         "the choice of the frames is a constant of training",
         "tests/fitting/test_coarse_start.py",
         "none: it is an option of training that is not part of the paper",

@@ -9,11 +9,11 @@ import pytest
 from endotsr.config import DEMO, Config
 from endotsr.fitting import coarse_start
 from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.fitting.coarse_start import CHECK_EVERY, checked_frames, coarse_ends, lacking, workshop_of
+from endotsr.fitting.coarse_start import CHECK_EVERY, coarse_ends, lacking
 from endotsr.fitting.state import new_training, save_state, state_from_checkpoint
 from endotsr.fitting.trainer import train
 from endotsr.scene.gaussians import arrays
-from endotsr.sequences.halved import halved
+from endotsr.sequences.smaller import halved
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
@@ -33,7 +33,7 @@ def settings(iterations=120, **training) -> Config:
 
 def run(sequence, config, state=None):
     """The last state, and the size of the frames by iteration."""
-    state, sizes, said, saved = state or new_training(sequence, config), [], [], []
+    state, sizes, said = state or new_training(sequence, config), [], []
     step = coarse_start.workshop
 
     def watched(frames, changed):
@@ -43,18 +43,19 @@ def run(sequence, config, state=None):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(coarse_start, "workshop", watched)
         patch.setattr("endotsr.fitting.trainer.workshop", watched)
-        train(state, sequence, config, lambda entry: None, saved.append, on_message=said.append)
+        train(state, sequence, config, lambda entry: None, lambda _: None, on_message=said.append)
     return state, sizes, said
 
 
 def test_half_the_size_is_what_the_reader_makes(sequence):
-    half = halved(sequence)
+    half = halved(sequence, 0.0)
     assert (half.width, half.height, half.count) == (32, 24, 11)
     blocks = sequence.images.reshape(11, 3, 24, 2, 32, 2).mean((3, 5))
     assert np.abs(half.images - blocks).max() <= 0.5
     np.testing.assert_array_equal(half.masks, sequence.masks.reshape(11, 24, 2, 32, 2).all((2, 4)))
     assert half.cameras[0].fx == sequence.cameras[0].fx / 2 and len({id(c) for c in half.cameras}) == 1
-    odd = halved(simulate(SimulatorSettings(frames=3, width=65, height=49)).sequence)
+    assert isinstance(halved(sequence, 1e-9).images.base, np.memmap), "what does not fit lies in a file"
+    odd = halved(simulate(SimulatorSettings(frames=3, width=65, height=49)).sequence, 0.0)
     assert (odd.width, odd.height) == (32, 24)
 
 
@@ -77,25 +78,25 @@ def test_it_ends_with_the_growth_at_the_latest(sequence, monkeypatch):
 
 def test_no_coarse_start_without_the_setting_or_for_small_frames(sequence):
     assert not new_training(sequence, settings(coarse_start=False)).coarse
-    assert new_training(sequence, settings()).coarse and not new_training(halved(sequence), settings()).coarse
+    assert new_training(sequence, settings()).coarse and not new_training(halved(sequence, 0.0), settings()).coarse
 
 
 def test_a_check_changes_nothing_and_a_better_fit_has_less_error(sequence):
     config = settings()
     state = new_training(sequence, config)
-    shop = workshop_of(state, sequence, config, print)
-    frames = checked_frames(sequence)
+    start = coarse_start.coarse_start(sequence, config)
+    shop, frames = start.workshop, start.frames
     assert len(frames) == 8 and {frames[0], frames[-1]} == {sequence.train_index[0], sequence.train_index[-1]}
     before = {name: a.copy() for name, a in arrays(state.gaussians).items()}
     generator = dict(state.rng.bit_generator.state)
     state.iteration = CHECK_EVERY
-    poor = coarse_start.fit_error(state, shop.spectral, shop.config, shop.sequence, frames)
-    assert not coarse_ends(state, shop, sequence)
+    poor = coarse_start.fit_error(state, shop, frames)
+    assert not coarse_ends(state, start)
     assert all(np.array_equal(a, before[name]) for name, a in arrays(state.gaussians).items())
     assert state.rng.bit_generator.state == generator
     state.iteration = 0
     trained, *_ = run(sequence, settings(iterations=60))
-    assert coarse_start.fit_error(trained, shop.spectral, shop.config, shop.sequence, frames) < 0.95 * poor
+    assert coarse_start.fit_error(trained, shop, frames) < 0.95 * poor
 
 
 def test_what_the_half_lacks_is_the_finest_band(sequence):
@@ -106,6 +107,11 @@ def test_what_the_half_lacks_is_the_finest_band(sequence):
     checker = (np.indices((48, 64)).sum(0) % 2 * 20 + 100).astype(np.uint8)
     noisy = with_images(sequence, np.broadcast_to(checker, sequence.images.shape).copy())
     assert lacking(noisy, frames) == pytest.approx(10 / 255, rel=0.01)
+    left = np.arange(64) < 32
+    half_noisy = with_images(sequence, np.where(left, checker, 110).astype(np.uint8) + np.zeros_like(sequence.images))
+    tissue = replace(half_noisy, masks=np.broadcast_to(~left, sequence.masks.shape).copy())
+    assert lacking(tissue, frames) == pytest.approx(0, abs=1e-6), "excluded pixels do not count"
+    assert lacking(half_noisy, frames) > 4 / 255
 
 
 def with_images(sequence, images):

@@ -3,36 +3,42 @@
     e(i) = mean_k L1(render of frame k at half size)         d = mean_k mean |P_1(frame k)|  over its valid pixels
 
 P_1 is the finest band of equation (5): what the frames of half size lack. The training goes on with the full frames
-from the first check with e(i) < d on, and from `density.until` at the latest. Comes in: the state and both sequences;
-goes out: the one that the next iteration is compared with. This module changes no parameter.
+from the first check with e(i) < d on, and from `density.until` at the latest. Comes in: a state and the sequence;
+goes out: whether the next iteration is compared with the full frames. This module changes no parameter.
 """
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config
+from endotsr.equations.calibration import calibration_views
 from endotsr.equations.laplacian import laplacian_levels, support_masks
-from endotsr.fitting.model import Spectral, camera_at, render_at
+from endotsr.fitting.model import camera_at, render_at
 from endotsr.fitting.state import TrainingState, Workshop, workshop
 from endotsr.losses.masked_l1 import masked_l1_forward
-from endotsr.sequences.halved import halved
 from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.smaller import halved
 
 CHECK_EVERY = 50  # iterations between two checks
 CHECKED_FRAMES = 8  # training frames, evenly spaced, that a check renders
 
 
-def workshop_of(
-    state: TrainingState, sequence: Sequence, config: Config, on_message: Callable[[str], object]
-) -> Workshop:
-    """What the next iterations work on: frames of half size while `state.coarse`, else the sequence itself."""
-    if not state.coarse:
-        return workshop(sequence, config)
-    on_message("coarse start: frames of half size until their fit is as near to them as they are to the full frames")
-    return workshop(halved(sequence), coarse_config(config))
+class CoarseStart(NamedTuple):
+    """Constants of a coarse start."""
+
+    workshop: Workshop  # of the frames of half size
+    frames: NDArray[np.intp]  # that a check renders
+    lacking: float  # d, display units
+
+
+def coarse_start(sequence: Sequence, config: Config) -> CoarseStart:
+    """The coarse start of a training on a sequence."""
+    frames = sequence.train_index[calibration_views(len(sequence.train_index), CHECKED_FRAMES)]
+    small = workshop(halved(sequence, config.sequence.memory), coarse_config(config))
+    return CoarseStart(small, frames, lacking(sequence, frames))
 
 
 def coarse_config(config: Config) -> Config:
@@ -41,31 +47,22 @@ def coarse_config(config: Config) -> Config:
     return msgspec.structs.replace(config, loss=loss)
 
 
-def coarse_ends(state: TrainingState, coarse: Workshop, sequence: Sequence) -> bool:
+def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
     """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
-    if state.iteration >= coarse.config.density.until:
+    if state.iteration >= coarse.workshop.config.density.until:
         return True
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
         return False
-    frames = checked_frames(sequence)
-    return fit_error(state, coarse.spectral, coarse.config, coarse.sequence, frames) < lacking(sequence, frames)
+    return fit_error(state, coarse.workshop, coarse.frames) < coarse.lacking
 
 
-def checked_frames(sequence: Sequence) -> NDArray[np.intp]:
-    """The training frames that a check renders: at most CHECKED_FRAMES, evenly spaced, the first and last included."""
-    train = sequence.train_index
-    return train[np.linspace(0, len(train) - 1, min(CHECKED_FRAMES, len(train))).round().astype(np.intp)]
-
-
-def fit_error(
-    state: TrainingState, spectral: Spectral, config: Config, sequence: Sequence, frames: NDArray[np.intp]
-) -> float:
-    """e: the mean masked L1 (B6) of the renders of some frames, display units."""
+def fit_error(state: TrainingState, shop: Workshop, frames: NDArray[np.intp]) -> float:
+    """e: the mean masked L1 (B6) of the renders of some frames of a workshop, display units."""
     errors = []
     for index in map(int, frames):
-        frame = sequence.frame(index, config.training.precision)
+        frame = shop.sequence.frame(index, shop.config.training.precision)
         at = (camera_at(state.frames, frame.camera, frame.time), frame.time)
-        rendered = render_at(state.gaussians, spectral, config, *at, frames=state.frames)
+        rendered = render_at(state.gaussians, shop.spectral, shop.config, *at, frames=state.frames)
         errors.append(masked_l1_forward(rendered.colour, frame.image, frame.mask)[0])
     return float(np.mean(errors))
 

@@ -15,7 +15,7 @@ import numpy as np
 from endotsr.config import Config
 from endotsr.equations.matern import matern_penalty_forward
 from endotsr.fitting.adam import adam_update, add_array, regather
-from endotsr.fitting.coarse_start import coarse_ends, workshop_of
+from endotsr.fitting.coarse_start import coarse_ends, coarse_start
 from endotsr.fitting.divergence import Diverged, DivergenceWatch, not_finite
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
@@ -82,10 +82,14 @@ def train(
         on_message(f"calibration: training the base model to iteration {config.training.residual_activation} first")
         state.lambda_lap = calibrated_weight(sequence, config)
         on_message(f"calibration: lambda_lap = {state.lambda_lap:.4g}")
-    shop = workshop_of(state, sequence, config, on_message)
+    coarse = coarse_start(sequence, config) if state.coarse else None
+    if coarse:
+        so_long = "until their fit is as near to them as they are to the full frames"
+        on_message(f"coarse start: frames of half size {so_long}")
+    shop = coarse.workshop if coarse else workshop(sequence, config)
     while state.iteration < config.training.iterations:
-        if state.coarse and coarse_ends(state, shop, sequence):
-            state.coarse, shop = False, workshop(sequence, config)
+        if coarse and coarse_ends(state, coarse):
+            coarse, state.coarse, shop = None, False, workshop(sequence, config)
             on_message(f"coarse start: the frames have their full size after iteration {state.iteration}")
         entry = training_step(state, shop)
         on_iteration(entry)

@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.opencv import area_resize
 from endotsr.sequences.checks.guard import guarded, with_coverage
-from endotsr.sequences.depth_files import far_off, reduced_depth
+from endotsr.sequences.depth_files import far_off
 from endotsr.sequences.files import shortened
-from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction
 from endotsr.sequences.read_frames import FrameFiles, Frames, read_frames
 from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.smaller import smaller_cameras, smaller_frames
 from endotsr.sequences.splits import frame_times, split_frames
 from endotsr.sequences.world import fitting_world, moved_cameras, world_note
-from endotsr.splatting.camera import Camera, camera_centre, scale_camera
+from endotsr.splatting.camera import Camera, camera_centre
 
 LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
 FAR_OFF = 4.0  # times the usual median depth; measured medians of a sequence lie within 1.2
@@ -59,8 +58,7 @@ def assemble(
     if config.scale != 1.0:
         images, masks, depth = _scaled(images, masks, depth, config, str(folder))
         height, width = images.shape[2:]
-        scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
-        cameras = [scaled[id(camera)] for camera in cameras]
+        cameras = smaller_cameras(cameras, width, height)
         notes.append(f"scaled to {width}x{height}; tissue fraction {masks.mean():.4f}")
         if files.masks:
             at_scale = f"{files.masks[0].parent} at scale {config.scale:g}"
@@ -151,18 +149,11 @@ def _scaled(
     scale = config.scale
     if scale > 1:
         raise InputError(f"{where}: scale {scale:g}: images are only reduced; allowed: values in (0, 1]")
-    n, _, old_height, old_width = images.shape
+    old_height, old_width = images.shape[2:]
     width, height = round(old_width * scale), round(old_height * scale)
     if min(width, height) < LEAST_SIDE:
         raise InputError(
             f"{where}: scale {scale:g} makes {width}x{height} pixels of {old_width}x{old_height};"
             f" allowed: at least {LEAST_SIDE} on each side"
         )
-    store = FrameStore(n, width, height, config.memory, where)
-    small, tissue = store.array((n, 3, height, width), np.uint8), store.array((n, height, width), bool)
-    prior = store.array((n, height, width), np.float32)
-    for i in range(n):
-        small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
-        tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
-        prior[i] = reduced_depth(depth[i], width, height)
-    return small, tissue, prior
+    return smaller_frames(images, masks, depth, width, height, config.memory, where)

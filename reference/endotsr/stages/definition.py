@@ -347,7 +347,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     poses = zip(inputs["rotation_matrices"], inputs["translations"])
     cameras = [projection.Camera(*pose, *CONSTANT_LENS.values()) for pose in poses]
     extent, tape = density_control.scene_extent(config, cameras), Tape(np.zeros(0), inputs["split_noise"])
-    made = density_control.densify(gaussians, statistics, config, tape, extent, settings.get("remaining", 1))
+    made = density_control.densify(gaussians, statistics, config, tape, extent)
     parent, survivors = made.plan
     cloned, split = np.split(parent[survivors : survivors + made.cloned + made.split], [made.cloned])
     rows = np.arange(count)

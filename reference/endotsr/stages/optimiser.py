@@ -82,7 +82,7 @@ def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     moments = adam_state(arrays(gaussians))
     moments.first["opacity_logit"][:] = 1.0
     tape: Any = Tape(np.zeros(0), inputs["split_noise"])
-    made = densify(gaussians, statistics, config, tape, extent, settings.get("remaining", 1))
+    made = densify(gaussians, statistics, config, tape, extent)
     regather(moments, arrays(gaussians), made.plan.source, made.plan.survivors)
     parent = made.gaussians.harmonics[0, 0].astype(np.int64)
     rows, survivors = np.arange(count), parent.size - made.cloned - 2 * made.split

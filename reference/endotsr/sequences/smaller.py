@@ -1,0 +1,54 @@
+"""Frames at a smaller size: for `sequence.scale`, and for the coarse start (specification B17).
+
+A picture is averaged over areas, a pixel is tissue where every pixel under it is, and a depth is the mean of the known
+ones under it. Comes in: the arrays of all frames, or a `Sequence`; goes out: the same, smaller.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.sequences.depth_files import reduced_depth
+from endotsr.sequences.frame_store import FrameStore
+from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera, scale_camera
+
+
+def smaller_frames(
+    images: NDArray[np.uint8],
+    masks: NDArray[np.bool_],
+    depth: NDArray[np.float32],
+    width: int,
+    height: int,
+    memory: float,
+    where: object,
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.float32]]:
+    """Pictures (n, 3, H, W), masks and depth (n, H, W) at a smaller size; `memory` and `where` as in `FrameStore`."""
+    from endotsr.opencv import area_resize
+
+    n = len(images)
+    store = FrameStore(n, width, height, memory, where)
+    small, tissue = store.array((n, 3, height, width), np.uint8), store.array((n, height, width), bool)
+    prior = store.array((n, height, width), np.float32)
+    for i in range(n):
+        small[i] = area_resize(images[i].transpose(1, 2, 0), width, height).transpose(2, 0, 1)
+        tissue[i] = area_resize((~masks[i]).astype(np.float32), width, height) == 0
+        prior[i] = reduced_depth(depth[i], width, height)
+    return small, tissue, prior
+
+
+def smaller_cameras(cameras: list[Camera], width: int, height: int) -> list[Camera]:
+    """The cameras for smaller pictures, whose edges they keep; one object stays one object."""
+    scaled = {id(camera): scale_camera(camera, width, height) for camera in cameras}
+    return [scaled[id(camera)] for camera in cameras]
+
+
+def halved(sequence: Sequence, memory: float) -> Sequence:
+    """The same frames, times and split with floor(W/2) x floor(H/2) pixels; `memory` as in `FrameStore`."""
+    width, height = sequence.width // 2, sequence.height // 2
+    images, masks, depth = smaller_frames(
+        sequence.images, sequence.masks, sequence.depth, width, height, memory, "half size"
+    )
+    cameras = smaller_cameras(sequence.cameras, width, height)
+    return replace(sequence, images=images, masks=masks, depth=depth, cameras=cameras)
