@@ -53,6 +53,8 @@ def _reason(outcome: dict[str, Any]) -> str:
             f"puts it first among the candidates and names none: {outcome['agrees']} of {outcome['refused']} refused "
             f"outputs have its values, {outcome['differs']} have others"
         )
+    if not outcome["likeliest"]:
+        return "refuses it and names none"
     return f"names none; `{outcome['likeliest']}` comes first"
 
 

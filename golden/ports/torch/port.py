@@ -29,7 +29,10 @@ def dictionary(i, s):
 
 def appearance(i, s):
     argument = torch.einsum("cai,a->ci", i["appearance_coefficients"], i["phi_bar"])
-    return {"residual": s["beta"] / Y00 * torch.tanh(argument)}
+    e = torch.exp(-2 * argument.detach().abs())
+    slope = 4 * e / (1 + e) ** 2  # in place of torch's own 1 - tanh^2, which loses its digits far out
+    bounded = torch.tanh(argument).detach() + slope * (argument - argument.detach())
+    return {"residual": s["beta"] / Y00 * bounded}
 
 
 def motion(i, s):

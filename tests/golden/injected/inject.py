@@ -192,7 +192,7 @@ def main(words: list[str]) -> int:
             if outcome.flag == "":
                 print(f"{name}: the right port: {outcome.refused} outputs refused, named: {outcome.named or 'none'}")
             elif not outcome.right:
-                named = ", ".join(outcome.named[:3]) or f"none; {outcome.likeliest} comes first"
+                named = ", ".join(outcome.named[:3]) or f"none; {outcome.likeliest or 'none'} comes first"
                 print(f"{name}: {outcome.flag}: {outcome.refused} outputs refused, named: {named}", flush=True)
     wrong = [outcome for outcome in outcomes if outcome.flag]
     right = sum(outcome.right for outcome in wrong)
