@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 
 from endotsr.definition import deformation as definition
-from endotsr.equations.deformation import BASES, deformation_forward, deformation_reverse
+from endotsr.equations.deformation import (
+    BASES,
+    GAUSSIAN_REACH,
+    QUARTIC_REACH,
+    deformation_forward,
+    deformation_reverse,
+)
 from endotsr.equations.deformation import GAUSSIANS_PER_PIECE as PIECE
+from endotsr.equations.deformation import GAUSSIANS_PER_STRETCH as STRETCH
 from endotsr.gradcheck import all_pairs
 from oracle.complex_step import derivative
 
@@ -186,6 +193,37 @@ def test_bits_do_not_depend_on_threads(rng, basis):
         numba.set_num_threads(before)
     for a, b in zip(*results, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("basis", BASES)
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_stretches_that_no_basis_reaches_are_left_out_without_a_trace(rng, basis, dtype):
+    """Column by column nothing is left out, since a stretch that is not full is always computed: the same bits.
+
+    Centres run away from t, so that whole stretches are out of reach and others hold a single basis in reach. Near the
+    end of the reach a basis value is 2^-60: the bound must not come before it. NaN is never out of reach.
+    """
+    count = 10 * STRETCH + 3
+    weight, centre, width = arrays(rng, 2, count, dtype)
+    end = np.sqrt((QUARTIC_REACH if basis == "quartic" else GAUSSIAN_REACH) * (0.01**2 + 1e-4))
+    centre[:], width[:] = (
+        0.4 + end * np.repeat([0.999, *np.linspace(1.001, 3.0, 10)], STRETCH)[:count].astype(dtype),
+        0.01,
+    )
+    centre[:, :, 5 * STRETCH + 1], centre[2, 1, 7 * STRETCH] = 0.4, np.nan
+    d_offsets = rng.normal(size=(10, count)).astype(dtype)
+    out, saved = deformation_forward(weight, centre, width, 0.4, basis)
+    grads = deformation_reverse(d_offsets, saved)
+    used = np.any(grads.d_fdm_weight != 0, axis=(0, 1)).reshape(-1)[: 10 * STRETCH].reshape(10, STRETCH).sum(axis=1)
+    assert list(used[:8]) == [STRETCH, 0, 0, 0, 0, 1, 0, 1]
+    assert np.isnan(out[2, 7 * STRETCH])
+    for i in range(count):
+        one, alone = deformation_forward(
+            weight[..., i : i + 1], centre[..., i : i + 1], width[..., i : i + 1], 0.4, basis
+        )
+        np.testing.assert_array_equal(out[:, i : i + 1], one)
+        for whole, single in zip(grads[:3], deformation_reverse(d_offsets[:, i : i + 1], alone)[:3], strict=True):
+            np.testing.assert_array_equal(whole[..., i : i + 1], single)
 
 
 def test_inputs_that_disagree_are_refused(rng):

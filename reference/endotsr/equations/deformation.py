@@ -9,7 +9,8 @@ activation. In: three arrays (10, B, N) and one time. Out: ten offsets a Gaussia
 concern of this module.
 
 The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,
-basis) row is streamed once, in pieces that stay in the second-level cache.
+basis) row is streamed once, in pieces that stay in the second-level cache. A basis value ends at 2^-60, so that most
+bases do not reach a given time; a stretch of Gaussians of which none does is left out before its exponentials.
 """
 
 from typing import Literal, NamedTuple
@@ -28,7 +29,11 @@ CHANNELS = 10
 WIDTH_FLOOR = 1e-4  # added to width^2; keeps u finite at width 0
 SMALLEST_EXPONENT = -60.0  # a basis value below 2^-60 (below float64 rounding of 1) is exactly 0: no subnormal numbers
 LARGEST_U = 128.0  # above it the basis value is 0 for either basis; keeps u^2 finite far from the centre
+REACH_MARGIN = 1.0001  # on the bounds of u below, beyond their rounding
+QUARTIC_REACH = REACH_MARGIN * (-SMALLEST_EXPONENT / LOG2_E) ** 0.5  # u above which a basis value is 0
+GAUSSIAN_REACH = REACH_MARGIN * -2 * SMALLEST_EXPONENT / LOG2_E
 GAUSSIANS_PER_PIECE = 4096  # Gaussians in one piece of a row: long enough for the memory to be read ahead
+GAUSSIANS_PER_STRETCH = 32  # Gaussians of a piece that are left out together, where no basis reaches the time
 
 
 class DeformationSaved(NamedTuple):
@@ -116,8 +121,39 @@ def _basis_constants(real, quartic):
 _basis_constants_kernel = jit(_basis_constants)
 
 
-def _add_row(weight, centre, width, t, quartic, out):
-    """out += weight x basis value, over one piece of a row; u is (t - centre)^2 / S for either basis."""
+def _reached(centre, width, t, quartic, reached):
+    """Which stretches of a piece hold a basis that reaches t: u <= the bound at which exponents end, or NaN.
+
+    reached   (stretches,) int32, written: 0 = every basis value of the stretch is exactly 0
+    """
+    real = centre.dtype.type
+    floor, bound = real(WIDTH_FLOOR), real(QUARTIC_REACH if quartic else GAUSSIAN_REACH)
+    full = min(reached.size, centre.size // GAUSSIANS_PER_STRETCH)  # no stretch is asked for where no sum is
+    for k in range(full):
+        found = np.int32(0)
+        for lane in range(GAUSSIANS_PER_STRETCH):
+            i = k * GAUSSIANS_PER_STRETCH + lane
+            distance = t - centre[i]
+            beyond = distance * distance > bound * (width[i] * width[i] + floor)
+            found |= np.int32(not beyond)
+        reached[k] = found
+    for k in range(full, reached.size):
+        reached[k] = 1
+
+
+def _next_run(reached, k):
+    """First and last + 1 Gaussian of the next run of reached stretches, from stretch k on; equal if there is none."""
+    first = k
+    while first < reached.size and reached[first] == 0:
+        first += 1
+    stop = first
+    while stop < reached.size and reached[stop] != 0:
+        stop += 1
+    return first * GAUSSIANS_PER_STRETCH, stop * GAUSSIANS_PER_STRETCH, stop
+
+
+def _add_run(weight, centre, width, t, quartic, out):
+    """out += weight x basis value; u is (t - centre)^2 / S for either basis."""
     real = out.dtype.type
     floor, cut = real(WIDTH_FLOOR), real(SMALLEST_EXPONENT)
     scale, slope, constant, far, _ = _basis_constants_kernel(real, quartic)
@@ -131,8 +167,8 @@ def _add_row(weight, centre, width, t, quartic, out):
         out[i] += weight[i] * (real(0) if exponent < cut else value)
 
 
-def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
-    """Gradients of one piece of a row."""
+def _reverse_run(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
+    """Gradients of `_add_run`."""
     real = d_offset.dtype.type
     floor, cut = real(WIDTH_FLOOR), real(SMALLEST_EXPONENT)
     scale, slope, constant, far, factor = _basis_constants_kernel(real, quartic)
@@ -151,6 +187,34 @@ def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre
         d_weight[i] = value
         d_centre[i] = common * ratio
         d_width[i] = common * u * (width[i] * inverse)
+
+
+_reached_kernel = jit(_reached)
+_next_run_kernel = jit(_next_run)
+_add_run_kernel = jit(_add_run)
+_reverse_run_kernel = jit(_reverse_run)
+
+
+def _add_row(weight, centre, width, t, quartic, out):
+    """out += weight x basis value, over one piece of a row; stretches that no basis reaches are left out."""
+    reached = np.empty((out.size + GAUSSIANS_PER_STRETCH - 1) // GAUSSIANS_PER_STRETCH, np.int32)
+    _reached_kernel(centre, width, t, quartic, reached)
+    a, b, k = _next_run_kernel(reached, 0)
+    while a < b:
+        _add_run_kernel(weight[a:b], centre[a:b], width[a:b], t, quartic, out[a:b])
+        a, b, k = _next_run_kernel(reached, k)
+
+
+def _reverse_row(weight, centre, width, t, quartic, d_offset, d_weight, d_centre, d_width):
+    """Gradients of one piece of a row; exactly 0 in the stretches that `_add_row` leaves out."""
+    reached = np.empty((d_offset.size + GAUSSIANS_PER_STRETCH - 1) // GAUSSIANS_PER_STRETCH, np.int32)
+    _reached_kernel(centre, width, t, quartic, reached)
+    d_weight[:], d_centre[:], d_width[:] = 0, 0, 0
+    a, b, k = _next_run_kernel(reached, 0)
+    while a < b:
+        inputs = (weight[a:b], centre[a:b], width[a:b], t, quartic, d_offset[a:b])
+        _reverse_run_kernel(*inputs, d_weight[a:b], d_centre[a:b], d_width[a:b])
+        a, b, k = _next_run_kernel(reached, k)
 
 
 add_row = jit(_add_row)
