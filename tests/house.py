@@ -134,6 +134,17 @@ def _count(file: Path) -> int:
     return len(file.read_text(encoding="utf-8").splitlines())
 
 
+def untyped(root: Path = ROOT) -> dict[str, int]:
+    """Lines that name `dict[str, Any]`, by room: data whose keys the reader must look up elsewhere."""
+    package, found = root / "reference" / "endotsr", {}
+    for file in package.rglob("*.py"):
+        count = sum("dict[str, Any]" in line for line in file.read_text(encoding="utf-8").splitlines())
+        if count:
+            first = file.relative_to(package).parts[0].removesuffix(".py")
+            found[first] = found.get(first, 0) + count
+    return found
+
+
 def settings(root: Path = ROOT) -> list[str]:
     """Every key of the configuration, as section.name; one that stands outside the sections by its name alone."""
     sections = {node.name: node for node in modules(root)["config"].body if isinstance(node, ast.ClassDef)}
@@ -174,6 +185,8 @@ def main(root: Path) -> None:
     print(f"functions above {LONGEST_FUNCTION} lines: {len(long)}")
     for f in sorted(long, key=lambda f: -f.lines):
         print(f"    {f.lines:4d} {f.name}")
+    loose = untyped(root)
+    print(f"lines with dict[str, Any]: {sum(loose.values())}:", ", ".join(f"{name} {n}" for name, n in loose.items()))
     up, round_ = upward(root), circles(root)
     print("imports that run up:", len(up), *up, sep="\n    ")
     print("circles:", len(round_), *round_, sep="\n    ")

@@ -85,6 +85,11 @@ def test_what_is_fitted_does_not_know_the_optimiser(name):
     assert not [b for a, b in house.imports() if house.room(a) == name and house.room(b) == "fitting"]
 
 
+def test_data_between_rooms_is_typed():
+    """The number of lines with `dict[str, Any]` only falls: set it lower where a change makes it lower."""
+    assert sum(house.untyped().values()) <= 262, house.untyped()
+
+
 def test_settings_and_commands_are_counted():
     """Read from the sources, they are those that the package has."""
     from endotsr.cli.main import COMMANDS

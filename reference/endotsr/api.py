@@ -46,6 +46,7 @@ from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
 from endotsr.runs.records import new_record
+from endotsr.sequences.record import SequenceRecord, nearest_frame, record_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
 
 Component = Literal["appearance", "spectral_motion"]
-RENDERING = ("names", "times", "train_index", "cameras", "static_camera")  # keys of sequence.json that it reads
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
 OnIteration = Callable[[dict[str, Any]], object]
 OnMessage = Callable[[str], object]
@@ -175,7 +175,7 @@ def train(
     about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)
     record = new_record(["endotsr.train"], config, threads, about) | found
-    seen = sources.sequence_record(sequence)
+    seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message)
 
@@ -228,7 +228,7 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
     model = load_model(folder)
     log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]
     given = "" if sequence is None else str(sequence)
-    return Run(model.config, folder.record(), folder.sequence_record(*RENDERING), log, model, given, _folder=folder)
+    return Run(model.config, folder.record(), folder.sequence_record(), log, model, given, _folder=folder)
 
 
 @dataclass(eq=False, repr=False)
@@ -237,7 +237,7 @@ class Run:
 
     config: Config  # all settings
     record: dict[str, Any]  # what run.json holds: versions, machine, input hashes, status, seconds
-    sequence_record: dict[str, Any]  # what sequence.json holds: times, names, split, cameras
+    sequence_record: SequenceRecord  # sequence.json: times, names, split, cameras
     log: list[dict[str, Any]]  # one entry an iteration, as the lines of log.jsonl
     model: Model  # Gaussians, spectral constants, settings and iteration: all that rendering reads
     _source: str  # where the sequence is; "" = where the record says
@@ -389,23 +389,21 @@ class Run:
         if isinstance(camera, Camera):
             return camera
         record = self.sequence_record
-        cameras = corrected_cameras(self.model.frames, sources.remembered_cameras(record), record["times"])
+        cameras = corrected_cameras(self.model.frames, record.frame_cameras, record.times)
         if camera is None:
-            return cameras[sources.nearest_frame(record["times"], time)]
+            return cameras[nearest_frame(record.times, time)]
         if not isinstance(camera, Integral) or not 0 <= int(camera) < len(cameras):
             allowed = f"a Camera, or a frame from 0 to {len(cameras) - 1}"
             raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
         return cameras[int(camera)]
 
 
-def _model_of(state: "TrainingState", config: Config, record: dict[str, Any]) -> Model:
+def _model_of(state: "TrainingState", config: Config, record: SequenceRecord) -> Model:
     """The model of a state; `record` is that of the sequence."""
-    import numpy as np
-
     from endotsr.fitting.model import spectral_from
 
-    times = np.asarray(record["times"])[record["train_index"]]
-    return Model(state.gaussians, spectral_from(config.model, times), config, state.iteration, state.frames)
+    spectral = spectral_from(config.model, record.train_times)
+    return Model(state.gaussians, spectral, config, state.iteration, state.frames)
 
 
 def _changed(config: Config, iterations: int | None, sections: Mapping[str, Mapping[str, Any]]) -> Config:

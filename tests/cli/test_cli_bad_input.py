@@ -6,6 +6,8 @@ from tiny import SETTINGS, assert_refused, run_line, train_words, written_folder
 
 from endotsr.opencv import read_png, write_png
 from endotsr.runs.folder import create_run
+from endotsr.sequences.record import SequenceRecord, recorded
+from endotsr.splatting.camera import Camera
 
 
 def refused(capsys, folder, *named, more=()):
@@ -129,7 +131,11 @@ def test_folder_that_cannot_be_written(tmp_path, capsys):
 def test_render_refuses_times_and_existing_output(tmp_path, capsys):
     from endotsr.config import PAPER
 
-    record = {"names": ["a", "b"], "times": [0.0, 0.5], "train_index": [0], "test_index": [1]}
+    camera = Camera(np.eye(3), np.zeros(3), 50.0, 50.0, 24.0, 16.0, 48, 32)
+    record = SequenceRecord(
+        unit="mm", largest_depth=9.0, static_camera=True, names=["a", "b"], times=[0.0, 0.5], train_index=[0],
+        test_index=[1], cameras=recorded([camera]),
+    )  # fmt: skip
     create_run(tmp_path / "run", PAPER, {}, record)
     words = ["render", str(tmp_path / "run"), "--out", str(tmp_path / "out")]
     assert_refused(capsys, [*words, "--times", "1.5"], "1.5", "[0, 1]")

@@ -70,7 +70,7 @@ def test_render_without_a_component_differs(finished_run, tmp_path):
 
 def test_depth_pictures_keep_a_known_step():
     depth = np.array([[0.0, 50.0], [99.9, np.nan]])
-    step = depth_step({"largest_depth": 80.0}, depth)
+    step = depth_step(80.0, depth)
     assert np.log2(step) == round(np.log2(step))
     stored = depth_bytes(depth, step)
     assert stored[0, 0] == 0 and stored[1, 1] == 0

@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 
+import msgspec
 import numpy as np
 import pytest
 from tiny import assert_refused
@@ -15,20 +16,26 @@ from endotsr.errors import InputError
 from endotsr.runs import files, machine
 from endotsr.runs import folder as runs
 from endotsr.runs.log import RunLog
-from endotsr.runs.sources import remembered_cameras, sequence_record
+from endotsr.sequences.record import SequenceRecord, read_sequence_record, record_of, recorded
 from endotsr.simulator.settings import CameraMotion, SimulatorSettings
 from endotsr.simulator.simulate import simulate
+from endotsr.splatting.camera import Camera
+
+ONE_FRAME = SequenceRecord(
+    unit="mm", largest_depth=9.0, static_camera=True, names=["a"], times=[0.0], train_index=[0], test_index=[],
+    cameras=recorded([Camera(np.eye(3), np.zeros(3), 50.0, 50.0, 24.0, 16.0, 48, 32)]),
+)  # fmt: skip
 
 
 def created(path):
-    return runs.create_run(path, PAPER, {"seed": 0}, {"names": []})
+    return runs.create_run(path, PAPER, {"seed": 0}, ONE_FRAME)
 
 
 def test_new_folder_reads_back(tmp_path):
     folder = created(tmp_path / "a" / "run")
     again = runs.open_run(tmp_path / "a" / "run")
     assert again == folder and again.config() == PAPER
-    assert again.record() == {"seed": 0} and again.sequence_record() == {"names": []}
+    assert again.record() == {"seed": 0} and again.sequence_record() == ONE_FRAME
     assert folder.log.read_bytes() == b""
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["run"]
 
@@ -213,11 +220,12 @@ def test_a_random_state_of_another_generator_is_one_line(finished_run, tmp_path,
 def test_cameras_are_remembered_to_the_last_bit(moving, tmp_path):
     settings = SimulatorSettings(width=32, height=24, frames=9, camera_motion=CameraMotion(on=moving))
     sequence = simulate(settings).sequence
-    files.write_json(tmp_path / "sequence.json", sequence_record(sequence))
-    record = json.loads((tmp_path / "sequence.json").read_text())
-    cameras = remembered_cameras(record)
-    assert len(cameras) == 9 and len(record["cameras"]) == (9 if moving else 1)
+    files.write_json(tmp_path / "sequence.json", msgspec.to_builtins(record_of(sequence)))
+    record = read_sequence_record(tmp_path / "sequence.json")
+    cameras = record.frame_cameras
+    assert record == record_of(sequence)
+    assert len(cameras) == 9 and len(record.cameras) == (9 if moving else 1)
     for camera, remembered in zip(sequence.cameras, cameras, strict=True):
         for a, b in zip(camera, remembered, strict=True):
             assert np.array_equal(a, b)
-    assert record["times"] == sequence.times.tolist() and record["test_index"] == sequence.test_index.tolist()
+    assert record.times == sequence.times.tolist() and record.test_index == sequence.test_index.tolist()

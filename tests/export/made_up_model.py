@@ -9,6 +9,7 @@ from endotsr.fitting.model import spectral_from
 from endotsr.runs.model import Model
 from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import FrameParameters
+from endotsr.sequences.record import SequenceRecord, recorded
 from endotsr.splatting.camera import Camera
 
 CAMERA = Camera(np.eye(3), np.zeros(3), 60.0, 60.0, 32.0, 24.0, 64, 48)
@@ -31,10 +32,9 @@ def moving_scene(count=80, seed=0, exposure=False, frames=4):
     config = msgspec.structs.replace(PAPER, model=model)
     times = [k / frames for k in range(frames)]
     exposures = FrameParameters(np.array([0.0, 0.5, 0.75]), normal(3, 3, scale=0.1), normal(3, 3, scale=0.1))
-    entry = CAMERA._asdict() | {"rotation": np.eye(3).tolist(), "translation": [0.0, 0.0, 0.0]}
-    record = {
-        "unit": "mm", "largest_depth": 15.0, "static_camera": True, "times": times,
-        "names": [f"frame {k}" for k in range(frames)], "train_index": [0, 2, 3], "test_index": [1], "cameras": [entry],
-    }  # fmt: skip
+    record = SequenceRecord(
+        unit="mm", largest_depth=15.0, static_camera=True, times=times, names=[f"frame {k}" for k in range(frames)],
+        train_index=[0, 2, 3], test_index=[1], cameras=recorded([CAMERA]),
+    )  # fmt: skip
     spectral = spectral_from(config.model, np.array(times)[[0, 2, 3]])
     return MovingScene(record, Model(gaussians, spectral, config, 7, exposures if exposure else None))

@@ -2,6 +2,7 @@
 
 import json
 
+import msgspec
 import numpy as np
 import pytest
 from made_up_model import CAMERA, moving_scene
@@ -14,6 +15,7 @@ from endotsr.export.ply import read_gaussians
 from endotsr.export.scene import MovingScene, open_scene
 from endotsr.export.times import Times
 from endotsr.scene.gaussians import Gaussians
+from endotsr.sequences.record import recorded
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.harmonics import harmonics_forward
 from endotsr.splatting.render import Scene
@@ -49,9 +51,9 @@ def scene_seen_by(pose) -> MovingScene:
         *(np.ascontiguousarray(a, np.float32) for a in (placed.position, placed.quaternion, placed.log_scale)),
         placed.opacity_logit, placed.harmonics,
     )  # fmt: skip
-    entry = made.record["cameras"][0] | {"rotation": rotation.tolist(), "translation": translation.tolist()}
+    cameras = recorded([CAMERA._replace(rotation=rotation, translation=translation)])
     model = made.model._replace(gaussians=gaussians)
-    return MovingScene(made.record | {"cameras": [entry]}, model)
+    return MovingScene(msgspec.structs.replace(made.record, cameras=cameras), model)
 
 
 def plain() -> Scene:

@@ -28,10 +28,9 @@ from endotsr.fitting.checkpoint import load_checkpoint
 from endotsr.fitting.model import corrected, corrected_cameras, render_at, spectral_from, with_corrected_cameras
 from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, workshop
 from endotsr.fitting.trainer import train, training_step
-from endotsr.runs.files import finite
 from endotsr.runs.model import Model
-from endotsr.runs.sources import remembered_cameras, sequence_record
 from endotsr.scene.parameters import Pose, exposure_of, trained
+from endotsr.sequences.record import record_of
 from endotsr.simulator.settings import Brightening, GainDrift, Highlights, SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
@@ -277,12 +276,12 @@ def test_a_camera_that_does_not_move_is_refused():
 
 def test_a_slim_model_holds_the_corrected_cameras_and_no_correction(disturbed, runs, tmp_path):
     config = settings("pose", True)
-    record = finite(sequence_record(disturbed))
+    record = record_of(disturbed)
     save_slim_model(tmp_path / "a.npz", model_of(runs["pose", True], disturbed, config), record)
     slim = load_slim_model(tmp_path / "a.npz")
     wanted = corrected_cameras(runs["pose", True].frames, disturbed.cameras, disturbed.times)
     assert slim.model.frames is None
-    for found, camera, given in zip(remembered_cameras(slim.record), wanted, disturbed.cameras, strict=True):
+    for found, camera, given in zip(slim.record.frame_cameras, wanted, disturbed.cameras, strict=True):
         np.testing.assert_array_equal(found.rotation, camera.rotation)
         np.testing.assert_array_equal(found.translation, camera.translation)
         assert not np.array_equal(found.translation, given.translation)

@@ -182,35 +182,31 @@ def read_checkpoint(path: Path) -> object:
 @cache
 def sequence_seeds() -> list[bytes]:
     """sequence.json of a static camera, and of one that moves."""
-    from endotsr.runs.files import finite
-    from endotsr.runs.sources import sequence_record
+    from endotsr.sequences.record import record_of
 
     _, sequence, _ = _tiny()
-    record = finite(sequence_record(sequence))
+    record = msgspec.to_builtins(record_of(sequence))
     moving = record | {"static_camera": False, "cameras": record["cameras"] * 9}
     return [json.dumps(record).encode(), json.dumps(moving).encode()]
 
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.export.scene import RECORD
     from endotsr.export.times import Times
     from endotsr.runs.folder import RunFolder
-    from endotsr.runs.sources import remembered_cameras
     from endotsr.views.plan import ViewRequest, check_request, views_of
 
     folder = RunFolder(path.parent)
-    record = folder.sequence_record("names", "times", "train_index", "test_index")
+    record = folder.sequence_record()
     requests = ViewRequest(Times(frames="all")), ViewRequest(Times(count=3), camera="sway", size="20x20")
     for request in requests:
         check_request(request, record)
-    folder.sequence_record(*RECORD)  # as the model asks when it is loaded
     for request in requests:
-        for view in views_of(request, record, remembered_cameras(record), pivot_depth=50.0):
+        for view in views_of(request, record, record.frame_cameras, pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
             assert view.camera.width > 0
-    return np.array(record["times"])[record["train_index"]]
+    return record.train_times
 
 
 @cache

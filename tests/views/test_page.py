@@ -139,8 +139,7 @@ def test_a_still_scene_is_drawn_too(tmp_path):
     export(scene, tmp_path / "a.ply")
     still = open_scene(tmp_path / "a.ply")
     write_page(tmp_path / "a.html", still, "still", 8)
-    camera = CAMERA._replace(**{k: still.record["cameras"][0][k] for k in ("fx", "fy", "cx", "cy", "width", "height")},
-                             translation=np.array(still.record["cameras"][0]["translation"]))  # fmt: skip
+    (camera,) = still.record.frame_cameras
     assert psnr(drawn(tmp_path / "a.html", "t=0"), bytes_image(still.render(0.0, camera).colour)) > AT_A_KEY
 
 
@@ -184,7 +183,7 @@ def keys_pressed(file, *keys):
 
 
 def test_keys_play_turn_and_change_the_frame(opened):
-    times = opened[0].record["times"]
+    times = opened[0].record.times
     said = keys_pressed(opened[1], ".", ",", ",", "ArrowLeft", "0", "+", "x", " ", " ")
     assert [time for time, _, _ in said[:3]] == [f"frame {i} of 64, t = {times[i - 1]:.3f}" for i in (2, 1, 64)]
     assert [view.split(",")[0] for _, view, _ in said[2:7]] == [

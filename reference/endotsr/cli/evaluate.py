@@ -193,11 +193,11 @@ def _write(
     view: bool,
 ) -> None:
     """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""
-    from endotsr.export.scene import RECORD, MovingScene
+    from endotsr.export.scene import MovingScene
     from endotsr.report.run_files import write_evaluation
     from endotsr.views.page import RUN_PAGE, write_run_page
     from endotsr.views.preview import preview
 
-    scene = MovingScene(folder.sequence_record(*RECORD), model, folder)
+    scene = MovingScene(folder.sequence_record(), model, folder)
     write_run_page(folder.path, scene, sequence if view else None)
     write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")

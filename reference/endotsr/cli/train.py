@@ -167,7 +167,7 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     kept = folder.config()
     remembered, simulator = run_source(folder)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
-    frames = len(folder.sequence_record("train_index")["train_index"])
+    frames = len(folder.sequence_record().train_index)
     asked = asked_settings(TrainOptions, words, lengthened(_settings(options), frames), kept)
     extended = asked.training.iterations > kept.training.iterations
     allowed = RESUMABLE | ({"training.iterations"} if extended else set())

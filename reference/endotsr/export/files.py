@@ -78,8 +78,7 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
         raise InputError(f"{out}: a .ply file is one moment, a slim model a whole scene; allowed: of a run folder")
     refuse_unwritable(out)
     model = scene.model
-    record = scene.record if scene.folder is None else scene.folder.sequence_record("largest_depth")
-    save_slim_model(out, model, record)
+    save_slim_model(out, model, scene.record)
     size = out.stat().st_size
     whole = scene.folder.checkpoint.stat().st_size if scene.folder else None
     compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
@@ -109,7 +108,7 @@ def _every_time(scene: MovingScene, out: Path, times: Times, content: Content) -
 
 def _write(scene: MovingScene, file: Path, time: float, content: Content) -> int:
     """One ply file; returns the number of its Gaussians, points or triangles."""
-    unit = scene.record.get("unit", "scene units")
+    unit = scene.record.unit
     comments = (f"endotsr {content.kind}", f"time {time!r}", f"lengths in {unit}", AXES)
     placement = scene.placement
     if content.kind == "mesh":

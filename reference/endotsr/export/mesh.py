@@ -57,7 +57,7 @@ def surface(scene: MovingScene, time: float, voxel: float | None = None, taken_o
     Raises: InputError without scikit-image, without a surface, or for a voxel that is too small.
     """
     cameras = scene.cameras
-    chosen = cameras[:1] if scene.record["static_camera"] else cameras[:: -(-len(cameras) // MOST_VIEWS)]
+    chosen = cameras[:1] if scene.record.static_camera else cameras[:: -(-len(cameras) // MOST_VIEWS)]
     return fused([depth_view(scene, time, camera, taken_out) for camera in chosen], voxel)
 
 

@@ -20,10 +20,9 @@ from endotsr.errors import InputError
 from endotsr.fitting.model import corrected_cameras, spectral_from
 from endotsr.runs.files import replace_file
 from endotsr.runs.model import Model
-from endotsr.runs.records import check_sequence_record
-from endotsr.runs.sources import remembered_cameras
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, pose_at, trained
+from endotsr.sequences.record import SequenceRecord, checked_record, recorded
 from endotsr.untrusted.arrays import RefusedArray, open_npz
 from endotsr.untrusted.json import integer, parsed
 
@@ -32,7 +31,6 @@ VERSION = 1
 HEADER = "header"
 LARGEST_FILE = 1 << 33  # bytes of all arrays together
 KEPT_WHOLE = ("gaussians.position",)  # float32
-RECORD = ("unit", "largest_depth", "static_camera", "names", "times", "train_index", "test_index", "cameras")
 HALF = np.finfo(np.float16)
 
 
@@ -40,10 +38,10 @@ class SlimModel(NamedTuple):
     """A model and the record of its sequence (sequence.json)."""
 
     model: Model
-    record: dict[str, Any]
+    record: SequenceRecord
 
 
-def save_slim_model(path: Path, model: Model, record: dict[str, Any]) -> None:
+def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
     """Write a slim model; the file appears whole or not at all, and equal models give equal bytes.
 
     record   sequence.json
@@ -55,7 +53,7 @@ def save_slim_model(path: Path, model: Model, record: dict[str, Any]) -> None:
         "version": VERSION,
         "iteration": model.iteration,
         "config": msgspec.to_builtins(model.config),
-        "sequence": {key: record[key] for key in RECORD} | {"cameras": _cameras(model, record)},
+        "sequence": msgspec.to_builtins(_with_corrected_cameras(record, model)),
         "frame_times": None if exposures is None else exposures.times.tolist(),
     }
     entries = {f"gaussians.{name}": a for name, a in arrays(model.gaussians).items()}
@@ -94,23 +92,15 @@ def load_slim_model(path: Path) -> SlimModel:
     for key in ("iteration", "config", "sequence", "frame_times"):
         if key not in header:
             raise InputError(f"{path}: header: {key} is missing")
-    record = _record(header["sequence"], path)
+    record = checked_record(header["sequence"], f"{path}: header", "sequence.")
     config = config_from_dict(header["config"], str(path))
     gaussians = _gaussians(entries, path)
     frames = _frames(entries, header["frame_times"], path)
     if entries:
         raise InputError(f"{path}: {next(iter(entries))} is foreign to a slim model")
-    spectral = spectral_from(config.model, np.array(record["times"], np.float64)[record["train_index"]])
+    spectral = spectral_from(config.model, record.train_times)
     iteration = integer(header["iteration"], f"{path}: header: iteration", low=0)
     return SlimModel(Model(gaussians, spectral, config, iteration, frames), record)
-
-
-def _record(record: Any, path: Path) -> dict[str, Any]:
-    for key in RECORD:
-        if not isinstance(record, dict) or key not in record:
-            raise InputError(f"{path}: header: sequence.{key} is missing")
-    check_sequence_record(record, path)
-    return record
 
 
 def _gaussians(entries: dict[str, NDArray], path: Path) -> Gaussians:
@@ -152,13 +142,12 @@ def _exposures(frames: FrameParameters | None) -> FrameParameters | None:
     return frames._replace(pose_rotation=None, pose_translation=None)
 
 
-def _cameras(model: Model, record: dict[str, Any]) -> list[dict[str, Any]]:
-    """The entries of `cameras` with the corrections of the model."""
+def _with_corrected_cameras(record: SequenceRecord, model: Model) -> SequenceRecord:
+    """The record with the cameras that the model has corrected."""
     if pose_at(model.frames, 0.0) is None:
-        return record["cameras"]
-    cameras = corrected_cameras(model.frames, remembered_cameras(record), record["times"])
-    vectors = ("rotation", "translation")
-    return [c._asdict() | {name: getattr(c, name).tolist() for name in vectors} for c in cameras]
+        return record
+    cameras = corrected_cameras(model.frames, record.frame_cameras, record.times)
+    return msgspec.structs.replace(record, cameras=recorded(cameras))
 
 
 def _frames(entries: dict[str, NDArray], times: Any, path: Path) -> FrameParameters | None:

@@ -6,7 +6,6 @@ A ply file is one moment: its scene does not move, and it is seen by a camera th
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -20,8 +19,8 @@ from endotsr.fitting.model import corrected_cameras, render_at, scene_at, spectr
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.runs.model import Model, load_model
-from endotsr.runs.sources import remembered_cameras
 from endotsr.scene.gaussians import Gaussians
+from endotsr.sequences.record import SequenceRecord, recorded
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut, Scene
 
@@ -30,7 +29,6 @@ MARGIN = 1.1  # of its picture around the Gaussians
 SIDE = 512  # pixels of its picture
 NEAR = 0.01  # distances of the camera: its near plane
 STILL = ModelConfig(appearance=False, spectral_motion=False, deformation=False)
-RECORD = ("unit", "static_camera", "names", "times", "train_index", "test_index", "cameras")  # keys that are read
 COMPONENTS = ("appearance", "spectral_motion")
 
 
@@ -38,25 +36,23 @@ COMPONENTS = ("appearance", "spectral_motion")
 class MovingScene:
     """The record of a sequence (sequence.json) and the model of it, which a run folder gives at its first use."""
 
-    record: dict[str, Any]
+    record: SequenceRecord
     loaded: Model | None = None
     folder: RunFolder | None = None
     one_time: bool = False  # of a ply file, which has the axes of the outputs
 
     @cached_property
     def model(self) -> Model:
-        """Raises: InputError if the run has no usable checkpoint, or an incomplete record."""
+        """Raises: InputError if the run has no usable checkpoint."""
         if self.loaded is not None:
             return self.loaded
         assert self.folder is not None
-        model = load_model(self.folder)
-        self.folder.sequence_record(*RECORD)
-        return model
+        return load_model(self.folder)
 
     @cached_property
     def cameras(self) -> list[Camera]:
         """The cameras of the frames, with the corrections of the model."""
-        return corrected_cameras(self.model.frames, remembered_cameras(self.record), self.record["times"])
+        return corrected_cameras(self.model.frames, self.record.frame_cameras, self.record.times)
 
     @property
     def placement(self) -> Placement:
@@ -90,7 +86,7 @@ def open_scene(path: Path) -> MovingScene:
     if path.is_file():
         raise InputError(f"{path}: not a scene; allowed: a run folder, a slim model (.npz) or a 3DGS file (.ply)")
     folder = open_run(path)
-    return MovingScene(folder.sequence_record("names", "times", "train_index", "test_index"), folder=folder)
+    return MovingScene(folder.sequence_record(), folder=folder)
 
 
 def _from_ply(path: Path) -> MovingScene:
@@ -102,16 +98,10 @@ def _from_ply(path: Path) -> MovingScene:
         model=msgspec.structs.replace(STILL, harmonics_degree=round(len(gaussians.harmonics) ** 0.5) - 1),
         raster=msgspec.structs.replace(PAPER.raster, near=NEAR * distance),
     )
-    record = {
-        "unit": "scene units",
-        "largest_depth": 2 * distance,
-        "static_camera": True,
-        "names": [path.stem],
-        "times": [0.0],
-        "train_index": [0],
-        "test_index": [0],
-        "cameras": [camera._asdict() | {name: getattr(camera, name).tolist() for name in ("rotation", "translation")}],
-    }
+    record = SequenceRecord(
+        unit="scene units", largest_depth=2 * distance, static_camera=True, names=[path.stem], times=[0.0],
+        train_index=[0], test_index=[0], cameras=recorded([camera]),
+    )  # fmt: skip
     model = Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0)
     return MovingScene(record, model, one_time=True)
 

@@ -3,10 +3,10 @@
 In: the choice and the record of the sequence (sequence.json). Out: times with the nearest frame and a name.
 """
 
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from endotsr.errors import InputError
-from endotsr.runs.sources import nearest_frame
+from endotsr.sequences.record import SequenceRecord, nearest_frame
 
 
 class Times(NamedTuple):
@@ -23,7 +23,7 @@ class Times(NamedTuple):
 
 
 def chosen_times(
-    command: str, request: Times, record: dict[str, Any], default: str = "test"
+    command: str, request: Times, record: SequenceRecord, default: str = "test"
 ) -> list[tuple[float, int, str, bool]]:
     """Time, nearest frame, name, and whether it is the time of that frame.
 
@@ -39,12 +39,12 @@ def chosen_times(
         for time in times:
             if not 0.0 <= time <= 1.0:
                 raise InputError(f"{command}: --times {time:g} is not allowed; allowed: times in [0, 1]")
-        known = record["times"]
+        known = record.times
         nearest = [nearest_frame(known, t) for t in times]
         return [(t, i, f"{k:05d}", known[i] == t) for k, (t, i) in enumerate(zip(times, nearest))]
-    every = range(len(record["names"]))
-    chosen = {"test": record["test_index"], "train": record["train_index"], "all": every}[request.frames or default]
-    return [(record["times"][i], i, record["names"][i], True) for i in chosen]
+    every = range(record.count)
+    chosen = {"test": record.test_index, "train": record.train_index, "all": every}[request.frames or default]
+    return [(record.times[i], i, record.names[i], True) for i in chosen]
 
 
 def _even(command: str, count: int) -> list[float]:

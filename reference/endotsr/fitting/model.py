@@ -7,6 +7,7 @@ A component whose arrays are None is not evaluated and gets no gradient array. I
 `Scene` that the rasteriser takes, or gradients by field name.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -203,7 +204,7 @@ def corrected_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> 
     return Pose(grads.d_rotation_vector, grads.d_offset)
 
 
-def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], times: FloatArray) -> list[Camera]:
+def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], times: Iterable[float]) -> list[Camera]:
     """The cameras of frames at their times with the corrections of a model; those given if the model has none."""
     return [camera_at(frames, camera, float(t)) for camera, t in zip(cameras, times, strict=True)]
 

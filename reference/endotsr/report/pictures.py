@@ -1,7 +1,5 @@
 """Rendered planes as whole numbers for PNG files."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,9 +19,9 @@ def grey_bytes(plane: FloatArray) -> NDArray[np.uint8]:
     return np.rint(np.clip(np.nan_to_num(plane), 0, 1) * 255).astype(np.uint8)
 
 
-def depth_step(record: dict[str, Any], depth: FloatArray) -> float:
+def depth_step(largest_depth: float, depth: FloatArray) -> float:
     """Scene units of one step of a 16-bit depth picture: a power of two that leaves headroom, one for all views."""
-    largest = max(float(record.get("largest_depth", 0.0)), float(np.nan_to_num(depth).max()), 1e-6) * DEPTH_HEADROOM
+    largest = max(largest_depth, float(np.nan_to_num(depth).max()), 1e-6) * DEPTH_HEADROOM
     return float(2.0 ** np.ceil(np.log2(largest / DEPTH_LEVELS)))
 
 

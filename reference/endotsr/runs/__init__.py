@@ -4,6 +4,6 @@ folder    the folder and its records          log       log.jsonl, cut at the ch
 files     files replaced whole, or refused    machine   versions, processor, memory, time
 sources   sequences by name: a folder, or `simulated`; the only module that imports both readers and simulator
 model     checkpoint -> model or training     training  a training that fills the folder
-records   what run.json and sequence.json may say     diverged  the state before an iteration that was not finite
+records   what run.json may say                      diverged  the state before an iteration that was not finite
 stopping  signals, deferred while an iteration finishes
 """

@@ -21,10 +21,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+import msgspec
+
 from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, replacing_folder, write_json
-from endotsr.runs.records import check_run_record, check_sequence_record
+from endotsr.runs.records import check_run_record
+from endotsr.sequences.record import SequenceRecord, read_sequence_record
 
 
 class RunBusy(InputError):
@@ -68,12 +71,9 @@ class RunFolder:
         check_run_record(record, path)
         return record
 
-    def sequence_record(self, *needed: str) -> dict[str, Any]:
-        """sequence.json, checked. Raises InputError if one of the `needed` keys is missing."""
-        path = self.path / "sequence.json"
-        record = read_json(path, needed)
-        check_sequence_record(record, path)
-        return record
+    def sequence_record(self) -> SequenceRecord:
+        """sequence.json, read anew and checked. Raises InputError as `checked_record`."""
+        return read_sequence_record(self.path / "sequence.json")
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -127,7 +127,7 @@ def refuse_existing(path: Path) -> None:
     refuse_folder(path)
 
 
-def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: dict[str, Any]) -> RunFolder:
+def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: SequenceRecord) -> RunFolder:
     """A new run folder, filled beside its final name and then renamed: it never exists half-written.
 
     Raises:  InputError if `path` exists or the file system refuses (nothing stays behind).
@@ -139,7 +139,7 @@ def create_run(path: Path, config: Config, record: dict[str, Any], sequence_reco
         with replacing_folder(path, replace=False) as folder:
             (folder / "config.toml").write_text(config_to_toml(config), encoding="utf-8", newline="\n")
             write_json(folder / "run.json", record)
-            write_json(folder / "sequence.json", sequence_record)
+            write_json(folder / "sequence.json", msgspec.to_builtins(sequence_record))
             (folder / "log.jsonl").touch()
     except OSError as error:
         raise InputError(os_error_line(error, path)) from None

@@ -42,20 +42,15 @@ class Model(NamedTuple):
 
 def load_model(folder: RunFolder) -> Model:
     """The model of the latest checkpoint. Raises InputError if there is none, it is damaged or of other settings."""
-    import numpy as np
-
     from endotsr.fitting.model import spectral_from
 
     if not folder.has_checkpoint:
         raise InputError(
             f"{folder.path}: no checkpoint yet; continue the run with `endotsr train --out {folder.path} --resume`"
         )
-    config, record = folder.config(), folder.sequence_record("times", "train_index")
+    config, record = folder.config(), folder.sequence_record()
     checkpoint, _ = _checkpoint_of(folder, config)
-    if not record["train_index"]:
-        raise InputError(f"{folder.path / 'sequence.json'}: train_index: holds no frame; allowed: at least one")
-    times = np.array(record["times"])[record["train_index"]]
-    spectral = spectral_from(config.model, times)
+    spectral = spectral_from(config.model, record.train_times)
     return Model(checkpoint.gaussians, spectral, config, checkpoint.iteration, checkpoint.frames)
 
 

@@ -15,12 +15,8 @@ from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.splatting.camera import Camera
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from endotsr.kernels.arrays import FloatArray
 
 SIMULATED = "simulated"  # names the embedded sequence; a folder of that name is given as `./simulated`
@@ -156,34 +152,3 @@ def true_positions_of(
     from endotsr.simulator.simulate import simulate
 
     return simulate(simulated_settings(simulator, config)).true_positions
-
-
-def sequence_record(sequence: Sequence) -> dict[str, Any]:
-    """Cameras, times, names and split, for sequence.json."""
-    cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras
-    return {
-        "unit": sequence.unit,
-        "largest_depth": float(sequence.depth.max()),
-        "static_camera": sequence.static_camera,
-        "names": sequence.names,
-        "times": sequence.times,
-        "train_index": sequence.train_index,
-        "test_index": sequence.test_index,
-        "cameras": [camera._asdict() for camera in cameras],
-    }
-
-
-def nearest_frame(times: "list[float] | NDArray[np.float64]", time: float) -> int:
-    """The frame whose time is nearest; of two at the same distance the earlier one."""
-    return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
-
-
-def remembered_cameras(record: dict[str, Any]) -> list[Camera]:
-    """The cameras of sequence.json, one a frame."""
-    import numpy as np
-
-    cameras = [
-        Camera(**(entry | {name: np.array(entry[name]) for name in ("rotation", "translation")}))
-        for entry in record["cameras"]
-    ]
-    return cameras * len(record["names"]) if record["static_camera"] else cameras

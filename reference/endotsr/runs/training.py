@@ -65,10 +65,10 @@ def train_new_run(
 ) -> RunFolder:
     """A new run folder, trained to the end. A folder that got no checkpoint is removed; errors as in `train_run`."""
     from endotsr.fitting.state import new_training
-    from endotsr.runs.sources import sequence_record
+    from endotsr.sequences.record import record_of
 
     state = new_training(sequence, config)
-    folder = create_run(out, config, record, sequence_record(sequence))
+    folder = create_run(out, config, record, record_of(sequence))
     try:
         with folder.locked():
             train_run(folder, state, sequence, config, observer)

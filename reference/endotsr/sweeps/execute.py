@@ -121,15 +121,15 @@ def _trained(job: Job, sequence: Sequence, threads: int, observer: Silent) -> Ru
 def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunFolder:
     """A new run, trained to the end."""
     from endotsr.runs.model import save_training
-    from endotsr.runs.sources import sequence_record
     from endotsr.runs.training import start_record, train_new_run, train_run
+    from endotsr.sequences.record import record_of
 
     record = start_record([*COMMAND, job.name], job.source, sequence, job.config, job.simulator, threads)
     if job.start is None:
         return train_new_run(Path(job.folder), record, sequence, job.config, observer)
     state = _start_state(job, sequence)
     record["start"] = {"configuration": job.start.configuration, "iteration": job.start.iteration}
-    folder = create_run(Path(job.folder), job.config, record, sequence_record(sequence))
+    folder = create_run(Path(job.folder), job.config, record, record_of(sequence))
     with folder.locked():
         save_training(folder, state, job.config)
         train_run(folder, state, sequence, job.config, observer)

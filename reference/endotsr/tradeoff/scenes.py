@@ -96,13 +96,13 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     from endotsr.fitting.model import corrected_cameras
     from endotsr.runs.folder import open_run
     from endotsr.runs.model import load_model
-    from endotsr.runs.sources import load_run_sequence, remembered_cameras
+    from endotsr.runs.sources import load_run_sequence
 
     folder = open_run(path)
     model = load_model(folder)
-    record = folder.sequence_record("names", "times", "test_index", "cameras", "static_camera")
-    cameras = corrected_cameras(model.frames, remembered_cameras(record), record["times"])
-    frame = int(record["test_index"][len(record["test_index"]) // 2])
+    record = folder.sequence_record()
+    cameras = corrected_cameras(model.frames, record.frame_cameras, record.times)
+    frame = record.test_index[len(record.test_index) // 2]
     try:
         noise = sensor_noise(load_run_sequence(folder))
     except InputError:  # the pictures are not available: the noise is left out
@@ -113,7 +113,7 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
         model.gaussians,
         model.spectral,
         model.config.model,
-        float(record["times"][frame]),
+        record.times[frame],
         scaled(cameras[frame], scale),
         model.config.raster.near,
         noise,

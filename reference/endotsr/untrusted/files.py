@@ -17,6 +17,7 @@ from queue import SimpleQueue
 from endotsr.errors import InputError
 
 LARGEST_TEXT = 1 << 26  # bytes of a settings or record file: 64 MiB
+MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192
 PATIENCE = 2.0  # seconds that a file which another program has open is waited for, on Windows
 MOST_READERS = 8  # threads that read files at the same time
 KINDS = {

@@ -1,15 +1,24 @@
-"""JSON from a file: objects without NaN, and the numbers in them."""
+"""JSON from a file: objects without NaN, the numbers in them, and the types that structures of them are made of."""
 
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
+
+import msgspec
 
 from endotsr.errors import InputError
-from endotsr.untrusted.files import LARGEST_TEXT, read_text
-from endotsr.untrusted.names import shown
+from endotsr.untrusted.files import LARGEST_TEXT, MOST_PIXELS, read_text
+from endotsr.untrusted.names import plain_line, shown
 
 MOST_DIGITS = 60  # of an integer: the state of a random generator has 39
+Count = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
+Side = Annotated[int, msgspec.Meta(ge=1, le=MOST_PIXELS)]
+Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Length = Annotated[float, msgspec.Meta(ge=-1e30, le=1e30)]
+Positive = Annotated[float, msgspec.Meta(gt=0, le=1e30)]
+Text = Annotated[str, msgspec.Meta(max_length=1 << 16, pattern="^[^\\x00]*$")]
+Structure = TypeVar("Structure")
 
 
 def read_json(path: Path, largest: int = LARGEST_TEXT) -> dict[str, Any]:
@@ -30,6 +39,16 @@ def parsed(text: str | bytes, where: str) -> Any:
         raise InputError(f"{where}: cannot be read: it is nested too deeply") from None
     except ValueError as error:  # of JSON, of UTF-8, and of an integer with thousands of digits
         raise InputError(f"{where}: cannot be read: {str(error).splitlines()[0]}") from None
+
+
+def typed(data: Any, kind: type[Structure], where: object) -> Structure:
+    """Plain data as a structure. Raises InputError naming the key if a value has another type or range."""
+    try:
+        return msgspec.convert(data, kind, strict=True)
+    except msgspec.ValidationError as error:
+        reason, _, place = str(error).partition(" - at `$")
+        key = place.strip("`.") or "its content"
+        raise InputError(f"{where}: {plain_line(key)}: {plain_line(reason[:1].lower() + reason[1:])}") from None
 
 
 def _finite(digits: str) -> float:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.untrusted.files import MOST_PIXELS
 
 LARGEST_FILE = 1 << 28  # bytes: 256 MiB
-MOST_PIXELS = 1 << 26  # 8192 x 8192
 MOST_EXTRA = 64  # bytes after the end of the compressed pixels, which some programs leave there
 CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type
 DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}

@@ -78,12 +78,12 @@ def _about(scene: MovingScene) -> dict[str, Any]:
     """Cameras, rules of the rasteriser, colours, and the depths that they span."""
     record, settings = scene.record, raster_settings(scene.model.config)
     cameras = scene.cameras
-    out = scene.render(float(record["times"][0]), cameras[0])
+    out = scene.render(record.times[0], cameras[0])
     low, high = depth_range(normalised_depth(out))
-    shown = cameras[:1] if record["static_camera"] else cameras
+    shown = cameras[:1] if record.static_camera else cameras
     return {
-        "unit": record["unit"],
-        "frames": {"names": record["names"], "times": record["times"]},
+        "unit": record.unit,
+        "frames": {"names": record.names, "times": record.times},
         "cameras": [
             [*np.ravel(c.rotation).tolist(), *np.ravel(c.translation).tolist(), c.fx, c.fy, c.cx, c.cy] for c in shown
         ],

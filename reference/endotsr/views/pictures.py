@@ -127,7 +127,7 @@ def write_pictures(
         for name in ("colour", "depth", "opacity"):
             (target / name).mkdir()
         first = next(pictures)
-        step = depth_step(scene.record, first[1].depth)
+        step = depth_step(scene.record.largest_depth, first[1].depth)
 
         def written() -> Iterator[tuple[PlannedView, RenderOut]]:
             for view, picture in chain([first], pictures):
@@ -136,7 +136,7 @@ def write_pictures(
                 yield view, picture
 
         consume(written())
-        unit, kind = scene.record["unit"], ABOUT_DEPTH[look.depth]
+        unit, kind = scene.record.unit, ABOUT_DEPTH[look.depth]
         about = f"depth PNG value x depth_step = view-space z in {unit}, {kind}"
         write_json(target / "render.json", {"depth_step": step, "about": about, "pictures": entries})
     return len(entries)

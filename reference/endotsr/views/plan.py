@@ -5,11 +5,12 @@ In: what the user asks for and the record of the sequence (sequence.json). Out: 
 
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.export.placement import HERE, Placement, training_camera
 from endotsr.export.times import Times, chosen_times
+from endotsr.sequences.record import SequenceRecord
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
@@ -36,7 +37,7 @@ class ViewRequest(NamedTuple):
     angle: float = 8.0  # degrees, of orbit and sway
 
 
-def check_request(request: ViewRequest, record: dict[str, Any], default: str = "test") -> None:
+def check_request(request: ViewRequest, record: SequenceRecord, default: str = "test") -> None:
     """Everything that can be refused without a model and its cameras. Raises: InputError."""
     chosen_times("render", request.times, record, default)
     if request.size:
@@ -45,7 +46,7 @@ def check_request(request: ViewRequest, record: dict[str, Any], default: str = "
         raise InputError(f"render: --angle {request.angle:g} is not allowed; allowed: 0 to {LARGEST_ANGLE:g} degrees")
     if not all(math.isfinite(number) for number in request.offset):
         raise InputError("render: --offset is not allowed; allowed: three finite numbers")
-    camera, count = request.camera, len(record["names"])
+    camera, count = request.camera, record.count
     if camera.lstrip("-").isdecimal() and not 0 <= int(camera) < count:
         raise InputError(f"render: --camera {camera} is not allowed; allowed: a frame from 0 to {count - 1}")
     if not (camera in PATHS or camera.isdecimal() or camera.lower().endswith(".json")):
@@ -55,7 +56,7 @@ def check_request(request: ViewRequest, record: dict[str, Any], default: str = "
 
 def views_of(
     request: ViewRequest,
-    record: dict[str, Any],
+    record: SequenceRecord,
     observed: list[Camera],
     pivot_depth: float,
     default: str = "test",

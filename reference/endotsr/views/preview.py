@@ -46,7 +46,7 @@ def encoded(found: list[ByteImage], words: str) -> Preview | None:
 
 def preview_pictures(scene: MovingScene) -> list[ByteImage]:
     """The pictures of a round, (H, W, 3) uint8, two views of one time side by side."""
-    times, cameras = np.asarray(scene.record["times"], np.float64), scene.cameras
+    times, cameras = np.asarray(scene.record.times, np.float64), scene.cameras
     count = min(PREVIEW_COUNT, max(len(times), 2))
     wanted = np.linspace(0, float(times.max()), count)
     near = [cameras[int(np.abs(times - time).argmin())] for time in wanted]

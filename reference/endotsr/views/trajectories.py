@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from endotsr.equations.exposure import exposure_forward
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import FloatArray
-from endotsr.runs.sources import nearest_frame
 from endotsr.scene.parameters import exposure_at
+from endotsr.sequences.record import nearest_frame
 from endotsr.splatting.camera import Camera, camera_centre
 from endotsr.splatting.harmonics import harmonics_forward
 
@@ -39,7 +39,7 @@ class Trajectories(NamedTuple):
 
 def key_times(scene: MovingScene, most: int) -> FloatArray:
     """Key times: those of the frames and 1, or `most` evenly spaced ones if they are fewer."""
-    times = np.unique(np.append(np.asarray(scene.record["times"], np.float64), 1.0))
+    times = np.unique(np.append(np.asarray(scene.record.times, np.float64), 1.0))
     if scene.model.gaussians.fdm_weight is None and scene.model.gaussians.appearance_coefficients is None:
         return times[:1] if scene.model.gaussians.motion_coefficients is None else np.linspace(0, 1, most)
     return times if times.size <= most else np.linspace(0, 1, most)
@@ -47,7 +47,7 @@ def key_times(scene: MovingScene, most: int) -> FloatArray:
 
 def trajectories(scene: MovingScene, times: FloatArray) -> Trajectories:
     """The Gaussians that can be seen, at the key times."""
-    cameras, known = scene.cameras, scene.record["times"]
+    cameras, known = scene.cameras, scene.record.times
     opacity = 1 / (1 + np.exp(-scene.model.gaussians.opacity_logit.astype(np.float64)))
     seen = opacity >= OPACITY_STEP
     values = np.empty((9, times.size, np.count_nonzero(seen)), np.float32)

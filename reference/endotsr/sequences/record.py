@@ -1,0 +1,158 @@
+"""The record of a sequence: what rendering and measuring need of it once the pictures are elsewhere.
+
+It is `sequence.json` of a run folder, and a part of the header of a slim model. In: a sequence, or such a file, which
+is user input. Out: `SequenceRecord`, checked, or an `InputError` that names the file, the key and what is allowed.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import MOST_PIXELS
+from endotsr.untrusted.json import Count, Fraction, Length, Positive, Side, Text, read_json, typed
+from endotsr.untrusted.names import file_name
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from endotsr.sequences.sequence import Sequence
+    from endotsr.splatting.camera import Camera
+
+ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
+Row = tuple[Length, Length, Length]
+
+
+class RecordedCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The camera of a frame; see `splatting.camera.Camera`."""
+
+    rotation: tuple[Row, Row, Row]
+    translation: Row
+    fx: Positive
+    fy: Positive
+    cx: Length
+    cy: Length
+    width: Side
+    height: Side
+
+
+class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """Names, times, split and cameras of a sequence. Keys of a file that are not listed are left alone."""
+
+    unit: Text  # the scene unit, in words
+    largest_depth: Annotated[float, msgspec.Meta(ge=0, le=1e30)]  # scene units
+    static_camera: bool
+    names: list[Text]  # of the n frames; they can be the names of files
+    times: list[Fraction]  # n times, normalised
+    train_index: list[Count]
+    test_index: list[Count]
+    cameras: list[RecordedCamera]  # n of them, or one that does not move
+
+    @property
+    def count(self) -> int:
+        """Number of frames n."""
+        return len(self.names)
+
+    @property
+    def train_times(self) -> "NDArray[np.float64]":
+        """Times of the training frames."""
+        import numpy as np
+
+        return np.array(self.times, np.float64)[self.train_index]
+
+    @property
+    def frame_cameras(self) -> "list[Camera]":
+        """The camera of every frame; one and the same object where it does not move."""
+        import numpy as np
+
+        from endotsr.splatting.camera import Camera
+
+        found = [
+            Camera(np.array(c.rotation), np.array(c.translation), c.fx, c.fy, c.cx, c.cy, c.width, c.height)
+            for c in self.cameras
+        ]
+        return found * self.count if self.static_camera else found
+
+
+def record_of(sequence: "Sequence") -> SequenceRecord:
+    """The record of a sequence in memory."""
+    cameras = sequence.cameras[:1] if sequence.static_camera else sequence.cameras
+    return SequenceRecord(
+        unit=sequence.unit,
+        largest_depth=float(sequence.depth.max()),
+        static_camera=sequence.static_camera,
+        names=sequence.names,
+        times=sequence.times.tolist(),
+        train_index=sequence.train_index.tolist(),
+        test_index=sequence.test_index.tolist(),
+        cameras=recorded(cameras),
+    )
+
+
+def recorded(cameras: "list[Camera]") -> list[RecordedCamera]:
+    """Cameras as a record holds them."""
+    found = []
+    for camera in cameras:
+        pose = {"rotation": camera.rotation.tolist(), "translation": camera.translation.tolist()}
+        lens = {name: float(getattr(camera, name)) for name in ("fx", "fy", "cx", "cy")}
+        sides = {name: int(getattr(camera, name)) for name in ("width", "height")}
+        found.append(msgspec.convert(pose | lens | sides, RecordedCamera))
+    return found
+
+
+def nearest_frame(times: "list[float] | NDArray[np.float64]", time: float) -> int:
+    """The frame whose time is nearest; of two at the same distance the earlier one."""
+    return min(range(len(times)), key=lambda i: (abs(times[i] - time), i))
+
+
+def read_sequence_record(path: Path) -> SequenceRecord:
+    """sequence.json. Raises InputError as `checked_record`."""
+    return checked_record(read_json(path), str(path))
+
+
+def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
+    """The record that plain data holds.
+
+    prefix   of the keys in messages
+
+    Raises:  InputError for a key that is missing or has another type or range, or contradicts another key: names are
+             distinct, frame numbers exist, no frame is both training and held out, and cameras have a rotation and at
+             most 2^26 pixels.
+    """
+    for name in SequenceRecord.__struct_fields__:
+        if not isinstance(data, dict) or name not in data:
+            raise InputError(f"{where}: {prefix}{name} is missing; allowed: the record as a run wrote it")
+    found = typed(data, SequenceRecord, where)
+    names = [file_name(name, f"{where}: names") for name in found.names]
+    if len(set(names)) < len(names):
+        raise InputError(f"{where}: names: two frames have one name; allowed: a name for each frame")
+    if len(found.times) != len(names):
+        raise InputError(f"{where}: times: {len(found.times)} for {len(names)} frames; allowed: one a frame")
+    _check_split(found, where)
+    _check_cameras(found, where)
+    return found
+
+
+def _check_split(found: SequenceRecord, where: str) -> None:
+    for key, index in (("train_index", found.train_index), ("test_index", found.test_index)):
+        if index and (max(index) >= found.count or len(set(index)) < len(index)):
+            raise InputError(f"{where}: {key}: allowed: frames from 0 to {found.count - 1}, each once")
+    if not found.train_index:
+        raise InputError(f"{where}: train_index: holds no frame; allowed: at least one")
+    if both := set(found.train_index) & set(found.test_index):
+        raise InputError(f"{where}: test_index: frame {min(both)} is a training frame as well")
+
+
+def _check_cameras(found: SequenceRecord, where: str) -> None:
+    expected = 1 if found.static_camera else found.count
+    if len(found.cameras) != expected:
+        raise InputError(f"{where}: cameras: {len(found.cameras)} of them; allowed: {expected}")
+    for k, camera in enumerate(found.cameras):
+        if camera.width * camera.height > MOST_PIXELS:
+            raise InputError(f"{where}: cameras: {k}: {camera.width}x{camera.height} pixels; allowed: {MOST_PIXELS}")
+        for i, row in enumerate(camera.rotation):
+            for j, other in enumerate(camera.rotation):
+                if abs(sum(a * b for a, b in zip(row, other)) - (i == j)) > ROTATION_TOLERANCE:
+                    raise InputError(f"{where}: cameras: {k}: rotation: its rows are not perpendicular unit vectors")
