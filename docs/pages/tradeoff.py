@@ -1,7 +1,7 @@
 """Measure what accuracy costs in time, and write docs/tradeoff.md from it.
 
     python docs/pages/tradeoff.py render [SPLATS.npz ...]    the simulated scene, then trained scenes
-    python docs/pages/tradeoff.py train SEQUENCE [OPTIONS]   trainings; OPTIONS as of `endotsr tradeoff train`
+    python docs/pages/tradeoff.py train SEQUENCE [OPTIONS]   trainings; `train --help` lists OPTIONS
     python docs/pages/tradeoff.py draw DIR                   pictures of a measurement of `endotsr tradeoff --out DIR`
     python docs/pages/tradeoff.py                            pictures and page once more from the files
 
@@ -19,11 +19,11 @@ from tradeoff_curves import draw_training
 from tradeoff_figures import draw
 from tradeoff_parts import fragments
 from tradeoff_study import run_whole_study
+from tradeoff_train import TRAINING
+from tradeoff_train import run as run_training
 
-from endotsr.cli.main import main as endotsr
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.tradeoff import RESULT, TradeoffOptions, chosen_scene
-from endotsr.cli.tradeoff_train import TRAINING
 from endotsr.errors import InputError
 from endotsr.kernels.threads import use_threads
 from endotsr.runs.files import write_json
@@ -61,9 +61,8 @@ def train(sequence: str, words: list[str]) -> None:
     """One study of training to docs/results/tradeoff_training_NAME.json."""
     name = Path(sequence).name
     out = WORK / name
-    if endotsr(["tradeoff", "train", sequence, "--out", str(out), *words]):
-        sys.exit(1)
-    shutil.copy(out / "training.json", RESULTS / f"tradeoff_training_{name}.json")
+    run_training([sequence, "--out", str(out), *words])
+    shutil.copy(out / TRAINING, RESULTS / f"tradeoff_training_{name}.json")
     shutil.rmtree(out)
 
 

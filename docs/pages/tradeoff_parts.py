@@ -1,8 +1,9 @@
-"""Generated parts of docs/tradeoff.md as Markdown; the input is the JSON of `endotsr tradeoff` and `tradeoff train`."""
+"""Generated parts of docs/tradeoff.md as Markdown, from the JSON of `endotsr tradeoff` and `tradeoff_train.py`."""
 
 from typing import Any
 
 from tradeoff_dials import OMITTED
+from tradeoff_training_text import best_by_time, gain_by_minute, summary, training_rows
 
 from endotsr.report.tables import markdown
 from endotsr.tradeoff.text import (
@@ -15,7 +16,6 @@ from endotsr.tradeoff.text import (
     levels,
     made,
 )
-from endotsr.tradeoff.training_text import best_by_time, gain_by_minute, summary, training_rows
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 

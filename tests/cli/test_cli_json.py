@@ -9,12 +9,8 @@ from endotsr.cli.golden import SUBCOMMANDS
 from endotsr.cli.main import COMMANDS, main
 
 NOT_ALONE = {"golden"}  # only with a second word
-WITHOUT = {
-    "sweep": "the folder it writes holds results.json",
-    "tradeoff train": "the folder it writes holds training.json",
-}
-EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), "tradeoff train"]
-EVERY += [f"golden {door}" for door in SUBCOMMANDS]
+WITHOUT = {"sweep": "the folder it writes holds results.json"}
+EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), *(f"golden {door}" for door in SUBCOMMANDS)]
 PRINTING = [name for name in EVERY if name not in WITHOUT]
 NUMBERS = range(len(EVERY))  # not the names: `pytest -k gradcheck` selects the gradient checks alone
 

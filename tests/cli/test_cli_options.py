@@ -168,11 +168,11 @@ def test_choices_are_listed_in_their_order_and_without_none(words, said, capsys)
     assert_refused(capsys, words, f"error: {said}\n")
 
 
-@pytest.mark.parametrize("command", [["render"], ["tradeoff", "train"]])
+@pytest.mark.parametrize("command", ["render", "ablate"])
 def test_help_lists_no_choice_called_none(command, capsys):
     from endotsr.cli.main import main
 
-    assert main([*command, "--help"]) == 0
+    assert main([command, "--help"]) == 0
     assert "None," not in capsys.readouterr().out
 
 

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 from test_splat_file import write_npz
+from tradeoff_train import run as run_training
 
 from endotsr.cli.main import main
-from endotsr.tradeoff.results import Measurement, Trainings, read_result
+from endotsr.errors import InputError
+from endotsr.tradeoff.results import Measurement, read_result
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +51,7 @@ def test_budget_reads_the_measurement(measured, capsys):
     [
         (["--budget", "soon"], 'allowed: a time per frame ("10 ms"'),
         (["--budget", "1 us"], "the fastest is"),
-        (["--budget", "5 min"], "no measured trainings; make them with `endotsr tradeoff train"),
+        (["--budget", "5 min"], 'allowed: a time per frame ("10 ms"'),
         (["--run", "a", "--splats", "b"], "give one of --run and --splats"),
         (["--repeats", "3"], "allowed: an integer >= 7"),
         (["--scale", "0"], "allowed: a number > 0"),
@@ -68,8 +70,6 @@ def test_mistakes(measured, capsys, words, said):
         ["--splats", "nope.ply"],
         ["--splats", "nope.ply", "--images"],
         ["--splats", "nope.ply", "--budget", "10 ms"],
-        ["train", "nope"],
-        ["train", "--scale", "0"],
     ],
 )
 def test_a_refused_call_leaves_no_folder(words, tmp_path, capsys, monkeypatch):
@@ -78,21 +78,19 @@ def test_a_refused_call_leaves_no_folder(words, tmp_path, capsys, monkeypatch):
     assert capsys.readouterr().err.startswith("endotsr: error: ") and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", [[], ["train"]])
-def test_an_output_folder_that_cannot_be_is_refused_before_the_work(words, tmp_path, capsys):
+def test_an_output_folder_that_cannot_be_is_refused_before_the_work(tmp_path, capsys):
     (tmp_path / "file").touch()
-    assert main(["tradeoff", *words, "--out", str(tmp_path / "file")]) == 2
+    assert main(["tradeoff", "--out", str(tmp_path / "file")]) == 2
     assert "is not a folder" in capsys.readouterr().err
-    assert main(["tradeoff", *words, "--out", str(tmp_path / "file" / "out")]) == 2
+    assert main(["tradeoff", "--out", str(tmp_path / "file" / "out")]) == 2
     assert "is not a folder" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("name", "budget", "key"), [("tradeoff", "1/255", "scene"), ("training", "1 h", "sequence")])
-def test_a_measurement_without_its_keys_is_refused(name, budget, key, tmp_path, capsys):
-    (tmp_path / f"{name}.json").write_text('{"format": 1}')
-    assert main(["tradeoff", "--out", str(tmp_path), "--budget", budget]) == 2
+def test_a_measurement_without_its_keys_is_refused(tmp_path, capsys):
+    (tmp_path / "tradeoff.json").write_text('{"format": 1}')
+    assert main(["tradeoff", "--out", str(tmp_path), "--budget", "1/255"]) == 2
     said = capsys.readouterr().err
-    assert f"{name}.json: not a whole measurement" in said and f"missing required field `{key}`" in said
+    assert "tradeoff.json: not a whole measurement" in said and "missing required field `scene`" in said
 
 
 def test_keys_that_are_missing_deeper_are_named_too(measured, tmp_path, capsys):
@@ -114,20 +112,19 @@ RESULTS = sorted((Path(__file__).parents[2] / "docs" / "results").glob("tradeoff
 
 @pytest.mark.parametrize("file", RESULTS, ids=lambda file: file.stem)
 def test_recorded_measurements_are_whole(file):
-    assert read_result(file, Trainings if "training" in file.name else Measurement)["format"] == 1
+    assert read_result(file, None if "training" in file.name else Measurement)["format"] == 1
 
 
-def test_mistakes_of_train(tmp_path, capsys):
+def test_mistakes_of_a_study_of_training(tmp_path):
     for words, said in (
-        (["--minutes", "0"], "allowed: a number > 0"),
-        (["--iterations", "0"], "allowed: an integer >= 1"),
-        (["--threads", "-1"], "--threads -1 is not allowed; allowed: 0 (all cores) or more"),
-        ([str(tmp_path / "none")], "not found"),
+        (["--minutes", "0"], "allowed: --minutes > 0"),
+        (["--iterations", "0"], "--iterations >= 1"),
+        ([], "not found"),
     ):
-        assert main(["tradeoff", "train", "--out", str(tmp_path / "out"), *words]) == 2
-        assert said in capsys.readouterr().err
+        with pytest.raises(InputError, match=said):
+            run_training([str(tmp_path / "none"), "--out", str(tmp_path / "out"), *words])
     assert not (tmp_path / "out").exists()
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "training.json").write_text("{}")
-    assert main(["tradeoff", "train", "--out", str(tmp_path / "out")]) == 2
-    assert "not a measurement of this version" in capsys.readouterr().err
+    with pytest.raises(InputError, match="not a measurement of this version"):
+        run_training(["simulated", "--out", str(tmp_path / "out")])

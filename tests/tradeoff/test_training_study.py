@@ -5,6 +5,9 @@ import json
 import msgspec
 import numpy as np
 import pytest
+import tradeoff_training as training
+from tradeoff_training import changed, configurations, measured, run_training_study
+from tradeoff_training_text import best_by_time, gain_by_minute, summary, training_lines, training_rows
 
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
@@ -15,9 +18,6 @@ from endotsr.fitting.state import new_training
 from endotsr.fitting.trainer import train
 from endotsr.runs.sources import load_sequence
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.tradeoff import training
-from endotsr.tradeoff.training import changed, configurations, measured, run_training_study
-from endotsr.tradeoff.training_text import best_by_time, gain_by_minute, summary, training_lines, training_rows
 
 pytestmark = pytest.mark.slow
 

@@ -8,13 +8,11 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.cli.tradeoff_train import TRAINING
-from endotsr.cli.tradeoff_train import run as run_training
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
 
 if TYPE_CHECKING:
-    from endotsr.tradeoff.budget import Advice, Budget
+    from endotsr.tradeoff.budget import Advice
     from endotsr.tradeoff.scenes import StudyScene
 
 RESULT = "tradeoff.json"  # in the folder of the measurement
@@ -25,8 +23,8 @@ LEAST_REPEATS = 7
 class TradeoffOptions:
     """Measure error against time for every setting of the renderer; the figures are kept in --out.
 
-    The scene is simulated, a trained --run, or a file of --splats. `endotsr tradeoff train` does the same for training;
-    see its --help. With --budget, the setting is chosen from the measurement in --out, which is made if it is missing.
+    The scene is simulated, a trained --run, or a file of --splats. With --budget, the setting is chosen from the
+    measurement in --out, which is made if it is missing.
     """
 
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
@@ -38,8 +36,8 @@ class TradeoffOptions:
     scale: float = 1.0
     """size of the picture, relative to that of the scene"""
     budget: str | None = None
-    """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate), an error
-    ("1/255", "1e-3": the fastest) or a training time ("5 min": the highest PSNR)"""
+    """print the best measured setting within a time per frame ("10 ms", "30 fps": the most accurate) or an error
+    ("1/255", "1e-3": the fastest)"""
     json: JsonFile = None
     """also write the answer to --budget as JSON"""
     images: bool = False
@@ -52,8 +50,6 @@ class TradeoffOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    if words[:1] == ["train"]:
-        return run_training(words[1:])
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
     budget = None
@@ -61,8 +57,6 @@ def run(words: list[str]) -> int:
         from endotsr.tradeoff.budget import parse_budget
 
         budget = parse_budget(options.budget)
-        if budget.kind == "training":
-            return _say_training(options, budget)
     from endotsr.tradeoff.results import Measurement, read_result
 
     file = options.out / RESULT
@@ -134,15 +128,3 @@ def chosen_scene(options: TradeoffOptions) -> "StudyScene":
         bar.begin(scenes.ITERATIONS)
         width = max(16, round(scenes.SIMULATED_WIDTH * options.scale))
         return scenes.simulated_scene(width=width, step=bar.step)
-
-
-def _say_training(options: TradeoffOptions, budget: "Budget") -> int:
-    from endotsr.tradeoff.budget import training_advice
-    from endotsr.tradeoff.results import Trainings, read_result
-
-    out = options.out
-    file = out / TRAINING
-    if not file.exists():
-        raise InputError(f"{out}: no measured trainings; make them with `endotsr tradeoff train --out {out}`")
-    _say(options, training_advice(read_result(file, Trainings), budget))
-    return 0

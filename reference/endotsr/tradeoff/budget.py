@@ -1,7 +1,6 @@
 """`--budget`: a limit on time or error as text, and the best measured setting within it.
 
-Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), an error (`1/255`, `0.5/255`, `1e-3`, in display units), or a
-training time (`5 min`, `1 h`).
+Allowed: a time per frame (`10 ms`, `0.1 s`, `30 fps`), or an error (`1/255`, `0.5/255`, `1e-3`, in display units).
 """
 
 import math
@@ -11,15 +10,15 @@ from typing import Any, Literal, NamedTuple
 from endotsr.errors import InputError
 from endotsr.tradeoff.text import levels, milliseconds
 
-Kind = Literal["frame", "error", "training"]
+Kind = Literal["frame", "error"]
 
 NUMBER = r"(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+)"
-FORMS = 'a time per frame ("10 ms", "0.1 s", "30 fps"), an error ("1/255", "1e-3") or a training time ("5 min", "1 h")'
-FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+FORMS = 'a time per frame ("10 ms", "0.1 s", "30 fps") or an error ("1/255", "1e-3")'
+FACTORS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 class Budget(NamedTuple):
-    """A limit: seconds per frame, a largest error in display units, or seconds of training."""
+    """A limit: seconds per frame, or a largest error in display units."""
 
     kind: Kind
     amount: float
@@ -39,14 +38,14 @@ def parse_budget(text: str) -> Budget:
     found = None
     if fraction := re.fullmatch(rf"{NUMBER} ?/ ?{NUMBER}", plain):
         found = Budget("error", _quotient(*map(float, fraction.groups())), text)
-    elif quantity := re.fullmatch(rf"{NUMBER} ?(us|ms|s|min|h|fps)?", plain):
+    elif quantity := re.fullmatch(rf"{NUMBER} ?(us|ms|s|fps)?", plain):
         amount, unit = float(quantity[1]), quantity[2]
         if unit is None:
             found = Budget("error", amount, text)
         elif unit == "fps":
             found = Budget("frame", _quotient(1.0, amount), text)
         else:
-            found = Budget("training" if unit in ("min", "h") else "frame", amount * FACTORS[unit], text)
+            found = Budget("frame", amount * FACTORS[unit], text)
     if found is None or not 0 < found.amount < math.inf:
         raise InputError(f"--budget {text!r} is not understood; allowed: {FORMS}, each finite and > 0")
     return found
@@ -113,30 +112,3 @@ def settings_words(setting: dict[str, Any]) -> str:
     if setting["scale"] != 1:
         words.append(f"--scale {setting['scale']:g}")
     return " ".join(words)
-
-
-def training_advice(result: dict[str, Any], budget: Budget) -> Advice:
-    """The state of a measured training with the best held-out PSNR that was reached within the time.
-
-    Raises InputError with the reason when none was.
-    """
-    reached = [
-        row | {"configuration": c["name"], "change": c["change"]}
-        for c in result["configurations"]
-        for row in c["milestones"]
-        if row["psnr_full"] is not None
-    ]
-    kept = [row for row in reached if row["seconds"] <= budget.amount]
-    if not kept:
-        first = f"; the first measured state took {min(r['seconds'] for r in reached):.0f} s" if reached else ""
-        raise InputError(
-            f"--budget {budget.text}: nothing was measured within that training time on {result['sequence']}{first}"
-        )
-    chosen = max(kept, key=lambda row: row["psnr_full"])
-    lines = [
-        f"{budget.text}: {chosen['configuration']}, {chosen['iteration']} of {result['iterations']} iterations",
-        f"expected: {chosen['psnr_full']:.2f} dB on held-out frames after {chosen['seconds']:.0f} s",
-        f"as settings: {' '.join(['--preset', result['preset'], *chosen['change']])}",
-        f"measured on {result['sequence']}",
-    ]
-    return Advice(chosen, lines)

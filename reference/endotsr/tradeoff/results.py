@@ -1,4 +1,4 @@
-"""The files of a measurement, `tradeoff.json` and `training.json`."""
+"""The file of a measurement, `tradeoff.json`."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,7 +8,7 @@ import msgspec
 from endotsr.errors import InputError
 from endotsr.untrusted.json import read_json
 
-FORMAT = 1  # of both; raised when a key changes its name or meaning
+FORMAT = 1  # raised when a key changes its name or meaning
 
 
 class Seconds(msgspec.Struct):
@@ -78,31 +78,6 @@ class Measurement(msgspec.Struct):
     def __post_init__(self) -> None:
         if unknown := sorted(set(self.fronts.forward) - {point.name for point in self.points}):
             raise ValueError(f"fronts.forward names {unknown[0]!r}, which is not among the points")
-
-
-class Milestone(msgspec.Struct):
-    """State and quality of a training at a milestone."""
-
-    iteration: int
-    seconds: float
-    psnr_full: float | None
-
-
-class Training(msgspec.Struct):
-    """One training of the study."""
-
-    name: str
-    change: list[str]
-    milestones: list[Milestone]
-
-
-class Trainings(msgspec.Struct):
-    """The keys of training.json that a budget reads."""
-
-    sequence: str
-    iterations: int
-    preset: str
-    configurations: list[Training]
 
 
 def read_result(file: Path, needed: type[msgspec.Struct] | None = None) -> dict[str, Any]:

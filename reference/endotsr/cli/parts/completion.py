@@ -21,7 +21,6 @@ ALWAYS = ("--help", "--help-all", "--quiet", "--log-file")
 SHARED_MODULE = {"demo": ("train", "TrainOptions")}  # a command whose options are those of another
 CHOICES = {"golden": "SUBCOMMANDS"}  # the table of a command module whose keys are its first words
 FIRST_WORDS = {
-    "tradeoff": ("train",),
     "train": ("simulated",),
     "inspect": ("simulated",),
     "simulate": tuple(SCENES),
