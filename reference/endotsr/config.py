@@ -232,7 +232,7 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     precision: Literal["float32", "float64"] = "float32"
     """floating-point precision of the run"""
     checkpoint_every: PositiveCount = 1000
-    """iterations between checkpoints"""
+    """most iterations between checkpoints; time decides when they come sooner"""
 
 
 Preset = Literal["paper", "sharp", "quick", "demo"]

@@ -1,4 +1,7 @@
-"""Commands set the number of threads of the process; the tests after them get back what was there."""
+"""Commands set the number of threads of the process; the tests after them get back what was there.
+
+Checkpoints are written by iterations alone, so that no test depends on the speed of the machine.
+"""
 
 import numba
 import pytest
@@ -12,6 +15,11 @@ def threads_as_before():
     before = numba.get_num_threads()
     yield
     numba.set_num_threads(before)
+
+
+@pytest.fixture(autouse=True)
+def checkpoints_by_iterations(monkeypatch):
+    monkeypatch.setattr("endotsr.runs.training.seconds_between", lambda *_: float("inf"))
 
 
 @pytest.fixture(scope="session")

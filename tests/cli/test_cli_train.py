@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,11 +21,13 @@ from endotsr.cli.parts import progress
 from endotsr.config import load_config
 from endotsr.fitting import state as training_state
 from endotsr.fitting import trainer
-from endotsr.runs import stopping
+from endotsr.fitting.checkpoint import load_checkpoint
+from endotsr.runs import stopping, training
 from endotsr.runs.folder import RunFolder
 
 LAST = 30
 EVERY = 7
+SECONDS_BETWEEN = training.seconds_between  # which conftest.py replaces
 
 
 def train_only(out, *more):
@@ -108,6 +111,38 @@ def test_ctrl_c_keeps_the_last_checkpoint_and_resume_is_bitwise_equal(at, finish
     assert_same_run(finished_run, out)
     record = RunFolder(out).record()
     assert record["status"] == "finished" and record["resumed"][0]["after_iteration"] == at // EVERY * EVERY
+
+
+@pytest.mark.parametrize(("at", "kept"), [(3, 0), (17, 15)])
+def test_time_brings_a_checkpoint_before_the_iterations_do(at, kept, finished_run, tmp_path, monkeypatch):
+    """On a clock of one second an iteration, with 4 seconds between checkpoints, they come at 5, 10, 15."""
+    out, clock = tmp_path / "run", SimpleNamespace(now=0.0)
+    clock.monotonic = lambda: clock.now
+
+    def killed(_, entry):
+        clock.now += 1.0
+        if entry["iteration"] == at:
+            raise RuntimeError("killed")
+
+    monkeypatch.setattr(progress.Progress, "update", killed)
+    monkeypatch.setattr(training, "time", clock)
+    monkeypatch.setattr(training, "seconds_between", lambda *_: 4.0)
+    with pytest.raises(RuntimeError, match="killed"):
+        main(train_only(out, "--training.checkpoint-every", "1000"))
+    monkeypatch.undo()
+    folder = RunFolder(out)
+    assert (load_checkpoint(folder.checkpoint).iteration if kept else folder.has_checkpoint) == kept
+    assert main(resume(out)) == 0
+    assert_same_run(finished_run, out)
+
+
+@pytest.mark.parametrize(
+    ("trained", "saving", "expected"),
+    [(0, 0, 10), (50, 0.1, 10), (600, 0.1, 60), (1e5, 0.1, 300), (0, 1.0, 50), (1e5, 20.0, 1000)],
+)
+def test_time_between_checkpoints(trained, saving, expected):
+    """Ten seconds at first, a tenth of the training later, five minutes at most, and never 2 % of the time."""
+    assert SECONDS_BETWEEN(trained, saving) == pytest.approx(expected)
 
 
 @pytest.mark.slow

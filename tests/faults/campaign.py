@@ -108,10 +108,18 @@ def in_child(work: Callable[[], int]) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(start_child(work), 0)[1])
 
 
-def kill_at_a_moment(bench: Bench) -> tuple[bool, str]:
-    """SIGKILL from outside after a random time."""
+def kill_at_a_moment(bench: Bench, by_time: bool = False) -> tuple[bool, str]:
+    """SIGKILL from outside after a random time; `by_time`: the time for a checkpoint comes at every iteration."""
     out = bench.fresh()
-    child = start_child(lambda: endotsr_quietly(train_words(out, "--no-evaluate")))
+
+    def work() -> int:
+        from endotsr.runs import training
+
+        if by_time:
+            training.seconds_between = lambda *_: 0.0
+        return endotsr_quietly(train_words(out, "--no-evaluate"))
+
+    child = start_child(work)
     time.sleep(bench.random.uniform(0.0, 1.1 * bench.seconds))
     os.kill(child, signal.SIGKILL)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -247,7 +255,9 @@ def campaign(
     total = count_operations(bench)
     spread = sorted({max(1, round(k * total / failures)) for k in range(1, failures + 1)}) if failures else []
     trials: dict[str, list[Callable[[], tuple[bool, str]]]] = {
-        "SIGKILL at a random moment": [lambda: kill_at_a_moment(bench)] * (kills // 2),
+        "SIGKILL at a random moment": [lambda: kill_at_a_moment(bench)] * (kills // 4),
+        "SIGKILL at a random moment, a checkpoint at every iteration": [lambda: kill_at_a_moment(bench, True)]
+        * (kills // 2 - kills // 4),
         "SIGKILL inside a file operation, twice in a row": [lambda: kill_at_an_operation(bench, total)]
         * (kills - kills // 2),
         "disk full at one file operation": [lambda at=at: fail_at_an_operation(bench, at, disk_full) for at in spread],

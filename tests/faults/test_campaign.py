@@ -26,8 +26,9 @@ def test_the_layer_sees_the_checkpoints_and_the_log(total):
     assert total > 300
 
 
-def test_a_kill_at_a_moment(bench):
-    assert campaign.kill_at_a_moment(bench)[0]
+@pytest.mark.parametrize("by_time", [False, True])
+def test_a_kill_at_a_moment(bench, by_time):
+    assert campaign.kill_at_a_moment(bench, by_time)[0]
 
 
 @pytest.mark.parametrize("fraction", [0.02, 0.5, 0.99])

@@ -3,6 +3,10 @@
 In: a sequence, settings, and an observer that is called at every iteration. Out: the run folder with log, checkpoints
 and run.json. After a signal the current iteration is finished and a checkpoint is written; the errors say how to
 continue the run. This module prints nothing itself.
+
+A checkpoint is written after `training.checkpoint_every` iterations at the latest, and after a time: a kill costs at
+most a tenth of the training so far. That tenth has bounds (`FEWEST_SECONDS`, `MOST_SECONDS`), and where one checkpoint
+takes long, they are as rare as `LARGEST_SHARE` demands. No result depends on when they are written.
 """
 
 import contextlib
@@ -28,6 +32,11 @@ if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
     from endotsr.sequences.sequence import Sequence
     from endotsr.simulator.settings import SimulatorSettings
+
+
+FEWEST_SECONDS, MOST_SECONDS = 10.0, 300.0  # of training between two checkpoints
+LARGEST_LOSS = 0.1  # of the training so far, which a kill may cost
+LARGEST_SHARE = 0.02  # of the time, which checkpoints may take
 
 
 class RunStopped(InputError):
@@ -154,6 +163,15 @@ def train_run(
     return last
 
 
+def seconds_between(trained: float, saving: float) -> float:
+    """Seconds of training between two checkpoints.
+
+    trained   seconds since the training was started or resumed
+    saving    seconds that the last checkpoint took
+    """
+    return max(min(max(LARGEST_LOSS * trained, FEWEST_SECONDS), MOST_SECONDS), saving / LARGEST_SHARE)
+
+
 class _Recorder:
     """Writes log, checkpoints and run.json of one training while it runs."""
 
@@ -161,7 +179,8 @@ class _Recorder:
         self.log = RunLog(folder.log, state.iteration)
         self._folder, self._config, self._observer = folder, config, observer
         self._seconds_before, self._began = self.log.seconds, time.monotonic()
-        self._last_tick = self._began
+        self._last_tick = self._saved_at = self._began
+        self._state, self._saving_took = state, 0.0
         self._saved = state.iteration if folder.has_checkpoint else None
         self._between_iterations = False  # whether the run was stopped after a whole iteration
 
@@ -174,19 +193,24 @@ class _Recorder:
         if stop_asked():
             self._between_iterations = True
             raise KeyboardInterrupt
+        if tick - self._saved_at >= seconds_between(tick - self._began, self._saving_took):
+            self.on_checkpoint(self._state)
 
     def on_checkpoint(self, state: "TrainingState") -> None:
-        """Replace the checkpoint."""
+        """Replace the checkpoint, unless it is of this iteration."""
         from endotsr.runs.model import save_training
 
+        if self._saved == state.iteration:
+            return
+        began = time.monotonic()
         save_training(self._folder, state, self._config)
-        self._saved = state.iteration
+        self._saved, self._saved_at = state.iteration, time.monotonic()
+        self._saving_took = self._saved_at - began
         self._folder.update(iterations_done=self._saved, lambda_lap=state.lambda_lap, **self._costs())
 
     def finish(self, last: "TrainingState") -> None:
         """Save the last state and mark the run as finished."""
-        if self._saved != last.iteration:
-            self.on_checkpoint(last)
+        self.on_checkpoint(last)
         self._folder.update(status="finished", finished=now(), iterations_done=last.iteration, **self._costs())
 
     def stop(self, error: BaseException, state: "TrainingState") -> BaseException:
