@@ -1,6 +1,7 @@
 """The time left that a training shows: of the iterations to come, not of compilation."""
 
 import io
+from types import SimpleNamespace
 
 import pytest
 
@@ -24,7 +25,7 @@ def lines(monkeypatch):
     monkeypatch.setattr(progress, "time", clock)
     monkeypatch.setattr(progress.sys, "stderr", said)
     shown = Progress(6000)
-    shown.begin(0)
+    shown.begin(SimpleNamespace(iteration=0))
     for iteration in range(1, 1001):
         clock.now += 180.0 if iteration == 1 else 40.0 if iteration == 9 else 0.1
         shown.update({"iteration": iteration, "loss": 0.5, "psnr": None, "gaussians": 10})

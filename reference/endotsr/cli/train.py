@@ -153,8 +153,9 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     for line in lines:
         print(line)
     print("starting", flush=True)
+    shown = _progress(RunFolder(options.out), sequence, config)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads) | found
-    return train_new_run(options.out, record, sequence, config, Progress(config.training.iterations)), sequence
+    return train_new_run(options.out, record, sequence, config, shown), sequence
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
@@ -181,8 +182,16 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     if extended:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
-    resume_run(folder, sequence, threads, Progress(asked.training.iterations))
+    resume_run(folder, sequence, threads, _progress(folder, sequence, folder.config()))
     return folder, sequence
+
+
+def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progress:
+    """The progress of a training, on the standard error and as a page in its folder."""
+    from endotsr.report.live_page import LIVE_PAGE, LivePage
+
+    print(f"watch it in a browser: {folder.path / LIVE_PAGE}", flush=True)
+    return Progress(config.training.iterations, LivePage(folder, sequence, config))
 
 
 def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:

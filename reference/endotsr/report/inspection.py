@@ -79,10 +79,7 @@ def _headline(title: str, inspection: Inspection, plan: Plan) -> str:
         (f"{plan.time:.0%}", "", "expected saving of time"),
         (f"{plan.memory:.0%}", "", "expected saving of memory"),
     ]
-    boxes = "".join(
-        f'<div class="card"><b>{parts.text(value)}<small>{unit}</small></b><span>{parts.text(label)}</span></div>'
-        for value, unit, label in cards
-    )
+    boxes = "".join(parts.card(parts.text(value), unit, label) for value, unit, label in cards)
     return (
         f'<header><p class="eyebrow">Endo-TSR · inspection</p><h1>{parts.text(title)}</h1>'
         f'<p class="lead">{parts.text(found)}</p><div class="cards">{boxes}</div></header>'

@@ -89,12 +89,22 @@ def colour_bar(name: str, low: str, high: str) -> str:
     return f'<span class="bar">{text(low)}{strip}{text(high)}</span>'
 
 
-def page(title: str, body: str) -> str:
-    """The whole document."""
+def card(value: str, unit: str, label: str) -> str:
+    """A number in a box with its name below; `value` is HTML already."""
+    suffix = f"<small>{unit}</small>" if unit and "absent" not in value else ""
+    return f'<div class="card"><b>{value}{suffix}</b><span>{text(label)}</span></div>'
+
+
+def page(title: str, body: str, refresh: str = "") -> str:
+    """The whole document.
+
+    refresh   seconds after which a browser reads it again, or "0; url=NAME" of the page that it is to show instead
+    """
+    again = f'<meta http-equiv="refresh" content="{text(refresh)}">' if refresh else ""
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
+        f'<meta name="color-scheme" content="light dark">{again}'
         f"<title>{text(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
     )
 

@@ -17,6 +17,7 @@ from endotsr.opencv import write_png
 from endotsr.report.curves import curves_png, read_log
 from endotsr.report.data import FramePictures, Preview, ReportData
 from endotsr.report.figures import triptych, triptych_picture
+from endotsr.report.live_page import REPORT, lead_to_report
 from endotsr.report.page import write_report
 from endotsr.report.pictures import rgb_bytes
 from endotsr.report.run_text import component_table, facts
@@ -52,7 +53,8 @@ def write_evaluation(
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
     data = _report_data(folder, sequence, metrics, held_out, log)
-    write_report(folder.path / "report.html", replace(data, preview=preview, viewer=viewer))
+    write_report(folder.path / REPORT, replace(data, preview=preview, viewer=viewer))
+    lead_to_report(folder.path)
 
 
 def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: Mapping[int, RenderOut]) -> None:

@@ -34,25 +34,20 @@ def headline(data: ReportData) -> str:
         (mean.get("ssim_full"), 4, "", "SSIM, full image"),
         (mean.get("lpips"), 4, "", "LPIPS (AlexNet)"),
     ]
-    boxes = [_card(parts.number(value, digits), unit, label) for value, digits, unit, label in cards if mean]
+    boxes = [parts.card(parts.number(value, digits), unit, label) for value, digits, unit, label in cards if mean]
     reached, gaussians = curves.series(data.log, "gaussians")
     seconds = curves.series(data.log, "seconds")[1]
     if gaussians.size:
-        boxes.append(_card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
+        boxes.append(parts.card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
     if "Training time" in data.facts:
-        boxes.append(_card(parts.text(data.facts["Training time"]), "", "training time"))
+        boxes.append(parts.card(parts.text(data.facts["Training time"]), "", "training time"))
     elif seconds.size:
-        boxes.append(_card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
+        boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
     frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
     return (
         f'<header><p class="eyebrow">Endo-TSR · {frames}</p><h1>{parts.text(data.title)}</h1>{_verdict(data)}'
         f'<div class="cards">{"".join(boxes)}</div></header>'
     )
-
-
-def _card(value: str, unit: str, label: str) -> str:
-    suffix = f"<small>{unit}</small>" if unit and "absent" not in value else ""
-    return f'<div class="card"><b>{value}{suffix}</b><span>{parts.text(label)}</span></div>'
 
 
 BESIDE_BASELINES = (

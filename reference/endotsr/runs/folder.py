@@ -6,6 +6,7 @@
     log.jsonl        one line an iteration
     checkpoint.npz   the latest checkpoint, and checkpoint.previous.npz, the one before it
     diverged.npz     the state before an iteration whose numbers were not finite
+    training.html    how far the training is; it leads to report.html once there is one
     run.lock         empty; the process that trains the run holds its lock
     metrics.json  report.html  renders/  test/ours_<iteration>/{renders,gt,masks}/    from `endotsr evaluate`
 

@@ -46,8 +46,8 @@ class RunStopped(InputError):
 class Observer(Protocol):
     """Callbacks of a training while it runs."""
 
-    def begin(self, start: int) -> None:
-        """The training begins after iteration `start`."""
+    def begin(self, state: "TrainingState") -> None:
+        """The training begins with `state`, which it changes in place; an observer changes nothing in it."""
 
     def update(self, entry: dict[str, Any]) -> None:
         """The log entry of one iteration."""
@@ -144,7 +144,7 @@ def train_run(
     from endotsr.fitting.trainer import train
 
     recorder = _Recorder(folder, state, config, observer)
-    observer.begin(state.iteration)
+    observer.begin(state)
     try:
         with finishing():
             compile_ahead(config, observer.say)

@@ -9,7 +9,7 @@ import errno
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line
@@ -19,6 +19,9 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.jobs import Job, finished_folder, measured_at_the_end, refuse_other_settings
 from endotsr.sweeps.locks import file_lock, run_lock
 from endotsr.untrusted.names import plain_line
+
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
 
 FINISHED, FAILED, INTERRUPTED = "finished", "failed", "interrupted"
 COMMAND = ["endotsr", "sweep"]
@@ -40,7 +43,7 @@ class Silent:
     def __init__(self, stop: Callable[[], bool] = lambda: False) -> None:
         self._stop = stop
 
-    def begin(self, start: int) -> None:
+    def begin(self, state: "TrainingState") -> None:
         """As `runs.training.Observer`."""
 
     def update(self, entry: dict[str, Any]) -> None:

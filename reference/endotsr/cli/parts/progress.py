@@ -1,4 +1,4 @@
-"""Progress on the standard error: a bar on a terminal, single lines elsewhere."""
+"""Progress on the standard error: a bar on a terminal, single lines elsewhere; and the page of a training."""
 
 import math
 import statistics
@@ -6,9 +6,13 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from endotsr.report.words import duration
+
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
+    from endotsr.report.live_page import LivePage
 
 QUIET_SECONDS = 30.0  # between lines if the standard error is not a terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the time left is in the postfix
@@ -18,23 +22,33 @@ MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 
 
 
 class Progress:
-    """Loss and PSNR (running means over views), Gaussian count and time left."""
+    """Loss and PSNR (running means over views), Gaussian count and time left.
 
-    def __init__(self, total: int) -> None:
-        self._total = total
+    page   is told of the same events, and of the time left
+    """
+
+    def __init__(self, total: int, page: "LivePage | None" = None) -> None:
+        self._total, self._page = total, page
         self._said = self._ended = time.monotonic()
         self._means: dict[str, float] = {}
         self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)
         self._bar: Any = None
 
-    def begin(self, start: int) -> None:
-        """The training begins after iteration `start`."""
+    def begin(self, state: "TrainingState") -> None:
+        """The training begins with `state`."""
+        if self._page is not None:
+            self._page.begin(state)
         self._said = self._ended = time.monotonic()
         if sys.stderr.isatty():
             from tqdm import tqdm
 
             self._bar = tqdm(
-                total=self._total, initial=start, unit="it", dynamic_ncols=True, mininterval=0.25, bar_format=BAR
+                total=self._total,
+                initial=state.iteration,
+                unit="it",
+                dynamic_ncols=True,
+                mininterval=0.25,
+                bar_format=BAR,
             )
 
     def update(self, entry: dict[str, Any]) -> None:
@@ -47,6 +61,9 @@ class Progress:
         now = time.monotonic()
         self._seconds.append(now - self._ended)
         self._ended = now
+        if self._page is not None:
+            left, _, known = self._left(entry).partition(" left")
+            self._page.update(entry, None if known else left)
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
@@ -63,16 +80,18 @@ class Progress:
             print(message, flush=True)
 
     def close(self) -> None:
-        """End the line of the bar."""
+        """End the line of the bar, and the page."""
+        if self._page is not None:
+            self._page.close()
         if self._bar is not None:
             self._bar.close()
 
     def _state(self, entry: dict[str, Any]) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
-        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left(self._seconds, self._remaining(entry))}"
+        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {self._left(entry)}"
 
-    def _remaining(self, entry: dict[str, Any]) -> int:
-        return self._total - entry["iteration"]
+    def _left(self, entry: dict[str, Any]) -> str:
+        return time_left(self._seconds, self._total - entry["iteration"])
 
 
 def time_left(seconds: Sequence[float], remaining: int) -> str:

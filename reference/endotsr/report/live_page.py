@@ -1,0 +1,149 @@
+"""The page of a training that runs: how far it is, how long it will take, its curves, and one frame as it is now.
+
+`training.html` is written beside the log from time to time and tells the browser to read it again: files alone, no
+server and no script. It computes a render of one frame with the parameters of the moment and changes none of them.
+It takes at most `LARGEST_SHARE` of the time, unless it would then be older than `MOST_SECONDS`, and a page that cannot
+be written stops no training. Once the run is evaluated, the page leads to the report.
+"""
+
+import contextlib
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.evaluation.metrics import psnr_tissue
+from endotsr.fitting.model import camera_at, render_at, spectral_from
+from endotsr.report import parts
+from endotsr.report.curves import read_log
+from endotsr.report.figures import bytes_image
+from endotsr.report.line_chart import ChartCurve, chart_svg
+from endotsr.runs.files import replace_file
+from endotsr.runs.folder import RunFolder
+from endotsr.runs.machine import now
+from endotsr.sequences.sequence import Sequence
+
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
+
+LIVE_PAGE, REPORT = "training.html", "report.html"  # in a run folder
+FEWEST_SECONDS, MOST_SECONDS = 5.0, 60.0  # between two pages
+LARGEST_SHARE = 0.01  # of the time, which pages may take
+KEPT = ("iteration", "loss", "psnr")  # keys of the log that the page shows
+
+
+class LivePage:
+    """Writes `training.html` of a run folder while the run is trained."""
+
+    def __init__(self, folder: RunFolder, sequence: Sequence, config: Config) -> None:
+        frames = sequence.test_index if len(sequence.test_index) else sequence.train_index
+        self._folder, self._sequence, self._config = folder, sequence, config
+        self._frame = int(frames[len(frames) // 2])
+        self._kind = "held-out" if len(sequence.test_index) else "training"
+        self._spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+        self._log: list[dict[str, Any]] = []
+        self._psnr = ChartCurve(f"{self._kind} frame {self._frame}", [], [])
+        self._due = 0.0
+
+    def begin(self, state: "TrainingState") -> None:
+        """The training begins with `state`, which it changes in place. Nothing is rendered yet: kernels compile now."""
+        self._state = state
+        self._log = [_kept(entry) for entry in read_log(self._folder.log) if entry["iteration"] <= state.iteration]
+        self._write("running", None, picture=False)
+        self._due = 0.0
+
+    def update(self, entry: dict[str, Any], left: str | None) -> None:
+        """An iteration has ended. entry: its line of the log; left: the time left; None = not known yet."""
+        self._log.append(_kept(entry))
+        if time.monotonic() >= self._due:
+            self._write("running", left)
+
+    def close(self) -> None:
+        """The training has ended, in the way that run.json says."""
+        with contextlib.suppress(OSError, InputError):
+            self._write(str(self._folder.record().get("status")), None)
+
+    def _write(self, status: str, left: str | None, picture: bool = True) -> None:
+        began = time.monotonic()
+        with contextlib.suppress(OSError):  # a disk without space: the training itself says so
+            _replace(self._folder.path, self._html(status, left, picture))
+        done = time.monotonic()
+        self._due = done + min(max(FEWEST_SECONDS, (done - began) / LARGEST_SHARE), MOST_SECONDS)
+
+    def _html(self, status: str, left: str | None, picture: bool) -> str:
+        done, planned = self._state.iteration, self._config.training.iterations
+        name, shown = self._folder.path.absolute().name, ""
+        if picture:
+            with contextlib.suppress(ValueError):  # a number that is not finite: the training itself says so
+                shown = self._picture()
+        loss = self._log[-1].get("loss") if self._log else None
+        psnr = self._psnr.y[-1] if self._psnr.y else None
+        running = status == "running"
+        boxes = (
+            parts.card(parts.cell(done), "", f"of {planned} iterations"),
+            parts.card(parts.cell(left if running else status), "", "time left" if running else "status"),
+            parts.card(parts.number(loss, 4), "", "loss of the last view"),
+            parts.card(parts.number(psnr, 2), "dB", f"PSNR of {self._kind} frame {self._frame}, tissue"),
+            parts.card(parts.cell(self._state.gaussians.count), "", "Gaussians"),
+        )
+        body = (
+            f'<header><p class="eyebrow">Endo-TSR · training</p><h1>{parts.text(name)}</h1>'
+            f'<div class="cards">{"".join(boxes)}</div></header>{shown}{self._curves(planned)}'
+            f"<footer>Written at {now()}. {_advice(status, self._folder.path)}</footer>"
+        )
+        again = f"{FEWEST_SECONDS:.0f}" if status in ("running", "finished") else ""
+        return parts.page(f"{done} of {planned}: {name}", body, again)
+
+    def _picture(self) -> str:
+        """The frame as the model of the moment renders it, beside the truth; its PSNR joins the curve."""
+        state, index, time_ = self._state, self._frame, float(self._sequence.times[self._frame])
+        camera = camera_at(state.frames, self._sequence.cameras[index], time_)
+        out = render_at(state.gaussians, self._spectral, self._config, camera, time_, frames=state.frames)
+        truth, mask = self._sequence.frame(index).image, self._sequence.masks[index]
+        self._psnr.x.append(float(state.iteration))
+        self._psnr.y.append(psnr_tissue(out.colour, truth, mask))
+        shown = "".join(
+            f"<figure><figcaption>{label}</figcaption>{parts.image(bytes_image(colour), label)}</figure>"
+            for label, colour in (("Render", out.colour), ("Truth", truth))
+        )
+        title = f"{self._kind.capitalize()} frame {index} after iteration {state.iteration}"
+        return parts.section(title, f'<div class="charts">{shown}</div>')
+
+    def _curves(self, planned: int) -> str:
+        """Loss, and PSNR of the training views and of the frame, over the iterations."""
+        loss, views = (
+            ChartCurve(label, [e["iteration"] for e in self._log if e.get(key) is not None],
+                  [e[key] for e in self._log if e.get(key) is not None])
+            for key, label in (("loss", "loss"), ("psnr", "training views"))
+        )  # fmt: skip
+        charts = (
+            ("Loss", chart_svg("Loss", [loss], planned, logarithmic=True)),
+            ("PSNR, dB", chart_svg("PSNR, dB", [views, self._psnr], planned)),
+        )
+        figures = "".join(f"<figure><figcaption>{title}</figcaption>{svg}</figure>" for title, svg in charts if svg)
+        return parts.section("Curves", f'<div class="charts">{figures}</div>') if figures else ""
+
+
+def lead_to_report(folder: Path) -> None:
+    """Let the page of a training show the report, once there is one; a run without the page gets none."""
+    if (folder / LIVE_PAGE).is_file():
+        _replace(folder, parts.page("Endo-TSR", f'<p><a href="{REPORT}">The report</a></p>', f"0; url={REPORT}"))
+
+
+def _replace(folder: Path, page: str) -> None:
+    replace_file(folder / LIVE_PAGE, lambda temporary: temporary.write_text(page, encoding="utf-8", newline="\n"))
+
+
+def _kept(entry: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a line of the log that the page shows."""
+    return {key: entry[key] for key in KEPT if key in entry}
+
+
+def _advice(status: str, folder: Path) -> str:
+    """What a reader of the page can do next."""
+    if status == "running":
+        return "The page is written again from time to time, and the browser reads it again by itself."
+    if status == "finished":
+        return "The report follows here once the run is evaluated."
+    return f"Continue with <code>endotsr train --out {parts.text(folder)} --resume</code>."
