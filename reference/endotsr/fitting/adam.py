@@ -13,14 +13,15 @@ rounding noise moves a parameter by up to a full rate, which is why gradients ar
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
-from endotsr.kernels.gather import gather_columns
+from endotsr.kernels.gather import regather_columns
 from endotsr.kernels.jit import jit
-from endotsr.kernels.threads import parallel_for
+from endotsr.kernels.threads import parallel_calls, parallel_for
 
 Rate = float | tuple[tuple[slice, float], ...]
 """One learning rate, or one per part of the leading axis: ((slice(0, 1), 2.5e-3), (slice(1, None), 1.25e-4))."""
@@ -59,11 +60,13 @@ def regather(state: AdamState, names: Iterable[str], source: NDArray[np.intp], k
     names    the arrays that were gathered; the moments of the others, and all step counters, stay as they are
     source   (M,) and `kept`: see `gather_columns`
 
-    The moments change in place, one array after another, so that old and new ones are never held in memory together.
+    The moments change in place, so that old and new ones are not held in memory together.
     """
-    for group in (state.first, state.second):
-        for name in names:
-            group[name] = gather_columns(group[name], source, kept)
+
+    def moved(group: dict[str, FloatArray], name: str) -> None:
+        group[name] = regather_columns(group[name], source, kept)
+
+    parallel_calls(*(partial(moved, group, name) for group in (state.first, state.second) for name in names))
 
 
 def adam_update(
