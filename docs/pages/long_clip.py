@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from marks import write_marked
 
+from endotsr.config import config_from_dict, with_iterations
 from endotsr.opencv import read_png
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
@@ -79,8 +80,8 @@ def measured(options: argparse.Namespace) -> dict[str, Any]:
         begun = time.monotonic()
         found = peaks([sys.executable, "-m", "endotsr", *words, *limit])
         metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
-    between = options.preset != "paper"
-    cost = estimated_cost(options.frames, width, height, iterations, 1.0, options.memory, between)
+    config = config_from_dict({"preset": options.preset, "sequence": {"memory": options.memory}})
+    cost = estimated_cost(options.frames, width, height, with_iterations(config, iterations))
     about = {"frames": options.frames, "width": width, "height": height, "preset": options.preset}
     return about | {
         "memory": options.memory,

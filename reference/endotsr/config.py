@@ -259,6 +259,7 @@ SHARP = Config(
     model=ModelConfig(initial_width=0.05),
     loss=LossConfig(ssim_weight=0.2, lambda_lap=1.2),
     optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),
+    density=DensityConfig(maximum=100_000),
     initialisation=InitialisationConfig(motion="flow"),
     training=TrainingConfig(bridge_fraction=0.7, visits_per_frame=128),
 )

@@ -45,7 +45,8 @@ def run(words: list[str]) -> int:
     if cost:
         print(
             f"{checked.facts['frames']} frames of {checked.facts['width']}x{checked.facts['height']}: a training needs"
-            f" about {cost['total_bytes'] / 1e9:.1f} GB and {cost['minutes']:.0f} minutes on two cores"
+            f" about {cost['total_bytes'] / 1e9:.1f} GB and {cost['minutes']:.0f} minutes on two cores,"
+            f" with about {cost['gaussians']} Gaussians at the end"
         )
     print(f"{options.sequence}: {'refused' if checked.refused else 'can be trained on'}")
     if options.json is not None:

@@ -1,5 +1,6 @@
 """`endotsr train`: trains on a sequence and writes a run folder."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -42,6 +43,8 @@ class TrainOptions:
     """settings to start from"""
     iterations: Annotated[int | None, Option("N")] = None
     """exact length of the run; stretches the schedule. With --resume: a larger number extends the run"""
+    minutes: Annotated[float | None, Option("M")] = None
+    """length, points and Gaussians for a training of so many minutes on this machine, from preset `quick` upwards"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
     scale: float | None = None
@@ -72,7 +75,7 @@ class TrainOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    base, schedule_note = base_settings(words)
+    base, schedule_note = base_settings(words, unnamed="sharp" if "--minutes" in words else "paper")
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
         raise InputError("train: --out RUN is missing: the run folder to create")
@@ -100,7 +103,7 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
     from endotsr.cli.parts.calibration import calibrate_run
 
     assert options.out is not None
-    for name in ("config", "iterations", "resume"):
+    for name in ("config", "iterations", "minutes", "resume"):
         if getattr(options, name):
             raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
     folder = open_run(options.out)
@@ -135,6 +138,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     if not options.sequence:
         raise InputError("train: SEQUENCE is missing: a sequence folder, or the word `simulated`")
     assert options.out is not None
+    if options.minutes is not None and (options.iterations is not None or not 0 < options.minutes < math.inf):
+        raise InputError(f"train: --minutes {options.minutes:g}: allowed: a number > 0, without --iterations")
     config, source = _settings(options), options.sequence
     refuse_existing(options.out)
     if source != SIMULATED:
@@ -142,8 +147,10 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     sequence = load_sequence(source, config, SimulatorSettings())
     if options.evaluate and source != SIMULATED:
         recorded_positions(Path(source), sequence)  # refuses a damaged truth before the training begins
-    config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     threads = use_threads(config.training.threads)
+    config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
+    if options.minutes is not None:
+        config, schedule_note = _of_minutes(options, sequence, config)
     found: dict[str, Any] = {}
     lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
     if options.effects == "auto":
@@ -156,6 +163,21 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     shown = _progress(RunFolder(options.out), sequence, config)
     record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads) | found
     return train_new_run(options.out, record, sequence, config, shown), sequence
+
+
+def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:
+    """The settings for the minutes asked for, from a few timed iterations, and the line on them."""
+    from endotsr.fitting.compile_ahead import compile_ahead
+    from endotsr.fitting.pace import paced_for, seconds_of_unit
+
+    assert options.minutes is not None
+    compile_ahead(config, print)
+    unit = seconds_of_unit(sequence, config)
+    found = paced_for(options.minutes, sequence, config, unit)
+    return found, (
+        f"minutes: {options.minutes:g}, where an iteration of 60 000 Gaussians takes {1e3 * unit:.0f} ms: "
+        f"{found.training.iterations} iterations, {found.density.maximum} Gaussians"
+    )
 
 
 def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
@@ -172,6 +194,8 @@ def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Seque
     asked = asked_settings(TrainOptions, words, lengthened(_settings(options), frames), kept)
     extended = asked.training.iterations > kept.training.iterations
     allowed = RESUMABLE | ({"training.iterations"} if extended else set())
+    if options.minutes is not None:
+        raise InputError(f"{out}: --minutes beside --resume is not allowed: the length of a run is fixed")
     refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in allowed]
     if refused:
         raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
@@ -191,7 +215,7 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progre
     from endotsr.report.live_page import LIVE_PAGE, LivePage
 
     print(f"watch it in a browser: {folder.path / LIVE_PAGE}", flush=True)
-    return Progress(config.training.iterations, LivePage(folder, sequence, config))
+    return Progress(config, sequence.width * sequence.height, LivePage(folder, sequence, config))
 
 
 def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:

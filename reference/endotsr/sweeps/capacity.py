@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from endotsr.config import PAPER
 from endotsr.kernels.machine import memory_available, memory_of_machine, usable_cores
 from endotsr.kernels.memory import ASSUMED
 from endotsr.sequences.checks.cost import estimated_cost
@@ -30,7 +31,7 @@ class Capacity(NamedTuple):
 
 def run_bytes(size: Size) -> float:
     """Estimated memory of one run."""
-    return MARGIN * estimated_cost(size.frames, size.width, size.height, 1).total_bytes
+    return MARGIN * estimated_cost(size.frames, size.width, size.height, PAPER).total_bytes
 
 
 def capacity(

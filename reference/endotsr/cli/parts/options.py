@@ -42,10 +42,13 @@ class Sources:
     schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
 
 
-def base_settings(words: list[str]) -> tuple[Config, str]:
-    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is)."""
+def base_settings(words: list[str], unnamed: str = "paper") -> tuple[Config, str]:
+    """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
+
+    unnamed   the preset where neither names one
+    """
     sources = parse_known(Sources, words)
-    data = read_toml(sources.config) if sources.config else {}
+    data = {"preset": unnamed} | (read_toml(sources.config) if sources.config else {})
     if sources.preset:
         data = data | {"preset": sources.preset}
     config = config_from_dict(data, str(sources.config or "configuration"))

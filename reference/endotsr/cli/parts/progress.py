@@ -8,7 +8,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from endotsr.config import Config
 from endotsr.report.words import duration
+from endotsr.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
 
 if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 QUIET_SECONDS = 30.0  # between lines if the standard error is not a terminal
 BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"  # the time left is in the postfix
 LEAST_ITERATIONS, MOST_ITERATIONS = 5, 200  # whose seconds give the time left
+FORECAST_AFTER = 30  # iterations of this process
 SPIKE = 10.0  # medians: a longer iteration compiled code and is left out
 MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 views (PSNR comes every tenth)
 
@@ -24,11 +27,14 @@ MEMORY = {"loss": 0.98, "psnr": 0.8}  # of the running means: about the last 50 
 class Progress:
     """Loss and PSNR (running means over views), Gaussian count and time left.
 
-    page   is told of the same events, and of the time left
+    config   of the training, whose length is fixed
+    pixels   of a frame
+    page     is told of the same events, and of the time left
     """
 
-    def __init__(self, total: int, page: "LivePage | None" = None) -> None:
-        self._total, self._page = total, page
+    def __init__(self, config: Config, pixels: int, page: "LivePage | None" = None) -> None:
+        self._config, self._pixels, self._page = config, pixels, page
+        self._total, self._done, self._training = config.training.iterations, 0, None
         self._said = self._ended = time.monotonic()
         self._means: dict[str, float] = {}
         self._seconds: deque[float] = deque(maxlen=MOST_ITERATIONS)
@@ -36,6 +42,7 @@ class Progress:
 
     def begin(self, state: "TrainingState") -> None:
         """The training begins with `state`."""
+        self._training = state
         if self._page is not None:
             self._page.begin(state)
         self._said = self._ended = time.monotonic()
@@ -59,18 +66,28 @@ class Progress:
                 mean = self._means.get(name)
                 self._means[name] = value if mean is None else memory * mean + (1 - memory) * value
         now = time.monotonic()
-        self._seconds.append(now - self._ended)
-        self._ended = now
+        standing = self._standing(entry)
+        seen = self._pixels / 4 if standing.coarse else self._pixels
+        self._seconds.append((now - self._ended) / float(iteration_work(standing.gaussians, seen)))
+        self._ended, self._done = now, self._done + 1
+        left = self._left(standing)
         if self._page is not None:
-            left, _, known = self._left(entry).partition(" left")
-            self._page.update(entry, None if known else left)
+            self._page.update(entry, left)
+        if self._done == FORECAST_AFTER and left is not None:
+            self.say(
+                f"forecast: {left} of training from here, about {gaussians_at_end(self._config)} Gaussians at its end"
+            )
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
-                self._bar.set_postfix_str(self._state(entry), refresh=False)
+                self._bar.set_postfix_str(self._state(entry, left), refresh=False)
         elif now - self._said > QUIET_SECONDS:
             self._said = now
-            print(f"iteration {entry['iteration']} of {self._total}: {self._state(entry)}", file=sys.stderr, flush=True)
+            print(
+                f"iteration {entry['iteration']} of {self._total}: {self._state(entry, left)}",
+                file=sys.stderr,
+                flush=True,
+            )
 
     def say(self, message: str) -> None:
         """A line that does not disturb the bar."""
@@ -86,24 +103,29 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
 
-    def _state(self, entry: dict[str, Any]) -> str:
+    def _state(self, entry: dict[str, Any], left: str | None) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
-        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {self._left(entry)}"
+        time_left = "time left not known yet" if left is None else f"{left} left"
+        return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left}"
 
-    def _left(self, entry: dict[str, Any]) -> str:
-        return time_left(self._seconds, self._total - entry["iteration"])
+    def _standing(self, entry: dict[str, Any]) -> Standing:
+        coarse = self._training is not None and self._training.coarse
+        return Standing(entry["iteration"], entry.get("gaussians", 0), coarse)
+
+    def _left(self, standing: Standing) -> str | None:
+        unit = unit_seconds(self._seconds)
+        return None if unit is None else duration(unit * work_left(self._config, self._pixels, standing))
 
 
-def time_left(seconds: Sequence[float], remaining: int) -> str:
-    """The time that is left, from the seconds of the latest iterations, those that compiled code left out.
+def unit_seconds(seconds: Sequence[float]) -> float | None:
+    """Seconds of a unit of work from those of the latest iterations, without those that compiled code; None = unknown.
 
-    seconds     of the latest iterations, the last one last
-    remaining   iterations to come
+    seconds   of the latest iterations, each divided by its work
     """
     if len(seconds) < LEAST_ITERATIONS:
-        return "time left not known yet"
+        return None
     limit = SPIKE * statistics.median(seconds)
-    return f"{duration(statistics.fmean(s for s in seconds if s <= limit) * remaining)} left"
+    return statistics.fmean(s for s in seconds if s <= limit)
 
 
 class StepBar:

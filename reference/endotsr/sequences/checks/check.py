@@ -224,11 +224,9 @@ def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:
 
 def _cost(parts: Parts, size: tuple[int, ...], config: Config, run: _Pass) -> Cost:
     """Memory, disk and time of a training, and a finding where they are short."""
-    height, width, count, wanted = *size[:2], len(parts.images), config.sequence
-    between = config.training.bridge_fraction > 0
-    cost = estimated_cost(count, width, height, config.training.iterations, wanted.scale, wanted.memory, between)
-    where = str(parts.folder)
-    run.tried(lambda: FrameStore(count, width, height, wanted.memory, where), "disk", where)
+    height, width, count, where = *size[:2], len(parts.images), str(parts.folder)
+    cost = estimated_cost(count, width, height, config)
+    run.tried(lambda: FrameStore(count, width, height, config.sequence.memory, where), "disk", where)
     if cost.file_bytes:
         what = f"the frames need {cost.file_bytes / 1e9:.1f} GB and lie in a file while a training runs"
         run.findings.append(finding("frames-in-file", where, what))

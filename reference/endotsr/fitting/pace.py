@@ -1,0 +1,86 @@
+"""Settings for a wish in minutes: length, points and Gaussians grow together, from a first look to the best.
+
+`paced(x)` is the preset `quick` at x = 0 and `sharp` on 55 training frames at x = 1. Between and below them the three
+counts follow geometric sequences; above 1 the length alone grows. The machine is timed on the clip itself: a
+few iterations of a model without motion, which is thrown away.
+"""
+
+import statistics
+import time
+
+import msgspec
+
+from endotsr.config import QUICK, SHARP, Config, with_iterations
+from endotsr.errors import InputError
+from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.trainer import training_step
+from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
+from endotsr.sequences.sequence import Sequence
+
+SHARP_LENGTH, SHARP_GAUSSIANS = 7040, 80_000  # of `sharp` on 55 training frames of 640x512
+SLOWEST, LONGEST = -1.0, 3.0  # range of x: 364 iterations, and 19 times those of x = 1
+COARSE_BELOW = 0.5  # x up to which frames of half size come first
+HALVINGS = 20  # of that range
+WARM, TIMED = 4, 9  # iterations
+
+
+def paced(config: Config, x: float) -> Config:
+    """The settings with the length, the points and the budget of Gaussians of x; every other setting stays."""
+
+    def between(low: int, high: int, at: float) -> int:
+        return max(1, round(low * (high / low) ** at))
+
+    growing, first, best = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
+    timed = with_iterations(config, between(QUICK.training.iterations, SHARP_LENGTH, x))
+    maximum = between(QUICK.density.maximum, SHARP_GAUSSIANS, growing)
+    points = {
+        name: between(getattr(first, name), getattr(best, name), growing)
+        for name in ("first_frame_points", "other_frame_points")
+    }
+    replace = msgspec.structs.replace
+    return replace(
+        timed,
+        density=replace(timed.density, growth="budget", maximum=maximum),
+        initialisation=replace(timed.initialisation, **points),
+        training=replace(timed.training, coarse_start=x <= COARSE_BELOW),
+    )
+
+
+def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -> Config:
+    """The settings whose training takes so many minutes, where a unit of work takes `unit` seconds.
+
+    Raises: InputError if the shortest training of this kind takes longer.
+    """
+    pixels = sequence.width * sequence.height
+
+    def seconds(x: float) -> float:
+        asked = paced(config, x)
+        return unit * work_left(asked, pixels, at_start(asked))
+
+    low, high = SLOWEST, LONGEST
+    if seconds(low) > 60 * minutes:
+        raise InputError(
+            f"{minutes:g} minutes are not allowed: the shortest training of this clip takes {seconds(low) / 60:.2g} on"
+            " this machine; allowed: more minutes, or a smaller scale of the frames"
+        )
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if seconds(middle) <= 60 * minutes else (low, middle)
+    return paced(config, low)
+
+
+def seconds_of_unit(sequence: Sequence, config: Config) -> float:
+    """Seconds of a unit of work on this machine and this clip: the median of a few iterations, kernels compiled."""
+    replace = msgspec.structs.replace
+    first = replace(QUICK.initialisation, motion="none")
+    short = replace(
+        config, initialisation=first, training=replace(config.training, bridge_fraction=0.0, coarse_start=False)
+    )
+    state, shop, found = new_training(sequence, short), workshop(sequence, short), []
+    state.lambda_lap = state.lambda_lap or 0.0
+    for _ in range(WARM + TIMED):
+        began = time.perf_counter()
+        training_step(state, shop)
+        seconds = time.perf_counter() - began
+        found.append(seconds / float(iteration_work(state.gaussians.count, sequence.width * sequence.height)))
+    return statistics.median(found[WARM:])

@@ -1,0 +1,51 @@
+"""Settings for a wish in minutes."""
+
+import numpy as np
+import pytest
+
+from endotsr.config import PRESETS, lengthened
+from endotsr.errors import InputError
+from endotsr.fitting.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
+from endotsr.sequences.checks.cost import at_start, work_left
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.simulator.simulate import simulate
+
+SHARP = PRESETS["sharp"]
+
+
+@pytest.fixture(scope="module")
+def still():
+    return simulate(SimulatorSettings(frames=11, width=64, height=48)).sequence
+
+
+def test_the_ends_are_the_presets():
+    quick, best = paced(SHARP, 0.0), paced(SHARP, 1.0)
+    for name in ("initialisation", "loss", "optimiser", "density"):
+        assert getattr(quick, name) == getattr(PRESETS["quick"], name), name
+    assert quick.training.iterations == 1600 and quick.training.coarse_start and quick.density.maximum == 22_000
+    assert lengthened(SHARP, 55).training.iterations == SHARP_LENGTH == best.training.iterations
+    assert best.initialisation == SHARP.initialisation and not best.training.coarse_start
+
+
+@pytest.mark.parametrize("minutes", [1.0, 3.0, 10.0, 40.0])
+def test_the_planned_time_is_the_wish(still, minutes):
+    config = paced_for(minutes, still, SHARP, unit=0.12)
+    planned = 0.12 * work_left(config, still.width * still.height, at_start(config))
+    assert 0.97 * 60 * minutes < planned <= 60 * minutes
+
+
+def test_more_minutes_are_never_less_of_anything(still):
+    found = [paced_for(m, still, SHARP, unit=0.12) for m in np.geomspace(0.5, 60, 9)]
+    for name in ("training.iterations", "density.maximum", "initialisation.first_frame_points"):
+        section, key = name.split(".")
+        values = [getattr(getattr(config, section), key) for config in found]
+        assert values == sorted(values), name
+
+
+def test_too_few_minutes_are_refused_with_the_least(still):
+    with pytest.raises(InputError, match=r"0\.001 minutes are not allowed: the shortest training of this clip takes"):
+        paced_for(0.001, still, SHARP, unit=0.12)
+
+
+def test_the_machine_is_timed_without_a_trace(still):
+    assert 0 < seconds_of_unit(still, SHARP) < 60
