@@ -13,10 +13,9 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
 from endotsr.golden.judge.store import read_golden
-from endotsr.golden.twins import golden_requests
 from endotsr.gradcheck import PairReport, all_pairs, check_pair, one_thread, pair_stream
-from endotsr.gradcheck.twins import BOUND, BOUNDS, Distance, all_distances
 from endotsr.stages.registry import all_stages
+from makers.twins import BOUND, BOUNDS, Distance, all_distances, golden_requests
 
 DOCS = ROOT / "docs"
 NOTE = "<!-- Written by docs/_extensions/book_pages.py. Do not edit. -->\n"

@@ -11,8 +11,9 @@ from endotsr.golden.judge.format import FLIP_BUDGET, Array, Because, Case, Mista
 from endotsr.golden.judge.words import signs
 from endotsr.golden.reference import reference, stored
 from endotsr.splatting.render import Compositor
-from endotsr.stages.stage import Asked, Inputs, Outputs, Stage
+from endotsr.stages.stage import Inputs, Outputs, Stage
 from makers.making import Spec
+from makers.registry import JUDGED, Judged
 from makers.wrong import Wrong
 
 MARGIN = 10.0  # size in tolerances from which a mistake counts as detected
@@ -55,7 +56,7 @@ def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> So
     """
     inputs = stored_inputs(spec)
     runs = [reference(operation, inputs, s, "float64", "definition") for s in (spec.settings, *spec.either)]
-    asked = {n: a for n, a in operation.asked.items() if n in runs[0] and n not in spec.without}
+    asked = {n: a for n, a in JUDGED[operation.name].items() if n in runs[0] and n not in spec.without}
     answers = tuple({name: stored(found[name]) for name in asked} for found in runs)
     expected = answers[0]
     spreads = _spreads(spec, operation, inputs, answers, asked)
@@ -88,7 +89,7 @@ def solve(spec: Spec, operation: Stage, wrong: Mapping[str, Wrong] | None) -> So
     return Solved(case, inputs, answers)
 
 
-def _truth(asked: Asked, own: bool) -> Truth:
+def _truth(asked: Judged, own: bool) -> Truth:
     return Truth(kind="oracle", oracle=asked.oracle) if asked.oracle and not own else Truth(kind="self")
 
 
@@ -103,7 +104,7 @@ def nice(value: float) -> float:
     return next(float(f"{m * power:.0e}") for m in (1, 2, 5, 10) if m * power >= value * (1 - 1e-9))
 
 
-def _rule(name: str, asked: Asked, spread: tuple[float, float], answers: int) -> Rule:
+def _rule(name: str, asked: Judged, spread: tuple[float, float], answers: int) -> Rule:
     if asked.scale == "exact":
         return Rule(kind="exact")
     double, single = (nice(max(FLOOR[p], SAFETY[p] * s)) for p, s in zip(("float64", "float32"), spread))
@@ -126,7 +127,7 @@ def _shaken(spec: Spec, inputs: Inputs, step: float, draw: int) -> dict[str, NDA
 
 
 def _spreads(
-    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Asked]
+    spec: Spec, operation: Stage, inputs: Inputs, answers: tuple[Outputs, ...], asked: dict[str, Judged]
 ) -> dict[str, tuple[float, float]]:
     def run(arrays: Inputs, precision: str, compositor: Compositor = "definition") -> Outputs:
         return reference(operation, arrays, spec.settings, precision, compositor)
@@ -181,7 +182,7 @@ def _flip_budgets(spec: Spec, operation: Stage, inputs: Inputs, expected: Output
 
 
 def _mistakes(
-    spec: Spec, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Asked],
+    spec: Spec, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Judged],
     wrong: Mapping[str, Wrong],
 ) -> dict[str, Mistake]:  # fmt: skip
     """The visible effect of every wrong port on this case."""
@@ -210,7 +211,7 @@ def _detected(mistake: Mistake, rules: dict[str, Rule]) -> bool:
 
 
 def _shown(
-    made: Outputs, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Asked], precision: str
+    made: Outputs, answers: tuple[Outputs, ...], rules: dict[str, Rule], asked: dict[str, Judged], precision: str
 ) -> dict[str, Shown]:
     """Every output that a wrong answer changes by more than half its tolerance, from the nearest legal answer."""
     tries = []

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from endotsr.golden.judge.compare import judged
 from endotsr.golden.judge.format import Case
 from endotsr.golden.judge.store import Golden, golden_folder, read_golden
-from endotsr.stages.definition import TWINS, definition_stages
+from endotsr.stages.definition import definition_stages, twins
 from notebook_signs import flipped, signs_of
 
 FOLDER = Path(inspect.getfile(importlib.import_module("endotsr.definition"))).parent
@@ -81,8 +81,8 @@ def notices(golden: Golden, case: Case) -> bool:
 
 def cases_for(golden: Golden, name: str) -> list[Case]:
     """The cases that the definition answers right, those of the file first."""
-    cases = [case for case in golden.cases if case.operation in TWINS and case.name != "render/long_needle"]
-    own = [n for n, twin in TWINS.items() if twin.function.__module__.endswith(f".{name}")]
+    cases = [case for case in golden.cases if case.operation in twins() and case.name != "render/long_needle"]
+    own = [n for n, twin in twins().items() if twin.function.__module__.endswith(f".{name}")]
     return sorted(cases, key=lambda case: case.operation not in own)
 
 

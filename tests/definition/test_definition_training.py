@@ -29,13 +29,13 @@ from endotsr.fitting import schedules
 from endotsr.fitting.adam import rate_parts
 from endotsr.fitting.state import fresh_state, workshop
 from endotsr.fitting.trainer import training_step
-from endotsr.gradcheck.twins import scaled
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise, squared_neighbour_distance, training_points
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.settings import PAPER as FAST_PAPER
+from makers.twins import scaled
 
 STEPS = 50
 LOSS_BOUND, ARRAY_BOUND = 1e-13, 1e-10  # relative to the loss, and to the largest entry of an array

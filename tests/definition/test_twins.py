@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from endotsr.golden.judge.store import golden_folder, read_golden
-from endotsr.golden.twins import golden_requests
-from endotsr.gradcheck.twins import BOUNDS, distances, made_up, scaled
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.registry import all_stages
+from makers.registry import JUDGED
+from makers.twins import BOUNDS, distances, golden_requests, made_up, scaled
 
 STAGES, TWINS = all_stages(), definition_stages()
 STORED = list(golden_requests(read_golden(golden_folder())))
@@ -16,10 +16,9 @@ REFERENCE_ALONE = {"determinism"}  # asks for the same bits twice, of one progra
 
 @pytest.mark.parametrize("name", TWINS)
 def test_the_compiled_function_computes_its_definition(name):
-    found = distances(
-        STAGES[name], TWINS[name], [*made_up(STAGES[name]), *(request for stage, request in STORED if stage == name)]
-    )
-    assert {d.output for d in found} <= STAGES[name].asked.keys() and found
+    requests = [*made_up(STAGES[name]), *(request for stage, request in STORED if stage == name)]
+    found = distances(STAGES[name], TWINS[name], requests, JUDGED[name])
+    assert {d.output for d in found} <= JUDGED[name].keys() and found
     assert [d for d in found if not d.distance <= d.bound] == []
 
 
@@ -39,7 +38,7 @@ def test_a_wrong_function_is_seen():
         found["d_phi"] = found["d_phi"] * (1 + 1e-12 * (np.arange(6) == 2))
         return {name: found[name] for name in ("d_phi",)}
 
-    found = {d.output: d for d in distances(stage, twin._replace(reverse=wrong), made_up(stage))}
+    found = {d.output: d for d in distances(stage, twin._replace(reverse=wrong), made_up(stage), JUDGED["motion"])}
     assert found["d_phi"].distance > found["d_phi"].bound
     assert found["d_motion_coefficients"].distance == np.inf
     assert found["translation"].distance <= found["translation"].bound

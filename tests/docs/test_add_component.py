@@ -11,11 +11,12 @@ import pytest
 import endotsr.definition
 import endotsr.losses  # noqa: F401
 from endotsr.gradcheck import check_pair, check_precision, one_thread, pair_of, pair_stream
-from endotsr.gradcheck.twins import distances, made_up
+from endotsr.stages.definition import twin_of
+from makers.twins import distances, made_up
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "add_component.md"
 SQUARED, DEFINITION = "reference/endotsr/losses/squared.py", "reference/endotsr/definition/squared.py"
-STAGES, TWINS = "reference/endotsr/stages/losses.py", "reference/endotsr/stages/definition.py"
+STAGES, JUDGED = "reference/endotsr/stages/losses.py", "golden/makers/registry.py"
 BLOCKS = re.findall(r"^```python\n# (\S+)\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
@@ -35,7 +36,7 @@ def component(monkeypatch):
 
 
 def test_the_guide_has_a_block_for_each_step():
-    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, TWINS, "notebooks/10_base_losses.py"]
+    assert [path for path, _ in BLOCKS] == [DEFINITION, SQUARED, STAGES, JUDGED, "notebooks/10_base_losses.py"]
     root = GUIDE.parents[2]
     assert all((root / path).is_file() for path, _ in BLOCKS[2:]), "the guide names files that exist"
 
@@ -53,8 +54,10 @@ def test_the_component_agrees_with_its_definition(component):
 
 
 def test_the_stage_agrees_with_its_twin(component):
-    (stage,), twin = component[STAGES].STAGES, component[TWINS].TWINS["masked_squared"]
-    found = distances(stage, stage._replace(forward=twin.forward, reverse=twin.reverse), made_up(stage))
+    (stage,), judged = component[STAGES].STAGES, component[JUDGED].JUDGED["masked_squared"]
+    twin = twin_of(stage)
+    assert twin.forward.__self__.forward is component[DEFINITION].masked_squared_forward
+    found = distances(stage, stage._replace(forward=twin.forward, reverse=twin.reverse), made_up(stage), judged)
     assert {d.output for d in found} == {"loss", "d_rendered"} and all(d.distance <= d.bound for d in found)
 
 
@@ -69,10 +72,9 @@ def test_the_stage_passes_the_gradient_check(component):
     assert precision.passed, precision.failures
 
 
-def test_the_stage_answers_what_it_asks(component):
+def test_the_stage_answers_what_is_judged(component):
     (stage,) = component[STAGES].STAGES
     rng = np.random.default_rng(1)
     inputs = {"rendered": rng.random((3, 4, 4)), "observed": rng.random((3, 4, 4)), "mask": np.ones((4, 4), bool)}
     found = stage.compute({**inputs, "d_loss": np.array(1.0)}, {})
-    assert set(found) == set(stage.asked)
-    assert set(inputs) == set(stage.inputs)
+    assert set(found) == set(component[JUDGED].JUDGED[stage.name])

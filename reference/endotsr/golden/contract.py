@@ -8,7 +8,7 @@ import numpy as np
 
 from endotsr.golden.judge.words import fnv1a, unit_numbers, words
 from endotsr.stages.registry import all_stages
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage
+from endotsr.stages.stage import Found, Inputs, Settings, Stage
 
 
 def _reading(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
@@ -36,22 +36,14 @@ STAGES = [
         equation="",
         text="echo parts of the inputs",
         function="",
-        inputs={"harmonics": "1", "mask": "1", "scalar": "1", "empty": "1"},
         forward=_reading,
-        asked={
-            **{name: Asked(0, scale="exact") for name in ("column", "flat", "scalar", "empty")},
-            **{name: Asked(0, scale="exact") for name in ("tissue_pixels", "tissue_row")},
-            **{name: Asked(0, "px", "exact") for name in ("sample_x", "sample_y")},
-        },
     ),
     Stage(
         name="generator",
         equation="",
         text="words of the written-out generator",
         function="endotsr.golden.judge.words.words",
-        inputs={},
         forward=_generator,
-        asked={name: Asked(0, scale="exact") for name in ("words", "unit_numbers")},
     ),
 ]
 

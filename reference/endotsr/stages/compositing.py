@@ -24,7 +24,7 @@ from endotsr.splatting.render import CONIC_EPSILON, RenderSaved, Scene, render_f
 from endotsr.splatting.settings import EXACT, RasterSettings
 from endotsr.stages.made_up import AXES, COUNT, HEIGHT, LENS, WIDE, WIDTH, is_near, pose, raw_gaussians
 from endotsr.stages.requests import camera_of, compositor_of, raster_dict, raster_of, scene_of
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.stages.stage import Found, Inputs, Settings, Stage, Variant, split_blocks
 
 Random = np.random.Generator
 IMAGES: tuple[str, ...] = ("colour_image", "depth_image", "opacity_image")
@@ -179,41 +179,13 @@ def _blocks_answer(settings: Settings) -> bool:
     return compositing_blocks.supports(raster_of(settings))
 
 
-DRAWN, REVERSED = "render.render_forward", "compositing.composite_reverse"
-UNITS = dict(zip(IMAGES, ("display", "scene unit", "1")))
-RAW_UNITS = {
-    "position": "scene unit",
-    "quaternion": "1",
-    "log_scale": "1",
-    "opacity_logit": "1",
-    "harmonics": "display / Y00",
-}
-POSE_UNITS = {"rotation_matrix": "1", "translation": "scene unit"}
-
 STAGES = [
     Stage(
         name="composite",
         equation="B5",
         text="blend screen Gaussians",
         function="endotsr.splatting.compositing.composite_forward",
-        inputs={
-            "mean2d": "px",
-            "covariance2d": "px^2",
-            "opacity_logit": "1",
-            "colour": "display",
-            "depth": "scene unit",
-            "background": "display",
-        },
         forward=_composite,
-        asked={
-            **{name: Asked(1, unit, oracle="compositing.composite_forward") for name, unit in UNITS.items()},
-            "d_mean2d": Asked(2, "loss per px", "last", REVERSED),
-            "d_covariance2d": Asked(2, "loss per px^2", "last", REVERSED),
-            "d_opacity_logit": Asked(2, "loss", "last", REVERSED),
-            "d_colour": Asked(2, "loss per display unit", "last", REVERSED),
-            "d_depth": Asked(2, "loss per scene unit", "last", REVERSED),
-            "d_background": Asked(2, "loss per display unit", oracle=REVERSED),
-        },
         reverse=_composite_reverse,
         trace=_composite_trace,
         variants=_variants("composite"),
@@ -223,22 +195,7 @@ STAGES = [
         equation="B5",
         text="one view of deformed Gaussians",
         function="endotsr.splatting.render.render_forward",
-        inputs={**RAW_UNITS, "residual": "display / Y00", "background": "display", **POSE_UNITS},
         forward=_render,
-        asked={
-            **{name: Asked(3, unit, oracle=DRAWN) for name, unit in UNITS.items()},
-            "visible": Asked(3, scale="exact"),
-            "d_position": Asked(3, "loss per scene unit", "last"),
-            "d_quaternion": Asked(3, "loss", "last"),
-            "d_log_scale": Asked(3, "loss", "last"),
-            "d_opacity_logit": Asked(3, "loss", "last"),
-            "d_harmonics": Asked(3, "loss", "last"),
-            "d_residual": Asked(3, "loss", "last"),
-            "d_mean2d": Asked(3, "loss per px", "last"),
-            "d_background": Asked(3, "loss per display unit"),
-            "d_rotation_matrix": Asked(3, "loss"),
-            "d_translation": Asked(3, "loss per scene unit"),
-        },
         reverse=_render_reverse,
         extra=lambda inputs, settings, saved: {"visible": saved.visible},
         trace=_render_trace,

@@ -4,6 +4,7 @@
 definition and the comparison of the golden values with it.
 """
 
+import importlib
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -14,28 +15,21 @@ from numpy.typing import NDArray
 from endotsr.config import Config, DensityConfig, LossConfig
 from endotsr.definition import (
     adam,
-    appearance,
     calibration,
     compositing,
     covariance,
-    deformation,
     density_control,
     depth,
     dictionary,
-    exposure,
-    harmonics,
     initialisation,
     laplacian,
-    masked_l1,
     masked_ssim,
     matern,
-    motion,
     objective,
     pose,
     projection,
     render,
     schedules,
-    smoothness,
     train,
     view,
 )
@@ -66,7 +60,7 @@ def definition_stages() -> dict[str, Stage]:
     out.
     """
     stages, made = all_stages(), {}
-    for name, twin in TWINS.items():
+    for name, twin in twins().items():
         stage, dotted = stages[name], f"{twin.function.__module__}.{twin.function.__name__}"
         variants = tuple(variant for variant in stage.variants if not variant.settings.get("_compositor") == "blocks")
         variants = variants or stage.variants
@@ -76,6 +70,22 @@ def definition_stages() -> dict[str, Stage]:
             variants=tuple(variant._replace(function="") for variant in variants),
         )  # fmt: skip
     return made
+
+
+def twins() -> dict[str, Twin]:
+    """The twin of every stage that the definition computes; that of a plain pair is found by its names."""
+    stages = all_stages()
+    return {name: twin_of(stage) for name, stage in stages.items() if name in TWINS or stage.plain}
+
+
+def twin_of(stage: Stage) -> Twin:
+    """The twin of a stage. Raises KeyError for a stage that is written out and is not in `TWINS`."""
+    pair = stage.plain
+    if pair is None:
+        return TWINS[stage.name]
+    module = importlib.import_module(f"endotsr.definition.{pair.forward.__module__.rpartition('.')[2]}")
+    own = pair._replace(forward=getattr(module, pair.forward.__name__), reverse=getattr(module, pair.reverse.__name__))
+    return Twin(own.forward, own.run, own.back)
 
 
 def _trace_of(stage: Stage) -> Callable[[Inputs, Settings, Any], Any]:
@@ -88,24 +98,6 @@ def _trace_of(stage: Stage) -> Callable[[Inputs, Settings, Any], Any]:
 def _of(arrays: Inputs, names: tuple[str, ...]) -> list[Any]:
     """Some arrays, in this order."""
     return [arrays[name] for name in names]
-
-
-def _pair(forward: Any, reverse: Any, arguments: str, output: str, gradient: str = "") -> Twin:
-    """A pair whose arguments are inputs and settings of these names, and that has one output.
-
-    gradient  the name of the one gradient, where the reverse pass returns an array
-    """
-
-    def run(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-        given = {**settings, **inputs}
-        value, saved = forward(*(given.get(name) for name in arguments.split()))
-        return {output: value}, saved
-
-    def back(cotangents: Inputs, saved: Any) -> Found:
-        found = reverse(cotangents[output], saved)
-        return {gradient: found} if gradient else found._asdict()
-
-    return Twin(forward, run, back)
 
 
 # ---- the paper ----
@@ -404,35 +396,18 @@ def _sizes(state: Any) -> dict[str, NDArray]:
 
 TWINS: dict[str, Twin] = {
     "frequencies": Twin(dictionary.frequencies, _frequencies),
-    "dictionary": _pair(dictionary.dictionary_forward, dictionary.dictionary_reverse, "t omega", "phi"),
     "atoms": Twin(dictionary.normalise_forward, _atoms, _atoms_reverse, _statistics),
-    "appearance": _pair(
-        appearance.appearance_forward, appearance.appearance_reverse, "appearance_coefficients phi_bar beta", "residual"
-    ),
-    "motion": _pair(motion.motion_forward, motion.motion_reverse, "motion_coefficients phi", "translation"),
     "matern": Twin(
         matern.matern_penalty_forward, _matern, _matern_reverse, lambda inputs, settings, saved: {"rho": saved.rho}
     ),
     "laplacian": Twin(laplacian.laplacian_loss_forward, _laplacian, _laplacian_reverse, _bands),
     "calibration": Twin(calibration.calibrate, _calibration),
-    "deformation": _pair(
-        deformation.deformation_forward,
-        deformation.deformation_reverse,
-        "fdm_weight fdm_centre fdm_width t basis",
-        "offsets",
-    ),
     "covariance": Twin(covariance.covariance_forward, _covariance, _covariance_reverse),
     "projection": Twin(
         projection.projection_forward,
         _projection,
         _projection_reverse,
         lambda inputs, settings, saved: {"visible": saved.visible},
-    ),
-    "harmonics": _pair(
-        harmonics.harmonics_forward,
-        harmonics.harmonics_reverse,
-        "harmonics residual position centre degree",
-        "colour",
     ),
     "composite": Twin(compositing.composite_forward, _composite, _composite_reverse),
     "render": Twin(
@@ -441,18 +416,8 @@ TWINS: dict[str, Twin] = {
         _render_reverse,
         lambda inputs, settings, saved: {"visible": saved.visible},
     ),
-    "masked_l1": _pair(
-        masked_l1.masked_l1_forward, masked_l1.masked_l1_reverse, "rendered observed mask", "loss", "d_rendered"
-    ),
     "masked_ssim": Twin(masked_ssim.masked_ssim_forward, _ssim, _ssim_reverse),
     "normalised_depth": Twin(depth.normalised_depth_forward, _depth, _depth_reverse),
-    "smoothness": _pair(
-        smoothness.smoothness_forward,
-        smoothness.smoothness_reverse,
-        "rendered_depth rendered mask edges total_variation_factor",
-        "loss",
-    ),
-    "exposure": _pair(exposure.exposure_forward, exposure.exposure_reverse, "colour log_gain bias", "exposed"),
     "pose": Twin(pose.pose_forward, _pose, _pose_reverse),
     "scene": Twin(moving.scene_at, _scene),
     "objective": Twin(view.view_gradients, _objective, _objective_reverse, _images_and_terms),

@@ -5,24 +5,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.deformation import (
-    CHANNELS,
-    Basis,
-    DeformationSaved,
-    deformation_forward,
-    deformation_reverse,
-)
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
-
-
-def _deformation(inputs: Inputs, settings: Settings) -> tuple[Found, DeformationSaved]:
-    weight, centre, width = inputs["fdm_weight"], inputs["fdm_centre"], inputs["fdm_width"]
-    offsets, saved = deformation_forward(weight, centre, width, float(inputs["t"]), settings["basis"])
-    return {"offsets": offsets}, saved
-
-
-def _deformation_reverse(cotangents: Inputs, saved: DeformationSaved) -> Found:
-    return deformation_reverse(cotangents["offsets"], saved)._asdict()
+from endotsr.equations.deformation import CHANNELS, Basis, deformation_forward, deformation_reverse
+from endotsr.stages.stage import PlainPair, Variant
 
 
 def _inputs(rng: np.random.Generator, spread: float) -> dict[str, NDArray]:
@@ -49,21 +33,10 @@ def _variant(basis: Basis, spread: float) -> Variant:
 
 
 STAGES = [
-    Stage(
-        name="deformation",
-        equation="B1",
-        text="offsets of the flexible deformation model",
-        function="endotsr.equations.deformation.deformation_forward",
-        inputs={"fdm_weight": "raw parameter", "fdm_centre": "1", "fdm_width": "1", "t": "1"},
-        forward=_deformation,
-        asked={
-            "offsets": Asked(1, "raw parameter", "last", "deformation.deformation_forward"),
-            "d_fdm_weight": Asked(2, "loss per raw parameter", "last", "deformation.deformation_reverse"),
-            "d_fdm_centre": Asked(2, "loss", "last", "deformation.deformation_reverse"),
-            "d_fdm_width": Asked(2, "loss", "last", "deformation.deformation_reverse"),
-            "d_t": Asked(2, "loss", oracle="deformation.deformation_reverse"),
-        },
-        reverse=_deformation_reverse,
+    PlainPair(deformation_forward, deformation_reverse, "fdm_weight fdm_centre fdm_width t basis", "offsets").stage(
+        "deformation",
+        "B1",
+        "offsets of the flexible deformation model",
         variants=(_variant("quartic", 1.2), _variant("gaussian", 1.8)),
     ),
 ]

@@ -3,17 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.exposure import ExposureSaved, exposure_forward, exposure_reverse
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
-
-
-def _exposure(inputs: Inputs, settings: Settings) -> tuple[Found, ExposureSaved]:
-    exposed, saved = exposure_forward(inputs["colour"], inputs["log_gain"], inputs["bias"])
-    return {"exposed": exposed}, saved
-
-
-def _reverse(cotangents: Inputs, saved: ExposureSaved) -> Found:
-    return exposure_reverse(cotangents["exposed"], saved)._asdict()
+from endotsr.equations.exposure import exposure_forward, exposure_reverse
+from endotsr.stages.stage import PlainPair, Variant
 
 
 def _inputs(rng: np.random.Generator) -> dict[str, NDArray]:
@@ -26,20 +17,7 @@ def _inputs(rng: np.random.Generator) -> dict[str, NDArray]:
 
 
 STAGES = [
-    Stage(
-        name="exposure",
-        equation="B13",
-        text="gain and bias of a frame",
-        function="endotsr.equations.exposure.exposure_forward",
-        inputs={"colour": "display", "log_gain": "1", "bias": "display"},
-        forward=_exposure,
-        asked={
-            "exposed": Asked(1, "display", oracle="exposure.exposure_forward"),
-            "d_colour": Asked(2, "loss per display", oracle="exposure.exposure_reverse"),
-            "d_log_gain": Asked(2, "loss", oracle="exposure.exposure_reverse"),
-            "d_bias": Asked(2, "loss per display", oracle="exposure.exposure_reverse"),
-        },
-        reverse=_reverse,
-        variants=(Variant("exposure", _inputs),),
+    PlainPair(exposure_forward, exposure_reverse, "colour log_gain bias", "exposed").stage(
+        "exposure", "B13", "gain and bias of a frame", variants=(Variant("exposure", _inputs),)
     )
 ]

@@ -14,7 +14,7 @@ from endotsr.equations.laplacian import (
 )
 from endotsr.equations.pyramid import Upsampling
 from endotsr.errors import CalibrationError
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.stages.stage import Found, Inputs, Settings, Stage, Variant, split_blocks
 
 LEVELS = 3
 IMAGE_SHAPE = (3, 19, 22)  # odd and even; sizes 19x22, 10x11, 5x6, 3x3
@@ -99,23 +99,13 @@ def _calibration(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     }, None
 
 
-PER_DISPLAY = "loss per display unit"
-MASKS = "laplacian.support_masks"
-
 STAGES = [
     Stage(
         name="laplacian",
         equation="5",
         text="pyramid of the observed image, valid pixels, loss",
         function="endotsr.equations.laplacian.laplacian_loss_forward",
-        inputs={"rendered": "display", "observed": "display", "mask": "1"},
         forward=_laplacian,
-        asked={
-            **{f"band_{j}": Asked(1, "display", oracle="laplacian.laplacian_levels") for j in range(1, LEVELS + 1)},
-            **{f"valid_{j}": Asked(1, scale="exact", oracle=MASKS) for j in range(1, LEVELS + 1)},
-            "loss": Asked(1, "display", oracle="laplacian.laplacian_loss_forward"),
-            "d_rendered": Asked(2, PER_DISPLAY, oracle="laplacian.laplacian_loss_reverse"),
-        },
         reverse=_laplacian_reverse,
         extra=_bands,
         trace=_laplacian_trace,
@@ -126,13 +116,6 @@ STAGES = [
         equation="7",
         text="Laplacian weight from gradient images",
         function="endotsr.equations.calibration.calibrate",
-        inputs={"d_photometric": PER_DISPLAY, "d_laplacian": PER_DISPLAY},
         forward=_calibration,
-        asked={
-            "g_rgb": Asked(1, PER_DISPLAY),
-            "g_lap": Asked(1, PER_DISPLAY),
-            "lambda_lap": Asked(1, oracle="calibration.calibrate"),
-            "refused": Asked(1, scale="exact"),
-        },
     ),
 ]

@@ -13,15 +13,13 @@ from endotsr.losses.depth import (
 from endotsr.losses.masked_l1 import MaskedL1Saved, masked_l1_forward, masked_l1_reverse
 from endotsr.losses.masked_ssim import SsimSaved, masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import SmoothnessSaved, smoothness_forward, smoothness_reverse
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
+from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant
 
 Random = np.random.Generator
 
 CHANNELS, HEIGHT, WIDTH = 3, 9, 14
 FACTOR = 3.0  # total variation against squared steps: both parts of the gradient must show
 PEAK = (5, 3)  # the pixel that holds the largest rendered depth
-TEXTBOOK = 2e-4  # E[x^2] - E[x]^2 in float32 over C2 = 9e-4: the usual form of SSIM loses this much
-PER_DISPLAY, PER_LENGTH = "loss per display unit", "loss per scene unit"
 
 
 def _mask() -> NDArray[np.bool_]:
@@ -41,15 +39,6 @@ def _frame(dtype: np.dtype) -> dict[str, NDArray]:
 
 
 # ---- masked L1 ----
-
-
-def _l1(inputs: Inputs, settings: Settings) -> tuple[Found, MaskedL1Saved]:
-    loss, saved = masked_l1_forward(inputs["rendered"], inputs["observed"], inputs["mask"])
-    return {"loss": loss}, saved
-
-
-def _l1_reverse(cotangents: Inputs, saved: MaskedL1Saved) -> Found:
-    return {"d_rendered": masked_l1_reverse(float(cotangents["loss"]), saved)}
 
 
 def _l1_trace(inputs: Inputs, settings: Settings, saved: MaskedL1Saved) -> dict[str, NDArray]:
@@ -118,16 +107,6 @@ def _depth_inputs(rng: Random) -> dict[str, NDArray]:
 # ---- smoothness ----
 
 
-def _smoothness(inputs: Inputs, settings: Settings) -> tuple[Found, SmoothnessSaved]:
-    images = (inputs["rendered_depth"], inputs["rendered"], inputs["mask"], inputs["edges"])
-    loss, saved = smoothness_forward(*images, settings["total_variation_factor"])
-    return {"loss": loss}, saved
-
-
-def _smoothness_reverse(cotangents: Inputs, saved: SmoothnessSaved) -> Found:
-    return smoothness_reverse(float(cotangents["loss"]), saved)._asdict()
-
-
 def _smoothness_trace(inputs: Inputs, settings: Settings, saved: SmoothnessSaved) -> dict[str, NDArray]:
     outside = [np.where(inputs["mask"], 0, inputs[name]) for name in ("rendered_depth", "rendered")]
     steps = [np.diff(value, axis=axis) for value in outside for axis in (-1, -2)]
@@ -151,15 +130,10 @@ def _smoothness_inputs(rng: Random) -> dict[str, NDArray]:
 
 
 STAGES = [
-    Stage(
-        name="masked_l1",
-        equation="B6",
-        text="masked L1",
-        function="endotsr.losses.masked_l1.masked_l1_forward",
-        inputs={"rendered": "display", "observed": "display", "mask": "1"},
-        forward=_l1,
-        asked={"loss": Asked(1, "display", oracle="masked_l1.masked_l1_forward"), "d_rendered": Asked(2, PER_DISPLAY)},
-        reverse=_l1_reverse,
+    PlainPair(masked_l1_forward, masked_l1_reverse, "rendered observed mask", "loss", "d_rendered").stage(
+        "masked_l1",
+        "B6",
+        "masked L1",
         trace=_l1_trace,
         variants=(Variant("masked_l1", _l1_inputs, fixed=_frame),),
     ),
@@ -168,12 +142,7 @@ STAGES = [
         equation="B7",
         text="masked SSIM",
         function="endotsr.losses.masked_ssim.masked_ssim_forward",
-        inputs={"rendered": "display", "observed": "display", "mask": "1"},
         forward=_ssim,
-        asked={
-            "ssim": Asked(1, oracle="masked_ssim.masked_ssim_forward", least32=TEXTBOOK),
-            "d_rendered": Asked(2, PER_DISPLAY, oracle="masked_ssim.masked_ssim_reverse", least32=TEXTBOOK),
-        },
         reverse=_ssim_reverse,
         variants=(Variant("masked_ssim", _ssim_inputs, fixed=_frame),),
     ),
@@ -182,29 +151,17 @@ STAGES = [
         equation="B8",
         text="normalised depth",
         function="endotsr.losses.depth.normalised_depth_forward",
-        inputs={"rendered_depth": "scene unit", "prior_depth": "scene unit", "mask": "1"},
         forward=_depth,
-        asked={
-            "loss": Asked(1, oracle="depth.normalised_depth_forward"),
-            "d_rendered_depth": Asked(2, PER_LENGTH, oracle="depth.normalised_depth_forward"),
-        },
         reverse=_depth_reverse,
         trace=_depth_trace,
         variants=(Variant("normalised_depth", _depth_inputs, fixed=_priors),),
     ),
-    Stage(
-        name="smoothness",
-        equation="B9",
-        text="smoothness with given edges",
-        function="endotsr.losses.smoothness.smoothness_forward",
-        inputs={"rendered": "display", "rendered_depth": "scene unit", "mask": "1", "edges": "1"},
-        forward=_smoothness,
-        asked={
-            "loss": Asked(1, "scene unit^2", oracle="smoothness.smoothness_forward"),
-            "d_rendered": Asked(2, PER_DISPLAY, oracle="smoothness.smoothness_forward"),
-            "d_rendered_depth": Asked(2, PER_LENGTH, oracle="smoothness.smoothness_forward"),
-        },
-        reverse=_smoothness_reverse,
+    PlainPair(
+        smoothness_forward, smoothness_reverse, "rendered_depth rendered mask edges total_variation_factor", "loss"
+    ).stage(
+        "smoothness",
+        "B9",
+        "smoothness with given edges",
         trace=_smoothness_trace,
         variants=(Variant("smoothness", _smoothness_inputs, {"total_variation_factor": FACTOR}, _edges),),
     ),

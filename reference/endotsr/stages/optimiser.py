@@ -28,7 +28,7 @@ from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import initialise
 from endotsr.splatting.camera import Camera
 from endotsr.stages.requests import Tape, config_of, gaussians_of, initialisation_of, model_of, sequence_of
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, real_of
+from endotsr.stages.stage import Found, Inputs, Settings, Stage, real_of
 
 RESIDUAL_RATES = ("appearance_coefficients", "motion_coefficients")
 CONSTANT_LENS = {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 1, "height": 1}  # the extent reads poses only
@@ -145,21 +145,12 @@ def _total(array: NDArray) -> float:
     return float(array.sum(dtype=np.float64))
 
 
-EXACT = "exact"
 TERMS = {"term_l1": "l1", "term_ssim": "ssim", "term_depth": "depth",
          "term_smoothness": "smoothness", "term_laplacian": "laplacian",
          "term_penalty": "matern_penalty"}  # fmt: skip
 SQUARES = tuple(f"square_{name}" for name in Gaussians._fields)
 STATE = ("first_moments", "second_moments", "gradient_sum", "visits")
 SERIES = TERMS | {name: name for name in ("loss", *SQUARES, *STATE)}  # output: entry of the log
-RATES = [
-    "position", "quaternion", "log_scale", "opacity_logit", "harmonics_base", "harmonics_rest", "fdm_weight_position",
-    "fdm_weight_other", "fdm_centre", "fdm_width", *RESIDUAL_RATES,
-]  # fmt: skip
-DENSITY = "density_control.densify"
-FRAMES = {"images": "display / 255", "masks": "1", "prior_depths": "scene unit", "times": "1", "train_index": "frame"}
-POSES = {"rotation_matrices": "1", "translations": "scene unit"}
-RAW = {"position": "scene unit", "quaternion": "1", "log_scale": "1", "opacity_logit": "1"}
 
 STAGES = [
     Stage(
@@ -167,88 +158,34 @@ STAGES = [
         equation="B10",
         text="optimiser steps with given gradients",
         function="endotsr.fitting.adam.adam_update",
-        inputs={"parameter": "raw parameter", "gradients": "loss per raw parameter"},
         forward=_adam,
-        asked={
-            "parameter_after": Asked(1, oracle="adam.adam_scalar"),
-            "first": Asked(1),
-            "second": Asked(1),
-        },
     ),
     Stage(
         name="schedule",
         equation="B10",
         text="rates, weights and switches of some iterations",
         function="endotsr.fitting.schedules.learning_rates",
-        inputs={"iteration": "1"},
         forward=_schedule,
-        asked={
-            **{f"rate_{name}": Asked(1, "per step", oracle="schedules.learning_rates") for name in RATES},
-            "laplacian_weight": Asked(1, oracle="schedules.learning_rates"),
-            **{
-                name: Asked(1, scale=EXACT, oracle="schedules.learning_rates")
-                for name in ("degree", "residuals", "smoothness", "gathers", "densifies")
-            },
-        },
     ),
     Stage(
         name="density",
         equation="B11",
         text="statistics of some views, one densification",
         function="endotsr.scene.density_control.densify",
-        inputs={**RAW, "d_mean2d": "loss per px", "visible": "1", "split_noise": "1", **POSES},
         forward=_density,
-        asked={
-            "extent": Asked(1, "scene unit", oracle=DENSITY),
-            "mean_gradient": Asked(1, "loss per NDC unit", oracle=DENSITY),
-            **{
-                name: Asked(1, scale=EXACT, oracle=DENSITY)
-                for name in ("pruned", "cloned", "split", "count", "parent", "moments_kept")
-            },
-            "position_after": Asked(1, "scene unit", oracle=DENSITY),
-            "log_scale_after": Asked(1, oracle=DENSITY),
-        },
     ),
     Stage(
         name="initialisation",
         equation="B12",
         text="Gaussians from depth maps",
         function="endotsr.scene.initialisation.initialise",
-        inputs={**FRAMES, **POSES},
         forward=_initialisation,
-        asked={
-            "count": Asked(1, scale=EXACT, oracle="initialisation.initialise"),
-            "position": Asked(1, "scene unit", "last", "initialisation.initialise"),
-            "log_scale": Asked(1, oracle="initialisation.initialise"),
-            "harmonics": Asked(1, "display / Y00", oracle="initialisation.initialise"),
-            **{name: Asked(1) for name in ("quaternion", "opacity_logit", "fdm_weight", "fdm_centre", "fdm_width")},
-        },
     ),
     Stage(
         name="training",
         equation="6",
         text="calibration and some iterations",
         function="endotsr.fitting.trainer.training_step",
-        inputs={
-            **RAW,
-            "harmonics": "display / Y00",
-            "fdm_weight": "raw parameter",
-            "fdm_centre": "1",
-            "fdm_width": "1",
-            **FRAMES,
-            **POSES,
-            "frame_order": "frame",
-            "split_noise": "1",
-        },
         forward=_training,
-        asked={
-            "lambda_lap": Asked(4),
-            **{name: Asked(4, order="iteration") for name in TERMS},
-            "loss": Asked(4, "loss", order="iteration"),
-            "count": Asked(4, scale=EXACT, order="iteration"),
-            **{name: Asked(4, "raw parameter^2", order="iteration") for name in SQUARES},
-            **{name: Asked(4, order="iteration") for name in STATE},
-            **{f"final_{name}": Asked(4, "raw parameter", "max") for name in Gaussians._fields},
-        },
     ),
 ]

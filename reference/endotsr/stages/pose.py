@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.equations.pose import PoseSaved, pose_forward, pose_reverse
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant
+from endotsr.stages.stage import Found, Inputs, Settings, Stage, Variant
 
 ALWAYS_DOUBLE = "a pose is computed in float64, whatever the precision of its inputs"
 
@@ -37,16 +37,7 @@ STAGES = [
         equation="B16",
         text="correction of a camera pose",
         function="endotsr.equations.pose.pose_forward",
-        inputs={"rotation": "1", "translation": "scene", "rotation_vector": "rad", "offset": "scene"},
         forward=_pose,
-        asked={
-            "corrected_rotation": Asked(1, oracle="pose_oracle.corrected"),
-            "corrected_translation": Asked(1, "scene", oracle="pose_oracle.corrected"),
-            "d_rotation": Asked(2, "loss", oracle="pose_oracle.gradients"),
-            "d_translation": Asked(2, "loss per scene", oracle="pose_oracle.gradients"),
-            "d_rotation_vector": Asked(2, "loss per rad", oracle="pose_oracle.gradients"),
-            "d_offset": Asked(2, "loss per scene", oracle="pose_oracle.gradients"),
-        },
         reverse=_reverse,
         variants=(
             Variant("pose", lambda rng: _inputs(rng, 1.7), single=ALWAYS_DOUBLE),

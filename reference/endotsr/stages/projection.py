@@ -9,7 +9,7 @@ from endotsr.splatting.projection import Projected, ProjectionSaved, projection_
 from endotsr.splatting.settings import EXACT, PAPER, RasterSettings
 from endotsr.stages.made_up import AXES, COUNT, LENS, is_near, pose, positions
 from endotsr.stages.requests import camera_of, raster_dict, raster_of
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant, split_blocks
 
 Random = np.random.Generator
 
@@ -77,16 +77,6 @@ def _projection_variant(name: str, raster: RasterSettings) -> Variant:
 # ---- harmonics (B4) ----
 
 
-def _harmonics(inputs: Inputs, settings: Settings) -> tuple[Found, HarmonicsSaved]:
-    position, centre, degree = inputs["position"], inputs["centre"], settings["degree"]
-    colour, saved = harmonics_forward(inputs["harmonics"], inputs["residual"], position, centre, degree)
-    return {"colour": colour}, saved
-
-
-def _harmonics_reverse(cotangents: Inputs, saved: HarmonicsSaved) -> Found:
-    return harmonics_reverse(cotangents["colour"], saved)._asdict()
-
-
 def _harmonics_trace(inputs: Inputs, settings: Settings, saved: HarmonicsSaved) -> dict[str, NDArray]:
     return {"clamped": saved.clamped.astype(int)}
 
@@ -118,23 +108,13 @@ def _harmonics_variant(degree: int) -> Variant:
     )
 
 
-POSE_UNITS = {"rotation_matrix": "1", "translation": "scene unit"}
-PROJECTED = "projection.projection_forward"
-
 STAGES = [
     Stage(
         name="covariance",
         equation="B2",
         text="rotation and semi-axes",
         function="endotsr.splatting.covariance.covariance_forward",
-        inputs={"quaternion": "1", "log_scale": "1"},
         forward=_covariance,
-        asked={
-            "rotation": Asked(1, "1", "last", "covariance.rotation_of"),
-            "scale": Asked(1, "scene unit", "last"),
-            "d_quaternion": Asked(2, "loss", "last"),
-            "d_log_scale": Asked(2, "loss", "last"),
-        },
         reverse=_covariance_reverse,
         variants=(Variant("covariance", _covariance_inputs),),
     ),
@@ -143,43 +123,15 @@ STAGES = [
         equation="B3",
         text="screen mean, covariance and depth",
         function="endotsr.splatting.projection.projection_forward",
-        inputs={"position": "scene unit", "rotation": "1", "scale": "scene unit", **POSE_UNITS},
         forward=_projection,
-        asked={
-            "visible": Asked(1, scale="exact"),
-            "mean2d": Asked(1, "px", "last", PROJECTED),
-            "covariance2d": Asked(1, "px^2", "last", PROJECTED),
-            "depth": Asked(1, "scene unit", "last", PROJECTED),
-            "d_position": Asked(2, "loss per scene unit", "last"),
-            "d_rotation": Asked(2, "loss", "last"),
-            "d_scale": Asked(2, "loss per scene unit", "last"),
-            "d_rotation_matrix": Asked(2, "loss"),
-            "d_translation": Asked(2, "loss per scene unit"),
-        },
         reverse=_projection_reverse,
         extra=lambda inputs, settings, saved: {"visible": saved[0].visible},
         variants=(_projection_variant("exact", EXACT), _projection_variant("paper", PAPER)),
     ),
-    Stage(
-        name="harmonics",
-        equation="B4",
-        text="colour from harmonics",
-        function="endotsr.splatting.harmonics.harmonics_forward",
-        inputs={
-            "harmonics": "display / Y00",
-            "residual": "display / Y00",
-            "position": "scene unit",
-            "centre": "scene unit",
-        },
-        forward=_harmonics,
-        asked={
-            "colour": Asked(1, "display", oracle="harmonics.harmonics_forward"),
-            "d_harmonics": Asked(2, "loss"),
-            "d_residual": Asked(2, "loss"),
-            "d_position": Asked(2, "loss per scene unit"),
-            "d_centre": Asked(2, "loss per scene unit"),
-        },
-        reverse=_harmonics_reverse,
+    PlainPair(harmonics_forward, harmonics_reverse, "harmonics residual position centre degree", "colour").stage(
+        "harmonics",
+        "B4",
+        "colour from harmonics",
         trace=_harmonics_trace,
         variants=tuple(_harmonics_variant(degree) for degree in range(4)),
     ),

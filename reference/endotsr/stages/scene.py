@@ -12,10 +12,9 @@ from endotsr.fitting.model import SceneSaved, scene_at
 from endotsr.fitting.objective import LossWeights, Targets, frame_targets
 from endotsr.fitting.view import ViewGradients, view_gradients
 from endotsr.opencv import canny_edges
-from endotsr.scene.gaussians import Gaussians
 from endotsr.scene.parameters import Exposure
 from endotsr.sequences.sequence import Frame
-from endotsr.stages.compositing import POSE_UNITS, RAW_UNITS, render_decisions
+from endotsr.stages.compositing import render_decisions
 from endotsr.stages.made_up import COUNT, HEIGHT, LENS, WIDE, WIDTH, pose, raw_gaussians
 from endotsr.stages.requests import (
     camera_of,
@@ -26,7 +25,7 @@ from endotsr.stages.requests import (
     raster_of,
     spectral_of,
 )
-from endotsr.stages.stage import Asked, Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.stages.stage import Blocks, Found, Inputs, Settings, Stage, Variant, split_blocks
 
 BASES, FREQUENCIES = 3, 2
 
@@ -173,41 +172,13 @@ def _twice(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
 
 
 TWICE = ("objective", "d_position", "d_harmonics")
-GRADIENT_UNITS = {"position": "loss per scene unit", "motion_coefficients": "loss per scene unit"}
-COMPONENT_UNITS = {
-    "fdm_weight": "raw parameter",
-    "fdm_centre": "1",
-    "fdm_width": "1",
-    "appearance_coefficients": "1",
-    "motion_coefficients": "scene unit",
-    "exposure_log_gain": "1",
-    "exposure_bias": "display",
-    "times": "1",
-    "train_index": "frame",
-}
-VIEW_UNITS = {"observed": "display", "mask": "1", "prior_depth": "scene unit", "edges": "1"}
 
 OBJECTIVE = Stage(
     name="objective",
     equation="6",
     text="moving scene, render, full loss, every gradient",
     function="endotsr.fitting.objective.image_loss",
-    inputs={**RAW_UNITS, **COMPONENT_UNITS, **VIEW_UNITS, **POSE_UNITS},
     forward=_objective,
-    asked={
-        "colour_image": Asked(3, "display", oracle="render.render_forward"),
-        "depth_image": Asked(3, "scene unit", oracle="render.render_forward"),
-        "term_l1": Asked(3, "display", oracle="masked_l1.masked_l1_forward"),
-        "term_ssim": Asked(3, oracle="masked_ssim.masked_ssim_forward"),
-        "term_depth": Asked(3, oracle="depth.normalised_depth_forward"),
-        "term_smoothness": Asked(3, "scene unit^2", oracle="smoothness.smoothness_forward"),
-        "term_laplacian": Asked(3, "display", oracle="laplacian.laplacian_loss_forward"),
-        "term_penalty": Asked(3, "scene unit^2", oracle="matern.matern_penalty_forward"),
-        "objective": Asked(3, "loss", oracle="masked_l1.masked_l1_forward"),
-        **{f"d_{name}": Asked(3, GRADIENT_UNITS.get(name, "loss"), "last") for name in Gaussians._fields},
-        "d_exposure_log_gain": Asked(3, "loss"),
-        "d_exposure_bias": Asked(3, "loss per display unit"),
-    },
     reverse=_objective_reverse,
     extra=_images_and_terms,
     trace=_objective_trace,
@@ -221,14 +192,7 @@ STAGES = [
         equation="2",
         text="raw parameters at time t, every component applied",
         function="endotsr.fitting.model.scene_at",
-        inputs={**RAW_UNITS, **COMPONENT_UNITS},
         forward=_scene,
-        asked={
-            "position_at_t": Asked(1, "scene unit", "last", "motion.motion_forward"),
-            "quaternion_at_t": Asked(1, "1", "last", "deformation.deformation_forward"),
-            "log_scale_at_t": Asked(1, "1", "last", "deformation.deformation_forward"),
-            "residual_at_t": Asked(1, "display / Y00", "last", "appearance.appearance_forward"),
-        },
     ),
     OBJECTIVE,
     Stage(
@@ -236,11 +200,6 @@ STAGES = [
         equation="6",
         text="the objective computed twice",
         function="endotsr.fitting.objective.image_loss",
-        inputs=OBJECTIVE.inputs,
         forward=_twice,
-        asked={
-            **{f"{name}_1": Asked(5, "loss") for name in TWICE},
-            **{f"{name}_2": Asked(5, "loss", f"identical {name}_1") for name in TWICE},
-        },
     ),
 ]

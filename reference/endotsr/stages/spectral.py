@@ -5,9 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.appearance import AppearanceSaved, appearance_forward, appearance_reverse
+from endotsr.equations.appearance import appearance_forward, appearance_reverse
 from endotsr.equations.dictionary import (
-    DictionarySaved,
     NormaliseSaved,
     dictionary_forward,
     dictionary_reverse,
@@ -16,9 +15,9 @@ from endotsr.equations.dictionary import (
     normalise_reverse,
 )
 from endotsr.equations.matern import MaternSaved, matern_penalty_forward, matern_penalty_reverse, matern_weights
-from endotsr.equations.motion import MotionSaved, motion_forward, motion_reverse
+from endotsr.equations.motion import motion_forward, motion_reverse
 from endotsr.stages.requests import statistics_of
-from endotsr.stages.stage import Asked, Found, Inputs, Settings, Stage, Variant, split_blocks
+from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant, split_blocks
 
 Random = np.random.Generator
 
@@ -37,15 +36,6 @@ def _each_atom(name: str) -> Mapping[str, Mapping[str, object]]:
 
 def _frequencies(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     return {"omega": frequencies(settings["count"], settings["low"], settings["high"])}, None
-
-
-def _dictionary(inputs: Inputs, settings: Settings) -> tuple[Found, DictionarySaved]:
-    phi, saved = dictionary_forward(float(inputs["t"]), inputs["omega"])
-    return {"phi": phi}, saved
-
-
-def _dictionary_reverse(cotangents: Inputs, saved: DictionarySaved) -> Found:
-    return dictionary_reverse(cotangents["phi"], saved)._asdict()
 
 
 def _dictionary_inputs(rng: Random) -> dict[str, NDArray]:
@@ -82,15 +72,6 @@ def _stamps(dtype: np.dtype) -> dict[str, NDArray]:
 # ---- equation (2) ----
 
 
-def _appearance(inputs: Inputs, settings: Settings) -> tuple[Found, AppearanceSaved]:
-    residual, saved = appearance_forward(inputs["appearance_coefficients"], inputs["phi_bar"], settings["beta"])
-    return {"residual": residual}, saved
-
-
-def _appearance_reverse(cotangents: Inputs, saved: AppearanceSaved) -> Found:
-    return appearance_reverse(cotangents["residual"], saved)._asdict()
-
-
 def _appearance_inputs(rng: Random) -> dict[str, NDArray]:
     return {
         "appearance_coefficients": rng.normal(0.0, 0.4, (3, 2 * FREQUENCIES, GAUSSIANS)),
@@ -99,15 +80,6 @@ def _appearance_inputs(rng: Random) -> dict[str, NDArray]:
 
 
 # ---- equation (3) ----
-
-
-def _motion(inputs: Inputs, settings: Settings) -> tuple[Found, MotionSaved]:
-    translation, saved = motion_forward(inputs["motion_coefficients"], inputs["phi"])
-    return {"translation": translation}, saved
-
-
-def _motion_reverse(cotangents: Inputs, saved: MotionSaved) -> Found:
-    return motion_reverse(cotangents["translation"], saved)._asdict()
 
 
 def _motion_inputs(rng: Random) -> dict[str, NDArray]:
@@ -146,23 +118,12 @@ STAGES = [
         equation="1",
         text="log-spaced frequencies",
         function="endotsr.equations.dictionary.frequencies",
-        inputs={},
         forward=_frequencies,
-        asked={"omega": Asked(1, "cycles per sequence", oracle="fourier_oracle.frequencies")},
     ),
-    Stage(
-        name="dictionary",
-        equation="1",
-        text="atoms at one time, forward and reverse",
-        function="endotsr.equations.dictionary.dictionary_forward",
-        inputs={"t": "1", "omega": "cycles per sequence"},
-        forward=_dictionary,
-        asked={
-            "phi": Asked(1, oracle="fourier_oracle.dictionary"),
-            "d_t": Asked(2, "loss"),
-            "d_omega": Asked(2, "loss per cycle"),
-        },
-        reverse=_dictionary_reverse,
+    PlainPair(dictionary_forward, dictionary_reverse, "t omega", "phi").stage(
+        "dictionary",
+        "1",
+        "atoms at one time, forward and reverse",
         variants=(Variant("dictionary", _dictionary_inputs),),
     ),
     Stage(
@@ -170,54 +131,28 @@ STAGES = [
         equation="1b",
         text="statistics over the training stamps and normalised atoms",
         function="endotsr.equations.dictionary.normalise_forward",
-        inputs={"phi": "1", "times": "1", "train_index": "frame", "omega": "cycles per sequence"},
         forward=_atoms,
-        asked={
-            "mean": Asked(1),
-            "rms": Asked(1),
-            "dead": Asked(1, scale="exact"),
-            "phi_bar": Asked(1, oracle="fourier_oracle.normalised"),
-            "d_phi": Asked(2, "loss"),
-        },
         reverse=_atoms_reverse,
         extra=_statistics,
         variants=(Variant("normalise", _atoms_inputs, fixed=_stamps),),
     ),
-    Stage(
-        name="appearance",
-        equation="2",
-        text="bounded colour residual",
-        function="endotsr.equations.appearance.appearance_forward",
-        inputs={"appearance_coefficients": "1", "phi_bar": "1"},
-        forward=_appearance,
-        asked={
-            "residual": Asked(1, "display / Y00", oracle="appearance.appearance_forward"),
-            "d_appearance_coefficients": Asked(2, "loss", "last", "appearance.appearance_reverse"),
-            "d_phi_bar": Asked(2, "loss", oracle="appearance.appearance_reverse"),
-        },
-        reverse=_appearance_reverse,
+    PlainPair(appearance_forward, appearance_reverse, "appearance_coefficients phi_bar beta", "residual").stage(
+        "appearance",
+        "2",
+        "bounded colour residual",
         variants=(
             Variant(
                 "appearance",
                 _appearance_inputs,
-                settings={"beta": 0.3},
+                {"beta": 0.3},
                 blocks=split_blocks(_each_atom("appearance_coefficients")),
             ),
         ),
     ),
-    Stage(
-        name="motion",
-        equation="3",
-        text="translation residual",
-        function="endotsr.equations.motion.motion_forward",
-        inputs={"motion_coefficients": "scene unit", "phi": "1"},
-        forward=_motion,
-        asked={
-            "translation": Asked(1, "scene unit", oracle="motion.motion_forward"),
-            "d_motion_coefficients": Asked(2, "loss per scene unit", "last", "motion.motion_reverse"),
-            "d_phi": Asked(2, "loss", oracle="motion.motion_reverse"),
-        },
-        reverse=_motion_reverse,
+    PlainPair(motion_forward, motion_reverse, "motion_coefficients phi", "translation").stage(
+        "motion",
+        "3",
+        "translation residual",
         variants=(Variant("motion", _motion_inputs, blocks=split_blocks(_each_atom("motion_coefficients"))),),
     ),
     Stage(
@@ -225,13 +160,7 @@ STAGES = [
         equation="4",
         text="Matern weights and penalty",
         function="endotsr.equations.matern.matern_penalty_forward",
-        inputs={"motion_coefficients": "scene unit", "omega": "cycles per sequence"},
         forward=_matern,
-        asked={
-            "rho": Asked(1, oracle="matern_oracle.weights"),
-            "penalty": Asked(1, "scene unit^2", oracle="matern.matern_penalty_forward"),
-            "d_motion_coefficients": Asked(2, "loss per scene unit", oracle="matern.matern_penalty_reverse"),
-        },
         reverse=_matern_reverse,
         extra=lambda inputs, settings, saved: {"rho": _weights(inputs, settings)},
         variants=(

@@ -18,17 +18,6 @@ Found = Mapping[str, NDArray | float | None]
 Blocks = Mapping[str, tuple[str, object]]
 
 
-class Asked(NamedTuple):
-    """An array that a stage returns, and how a golden case judges it."""
-
-    level: int
-    unit: str = "1"
-    scale: str = "max"  # "exact", "max" or "last"
-    oracle: str = ""  # name in the golden files of the independent program that gives the value; empty: there is none
-    least32: float = 0.0  # least float32 tolerance: what another sound formula loses, beyond the measured spread
-    order: str = ""  # "iteration": entry k is of iteration k + 1
-
-
 def _always(settings: Settings) -> bool:
     return True
 
@@ -66,34 +55,32 @@ class Stage(NamedTuple):
     equation  label of the specification ("1" ... "7" for the paper, "B..." for the base model); "" = none
     text      what it computes, in a few words
     function  dotted name of the forward function of the package
-    inputs    unit by name of every array that a request may hold, cotangents apart
     forward   (inputs, settings) -> (outputs that can be differentiated, saved)
-    asked     outputs, `extra` outputs and gradients in the order in which they are stored and judged
     reverse   (cotangents by output name, saved) -> gradients, named `d_` and the input; None = not differentiated
     extra     (inputs, settings, saved) -> further outputs, which are not differentiated
     trace     (inputs, settings, saved) -> the discrete decisions of the forward pass (order, contributors, clamps,
               signs); a finite difference across a change of them is refused. None = no decisions
     variants  the gradient checks
     is_loss   the one output is the loss that all derivatives are of: its cotangent is 1 unless it is given
+    plain     the pair that the stage is made of, whose twin has the same names; None = written out
     """
 
     name: str
     equation: str
     text: str
     function: str
-    inputs: Mapping[str, str]
     forward: Callable[[Inputs, Settings], tuple[Found, Any]]
-    asked: Mapping[str, Asked]
     reverse: Callable[[Inputs, Any], Found] | None = None
     extra: Callable[[Inputs, Settings, Any], Found] | None = None
     trace: Callable[[Inputs, Settings, Any], Mapping[str, NDArray]] | None = None
     variants: tuple[Variant, ...] = ()
     is_loss: bool = False
+    plain: "PlainPair | None" = None
 
     def compute(self, inputs: Inputs, settings: Settings) -> Outputs:
         """All results of a request: outputs, and gradients where the request holds every cotangent.
 
-        returns  arrays by name in C order; may hold more, or fewer, names than `asked`
+        returns  arrays by name in C order
         """
         outputs, saved = self.forward(inputs, settings)
         found = dict(outputs)
@@ -108,6 +95,41 @@ class Stage(NamedTuple):
     def checks(self, settings: Settings) -> tuple[str, ...]:
         """Names of the variants that a golden case with these settings exercises."""
         return tuple(variant.name for variant in self.variants if variant.covers(settings))
+
+
+class PlainPair(NamedTuple):
+    """A forward and a reverse function that are called with inputs and settings by name, and have one output.
+
+    arguments   names of inputs and settings, in the order of the parameters
+    output      name of the value
+    gradient    name of the one gradient where the reverse pass returns an array; "": it returns a NamedTuple of them
+    """
+
+    forward: Any
+    reverse: Any
+    arguments: str
+    output: str
+    gradient: str = ""
+
+    def run(self, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+        """The forward pass of a request; an input without axes is a number."""
+        given = {**settings, **{name: _number(value) for name, value in inputs.items()}}
+        value, saved = self.forward(*(given.get(name) for name in self.arguments.split()))
+        return {self.output: value}, saved
+
+    def back(self, cotangents: Inputs, saved: Any) -> Found:
+        """The gradients of a request."""
+        found = self.reverse(_number(cotangents[self.output]), saved)
+        return {self.gradient: found} if self.gradient else found._asdict()
+
+    def stage(self, name: str, equation: str, text: str, **fields: Any) -> Stage:
+        """The stage of this pair; `fields` as of `Stage`."""
+        function = f"{self.forward.__module__}.{self.forward.__name__}"
+        return Stage(name, equation, text, function, self.run, self.back, plain=self, **fields)
+
+
+def _number(value: NDArray) -> Any:
+    return float(value) if np.ndim(value) == 0 and np.asarray(value).dtype.kind == "f" else value
 
 
 def real_of(inputs: Inputs) -> np.dtype:

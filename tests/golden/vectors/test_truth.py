@@ -7,7 +7,7 @@ import endotsr.definition as definition
 from endotsr.golden.judge.compare import judged, largest
 from endotsr.golden.judge.store import golden_folder, read_golden
 from endotsr.stages.definition import definition_stages
-from endotsr.stages.registry import all_stages
+from makers.registry import JUDGED
 from oracle import adam, fourier_oracle, matern_oracle, pose_oracle
 
 GOLDEN = read_golden(golden_folder())
@@ -133,7 +133,7 @@ def test_every_independent_program_that_a_file_names_exists():
         module.__name__.rpartition(".")[2]: module for module in (adam, fourier_oracle, matern_oracle, pose_oracle)
     }
     named = {o.truth.oracle for case in GOLDEN.cases for o in case.outputs.values() if o.truth.kind == "oracle"}
-    named |= {asked.oracle for stage in all_stages().values() for asked in stage.asked.values() if asked.oracle}
+    named |= {judged.oracle for outputs in JUDGED.values() for judged in outputs.values() if judged.oracle}
     for program in sorted(named):
         module, function = program.split(".")
         homes = [home for home in (modules.get(module), getattr(definition, module, None)) if home]

@@ -5,16 +5,18 @@ gradient the largest difference in units of its scale, which for most arrays is 
 stated here; the test and the table of the book read them.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.golden.judge.store import Golden
 from endotsr.gradcheck.registry import one_thread, pair_stream
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.registry import all_stages
 from endotsr.stages.stage import Inputs, Settings, Stage
+from makers.registry import JUDGED, Judged
 
 SEEDS = (0, 1, 2)
 SMALL_COLUMN = 1e-3  # of the largest magnitude: the least scale of a column
@@ -26,9 +28,10 @@ BOUNDS = {
     "render of a long needle": (1e-5, "the definition inverts Sigma, and loses (length / width)^2 roundings"),
 }
 LONG_NEEDLE = "golden render/long_needle"  # a row of its own
+ANY_VALUE = 1.0  # a float64 tolerance from here on, in units of the scale, asks for nothing: the output is rounding
 
 
-class Request(NamedTuple):
+class TwinRequest(NamedTuple):
     """Arrays and settings by name, of a made-up input or of a golden case, and what is asked; empty = everything."""
 
     label: str
@@ -48,7 +51,7 @@ class Distance(NamedTuple):
     request: str  # where it is largest
 
 
-def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[Request]:
+def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[TwinRequest]:
     """The inputs of the gradient checks of a stage, with a random cotangent for every output."""
     for variant in stage.variants:
         for seed in seeds:
@@ -57,7 +60,7 @@ def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[Request]:
             inputs |= {} if variant.fixed is None else variant.fixed(np.dtype(np.float64))
             outputs, _ = stage.forward(inputs, variant.settings)
             cotangents = {f"d_{name}": rng.normal(0, 1, np.asarray(value).shape) for name, value in outputs.items()}
-            yield Request(f"{variant.name}, seed {seed}", inputs | cotangents, variant.settings)
+            yield TwinRequest(f"{variant.name}, seed {seed}", inputs | cotangents, variant.settings)
 
 
 def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
@@ -77,17 +80,30 @@ def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
     return float(np.where(np.isfinite(off), off, np.inf).max(initial=0))
 
 
-def distances(stage: Stage, twin: Stage, requests: Iterable[Request]) -> list[Distance]:
-    """The worst difference of every output that the stage answers, over all requests; those of needles apart."""
+def golden_requests(golden: Golden) -> Iterator[tuple[str, TwinRequest]]:
+    """(name of the stage, request) of every case."""
+    for case in golden.cases:
+        inputs = {name: golden.array(case, array.file) for name, array in case.inputs.items()}
+        asked = tuple(name for name, output in case.outputs.items() if output.compare.float64 < ANY_VALUE)
+        yield case.operation, TwinRequest(f"golden {case.name}", inputs, case.settings, asked)
+
+
+def distances(
+    stage: Stage, twin: Stage, requests: Iterable[TwinRequest], judged: Mapping[str, Judged]
+) -> list[Distance]:
+    """The worst difference of every output that the stage answers, over all requests; those of needles apart.
+
+    judged   the outputs of the stage, as in `makers.registry`
+    """
     worst: dict[tuple[str, str], tuple[float, str]] = {}
     for request in requests:
         name = "render of a long needle" if request.label == LONG_NEEDLE else stage.name
         with one_thread(), np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             wanted = stage.compute(request.inputs, request.settings)
             got = twin.compute(request.inputs, request.settings)
-        for output in request.asked or [output for output in stage.asked if output in wanted]:
+        for output in request.asked or [output for output in judged if output in wanted]:
             missing = np.array(np.nan)
-            found = scaled(got.get(output, missing), wanted.get(output, missing), stage.asked[output].scale)
+            found = scaled(got.get(output, missing), wanted.get(output, missing), judged[output].scale)
             if found >= worst.get((name, output), (-1.0, ""))[0]:
                 worst[name, output] = (found, request.label)
     return [
@@ -96,12 +112,12 @@ def distances(stage: Stage, twin: Stage, requests: Iterable[Request]) -> list[Di
     ]
 
 
-def all_distances(stored: Iterable[tuple[str, Request]] = ()) -> list[Distance]:
+def all_distances(stored: Iterable[tuple[str, TwinRequest]] = ()) -> list[Distance]:
     """Every stage on its made-up inputs and on further requests, given as (stage name, request)."""
-    more: dict[str, list[Request]] = {}
+    more: dict[str, list[TwinRequest]] = {}
     for name, request in stored:
         more.setdefault(name, []).append(request)
     stages, found = all_stages(), []
     for name, twin in definition_stages().items():
-        found += distances(stages[name], twin, [*made_up(stages[name]), *more.get(name, ())])
+        found += distances(stages[name], twin, [*made_up(stages[name]), *more.get(name, ())], JUDGED[name])
     return found
