@@ -90,6 +90,10 @@ def test_data_between_rooms_is_typed():
     assert sum(house.untyped().values()) <= 245, house.untyped()
 
 
+def test_no_function_is_long():
+    assert {f.name: f.lines for f in house.functions() if f.lines > house.LONGEST_FUNCTION} == {}
+
+
 def test_settings_and_commands_are_counted():
     """Read from the sources, they are those that the package has."""
     from endotsr.cli.main import COMMANDS

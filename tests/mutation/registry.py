@@ -82,8 +82,8 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "final T in place of T_i",
-        COMPOSITE_REVERSE,
-        (("alpha, t, e, dy = kept[j, 0], kept[j, 1]", "alpha, t, e, dy = kept[j, 0], kept[n - 1, 1]"),),
+        "splatting.compositing._pixel_reverse",
+        (("alpha, t, e, dy = kept[j, 0], kept[j, 1]", "alpha, t, e, dy = kept[j, 0], kept[hit.size - 1, 1]"),),
     ),
     Defect("sign of dy", "splatting.compositing._alpha", (("dy = y - record[V]", "dy = record[V] - y"),)),
     Defect(

@@ -126,6 +126,38 @@ def _composite(
                 depth[row, column], opacity[row, column], transmittance[row, column] = z, total, t
 
 
+def _pixel_reverse(records, ranks, hit, kept, pixel, rest, sums):
+    """From the last blended pair of a pixel to the first: what each adds to the sums of its pair.
+
+    hit, kept   pairs that were blended, nearest first; alpha, T, e, dy and the alpha that passes the clamp
+    pixel       dL/d(red, green, blue, depth, opacity)
+    rest        <g, R> behind the last pair
+    """
+    one = records.dtype.type(1)
+    g0, g1, g2, gz, go = pixel
+    for j in range(hit.size - 1, -1, -1):
+        record = records[ranks[hit[j]]]
+        alpha, t, e, dy = kept[j, 0], kept[j, 1], kept[j, 2], kept[j, 3]
+        own = g0 * record[RED] + g1 * record[GREEN] + g2 * record[BLUE] + gz * record[DEPTH] + go
+        s = kept[j, 4] * (t * (own - rest))
+        rest = alpha * own + (one - alpha) * rest
+        weight = alpha * t
+        out = sums[hit[j]]
+        out[SUM_S] += s
+        out[SUM_SE] += s * e
+        out[SUM_SY] += s * dy
+        out[SUM_SEE] += s * e * e
+        out[SUM_SEY] += s * e * dy
+        out[SUM_SYY] += s * dy * dy
+        out[SUM_RED] += weight * g0
+        out[SUM_GREEN] += weight * g1
+        out[SUM_BLUE] += weight * g2
+        out[SUM_DEPTH] += weight * gz
+
+
+_pixel_reverse_kernel = jit(_pixel_reverse)
+
+
 def _composite_reverse(
     first_tile,
     last_tile,
@@ -147,8 +179,8 @@ def _composite_reverse(
     tiles_x = (width + TILE_WIDTH - 1) // TILE_WIDTH
     for tile in range(first_tile, last_tile):
         first, length = starts[tile], starts[tile + 1] - starts[tile]
-        for p in range(length):
-            pair_gradients[first + p, :] = zero
+        end = first + length
+        pair_gradients[first:end] = zero
         hit = np.empty(length, np.int64)  # pairs that were blended, nearest first
         kept = np.empty((length, 5), records.dtype)  # alpha, T, e, dy, whether the gradient passes the clamp
         top, left = (tile // tiles_x) * TILE_HEIGHT, (tile % tiles_x) * TILE_WIDTH
@@ -173,24 +205,8 @@ def _composite_reverse(
                 g0, g1, g2 = d_colour[0, row, column], d_colour[1, row, column], d_colour[2, row, column]
                 gz, go = d_depth[row, column], d_opacity[row, column]
                 rest = g0 * background[0] + g1 * background[1] + g2 * background[2]  # <g, R> behind the pair
-                for j in range(n - 1, -1, -1):
-                    record = records[ranks[first + hit[j]]]
-                    alpha, t, e, dy = kept[j, 0], kept[j, 1], kept[j, 2], kept[j, 3]
-                    own = g0 * record[RED] + g1 * record[GREEN] + g2 * record[BLUE] + gz * record[DEPTH] + go
-                    s = kept[j, 4] * (t * (own - rest))
-                    rest = alpha * own + (one - alpha) * rest
-                    weight = alpha * t
-                    out = pair_gradients[first + hit[j]]
-                    out[SUM_S] += s
-                    out[SUM_SE] += s * e
-                    out[SUM_SY] += s * dy
-                    out[SUM_SEE] += s * e * e
-                    out[SUM_SEY] += s * e * dy
-                    out[SUM_SYY] += s * dy * dy
-                    out[SUM_RED] += weight * g0
-                    out[SUM_GREEN] += weight * g1
-                    out[SUM_BLUE] += weight * g2
-                    out[SUM_DEPTH] += weight * gz
+                pixel = g0, g1, g2, gz, go
+                _pixel_reverse_kernel(records, ranks[first:end], hit[:n], kept, pixel, rest, pair_gradients[first:end])
 
 
 _composite_kernel = jit(_composite)
