@@ -37,7 +37,7 @@ def video_seeds() -> list[bytes]:
     """Three pictures as .mp4, without loss and with."""
     import tempfile
 
-    from endotsr.opencv.video import write_video
+    from endotsr.sequences.film_file import write_video
 
     pictures = list(np.random.default_rng(0).integers(0, 255, (3, 16, 24, 3), np.uint8))
     with tempfile.TemporaryDirectory() as scratch:

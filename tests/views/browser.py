@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,11 +33,19 @@ def browser() -> str:
     return found
 
 
-def dom(page: Path, moment: str) -> str:
-    """The document after the page has drawn."""
-    words = [browser(), *FLAGS, f"--user-data-dir={page.parent / 'profile'}"]
+def dom(page: Path, moment: str, *more: str) -> str:
+    """The document after the page has drawn; `more` are further flags."""
+    words = [browser(), *FLAGS, *more, f"--user-data-dir={page.parent / 'profile'}"]
     words += [f"--virtual-time-budget={VIRTUAL_MILLISECONDS}", "--dump-dom", f"{page.as_uri()}#{moment}"]
     return subprocess.run(words, capture_output=True, text=True, timeout=200).stdout
+
+
+def seen(page: Path, *more: str) -> dict[str, Any]:
+    """What a page wrote as JSON into its element `probe`."""
+    content = dom(page, "", *more)
+    found = re.search(r'<pre id="probe"[^>]*>(.+?)</pre>', content, re.S)
+    assert found, content[-2000:]
+    return json.loads(html.unescape(found[1]))
 
 
 def drawn(page: Path, moment: str) -> np.ndarray:

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from browser import seen
 from PIL import Image
 
 from endotsr.errors import InputError
 from endotsr.evaluation.depth import normalised_depth
 from endotsr.report.figures import EXCLUDED
+from endotsr.sequences import film_file
 from endotsr.sequences.sequence import Frame
+from endotsr.sequences.video_file import video_facts
 from endotsr.splatting.render import RenderOut
 from endotsr.views.film import check_film, write_film
 from endotsr.views.panels import Scale, panel, side_by_side
@@ -89,3 +92,56 @@ def test_panels_stand_side_by_side(out):
     assert (row[1, 25] == 255).all() and (row[0, 24] == 0).all(), "opacity"
     with pytest.raises(ValueError, match="needs the frame"):
         panel("truth", out, Scale(10, 16))
+
+
+PLAYER = """<!doctype html><title>film</title><video src="FILM" muted></video><pre id="probe"></pre><script>
+const film = document.querySelector("video"), canvas = document.createElement("canvas");
+const say = found => document.getElementById("probe").textContent = JSON.stringify(found);
+film.onerror = () => say({error: film.error.message});
+film.onloadedmetadata = () => { film.currentTime = 0.25; };
+film.onseeked = () => {
+  canvas.width = film.videoWidth; canvas.height = film.videoHeight;
+  const drawing = canvas.getContext("2d");
+  drawing.drawImage(film, 0, 0);
+  const at = (x, y) => [...drawing.getImageData(x, y, 1, 1).data].slice(0, 3);
+  const [width, height, seconds] = [film.videoWidth, film.videoHeight, film.duration];
+  say({width, height, seconds, square: at(14, 24), ground: at(60, 4)});
+};
+</script>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".mp4", ".webm"])
+def test_a_browser_plays_a_film_with_its_colours(ending, tmp_path):
+    """Picture 2 of 6, at 0.2 to 0.3 s, has the red square at columns 8 to 24."""
+    write_film(tmp_path / f"film{ending}", pictures(6), 10.0)
+    (tmp_path / "page.html").write_text(PLAYER.replace("FILM", f"film{ending}"))
+    found = seen(tmp_path / "page.html", "--allow-file-access-from-files")
+    assert "error" not in found, found
+    assert (found["width"], found["height"]) == (64, 48) and found["seconds"] == pytest.approx(0.6, abs=0.05)
+    assert np.abs(np.subtract(found["square"], (220, 60, 60))).max() < 12, found
+    assert np.abs(np.subtract(found["ground"], pictures(1)[0][4, 60])).max() < 8, found
+
+
+def test_an_mp4_is_h264_where_there_is_an_encoder_and_vp9_otherwise(tmp_path, monkeypatch):
+    write_film(tmp_path / "a.mp4", pictures(2), 10.0)
+    has_encoder = film_file.encoder_of(tmp_path / "a.mp4") in film_file.H264
+    assert video_facts(tmp_path / "a.mp4").codec == ("h264" if has_encoder else "vp9")
+    monkeypatch.setitem(film_file.BY_ENDING, ".mp4", film_file.VP9)
+    write_film(tmp_path / "b.mp4", pictures(2), 10.0)
+    assert video_facts(tmp_path / "b.mp4").codec == "vp9"
+    monkeypatch.setitem(film_file.BY_ENDING, ".mp4", (film_file.Encoder("none_of_these", {}),))
+    with pytest.raises(InputError, match=r"no encoder for it \(none_of_these\); allowed: a name in .gif"):
+        write_film(tmp_path / "c.mp4", pictures(2), 10.0)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mp4", "b.mp4"]
+
+
+def test_a_film_without_loss_holds_its_pictures_bit_by_bit(tmp_path):
+    film_file.write_video(tmp_path / "a.mp4", pictures(3), 10.0, lossless=True)
+    assert all((a == b).all() for a, b in zip(read_video(tmp_path / "a.mp4"), pictures(3), strict=True))
+
+
+def test_a_place_that_cannot_be_written_is_an_error_of_the_file_system(tmp_path):
+    with pytest.raises(OSError):
+        film_file.write_video(tmp_path / "none" / "a.mp4", pictures(2), 10.0)
+    assert list(tmp_path.iterdir()) == []

@@ -23,7 +23,7 @@ class RenderOptions:
     out: Annotated[Path | None, Option("DIR")] = None
     """folder of pictures to create"""
     film: Annotated[Path | None, Option("FILE")] = None
-    """film to write: .mp4, .webm (VP9 both) or .gif"""
+    """film to write: .mp4 (H.264), .webm (VP9) or .gif"""
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()
     """normalised times in [0, 1]"""
     frames: Literal["test", "train", "all"] | None = None

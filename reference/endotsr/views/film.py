@@ -1,7 +1,7 @@
 """Films: a series of pictures as one mp4, webm or gif file.
 
-In: pictures of one size. Out: a file that appears whole or not at all. mp4 and webm hold VP9, which every current
-browser plays without a plug-in; a gif has 256 colours a picture and plays everywhere.
+In: pictures of one size. Out: a file that appears whole or not at all. mp4 holds H.264, which browsers, PowerPoint and
+QuickTime play (VP9 where there is no encoder); webm holds VP9; a gif has 256 colours a picture and plays everywhere.
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,12 +21,16 @@ HUNDREDTHS = 100  # of a second: the unit of time in a gif
 
 
 def check_film(file: Path, rate: float) -> None:
-    """Raises InputError if this is no name of a film, or no rate that a film can have."""
+    """Raises InputError if this is no name of a film, no rate that a film can have, or nothing can encode it."""
     if file.suffix.lower() not in KINDS:
         raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
     highest = 50 if file.suffix.lower() == ".gif" else 120
     if not 0.1 <= rate <= highest:
         raise InputError(f"render: --rate {rate:g} is not allowed; allowed: 0.1 to {highest} pictures a second")
+    if file.suffix.lower() != ".gif":
+        from endotsr.sequences.film_file import encoder_of
+
+        encoder_of(file)
 
 
 def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
@@ -34,7 +38,7 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
 
     pictures   (H, W, 3) uint8 RGB, all of one size; an odd side of an mp4 or webm is repeated by one pixel
     rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
-    Raises: InputError if there is no picture or this OpenCV cannot encode the film.
+    Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
     counted = _Counted(pictures)
     writer = _write_gif if file.suffix.lower() == ".gif" else _write_video
@@ -55,7 +59,7 @@ class _Counted:
 
 
 def _write_video(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
-    from endotsr.opencv.video import write_video
+    from endotsr.sequences.film_file import write_video
 
     write_video(file, (_even(picture) for picture in pictures), rate)
 
