@@ -244,6 +244,22 @@ def test_arrays_in_memory_train_and_are_saved(sequence, run, tmp_path):
         opened.evaluate()
 
 
+def test_film_view_and_export_are_those_of_the_commands(run, tmp_path):
+    """Of a run in memory; the files equal those that the commands make of the saved run."""
+    saved = run.save(tmp_path / "run")
+    run.film(tmp_path / "a.gif", count=3, camera="sway")
+    run.view(tmp_path / "a.html")
+    assert str(tmp_path / "a.ply") in run.export(tmp_path / "a.ply", times=(0.25,))
+    assert main(["render", str(saved), "--film", str(tmp_path / "b.gif"), "--count", "3", "--camera", "sway"]) == 0
+    words = ["export", str(saved), "--out"]
+    assert main([*words, str(tmp_path / "b.html"), "--no-held-out", "--title", "a"]) == 0
+    assert main([*words, str(tmp_path / "b.ply"), "--times", "0.25"]) == 0
+    for ending in ("gif", "html", "ply"):
+        assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes(), ending
+    with pytest.raises(endotsr.InputError, match="not a film"):
+        run.film(tmp_path / "a.avi")
+
+
 def test_runs_that_cannot_be_opened(tmp_path):
     with pytest.raises(endotsr.InputError, match="run folder not found"):
         endotsr.open_run(tmp_path / "absent")

@@ -54,6 +54,7 @@ from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.toml import read_toml
 
 if TYPE_CHECKING:
+    from endotsr.export.scene import MovingScene
     from endotsr.fitting.state import TrainingState
 
 Component = Literal["appearance", "spectral_motion"]
@@ -294,6 +295,50 @@ class Run:
             spectral_motion="spectral_motion" not in without,
         )
 
+    def film(self, path: str | Path, *, count: int | None = None, camera: str = "observed", rate: float = 15.0) -> Path:
+        """Write a film, as `endotsr render --film`; returns its path. .mp4 holds H.264, .webm VP9; or .gif.
+
+        count    number of pictures, evenly spaced over the clip; default: the frames
+        camera   "observed", "orbit", "sway", the number of a frame, or a file of cameras
+        rate     pictures a second
+
+        Raises: InputError for a name, rate, count or camera that is not allowed.
+        """
+        from endotsr.export.times import Times
+        from endotsr.views import pictures
+        from endotsr.views.plan import ViewRequest
+
+        path, look, scene = Path(path), pictures.Look(), self._scene()
+        pictures.check_outputs(None, path, rate)
+        views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
+        pictures.write_views_film(path, pictures.rendered(scene, views, look), look, rate)
+        return path
+
+    def view(self, path: str | Path) -> Path:
+        """Write the page that plays and turns the scene in a browser, as `endotsr export`; returns its path.
+
+        Raises: InputError for a name that is not that of a page.
+        """
+        from endotsr.views.page import KEYS, check_page, write_page
+
+        path = Path(path)
+        check_page(path, KEYS)
+        write_page(path, self._scene(), path.stem, KEYS)
+        return path
+
+    def export(self, path: str | Path, *, times: tuple[float, ...] = ()) -> str:
+        """Write Gaussians for other programs, as `endotsr export`; returns a line on what was written.
+
+        path    .ply of one time, .npz of the whole scene, or a folder to create
+        times   normalised, in [0, 1]
+
+        Raises: InputError for a name or a time that is not allowed.
+        """
+        from endotsr.export.files import GAUSSIANS, export
+        from endotsr.export.times import Times
+
+        return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS)
+
     def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
         """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
 
@@ -367,6 +412,13 @@ class Run:
             shutil.rmtree(folder.path, ignore_errors=True)
             raise
         return folder.path
+
+    def _scene(self) -> "MovingScene":
+        """What the writers of films and files take; the record as it stands in sequence.json."""
+        from endotsr.export.scene import MovingScene
+        from endotsr.runs.files import finite
+
+        return MovingScene(finite(self.sequence_record), self.model)
 
     def _training(self) -> "TrainingState":
         state = self._state
