@@ -58,7 +58,8 @@ def _drawn_to_nowhere(monkeypatch):
     plt.close("all")
 
 
-SLOW = {"00_why": pytest.mark.slow, "14_full_sequence": pytest.mark.slow}  # these train
+TRAIN = ("00_why", "14_full_sequence", "18_between", "19_tracked_motion", "20_first_look")
+SLOW = dict.fromkeys(TRAIN, pytest.mark.slow)
 
 
 @pytest.mark.parametrize(

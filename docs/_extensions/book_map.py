@@ -55,20 +55,17 @@ UNDIFFERENTIATED = {
         "a target is a constant of training",
         "tests/sequences/test_between.py",
         "none: dense optical flow is an estimate, and a port may take any",
-        "none: it is an option of training that is not part of the paper",
     ),
     "b15": Undifferentiated(
         ("endotsr.sequences.tracks.follow", "endotsr.scene.tracked_motion.with_tracked_motion"),
         "it comes before training",
         "tests/scene/test_tracked_motion.py",
         "none: dense optical flow is an estimate, and a port may take any",
-        "none: it is an option of training that is not part of the paper",
     ),
     "b17": Undifferentiated(
         ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.smaller.halved"),
         "the choice of the frames is a constant of training",
         "tests/fitting/test_coarse_start.py",
-        "none: it is an option of training that is not part of the paper",
         "none: it is an option of training that is not part of the paper",
     ),
     "m1": Undifferentiated(

@@ -38,7 +38,7 @@ def densify(gaussians, statistics, config, rng, extent, remaining=1):
     steepness = statistics.gradient_sum / np.maximum(statistics.visits, 1)
     least, calls = (config.gradient_threshold, 1) if config.growth == "threshold" else (0, remaining)
     candidates = np.flatnonzero(alive & (steepness > 0) & (steepness >= least))
-    room = -(-max(0, config.maximum - alive.sum()) // calls)
+    room = -(-max(0, config.maximum - alive.sum()) // calls)  # (20.1), (20.3)
     candidates = np.sort(candidates[np.argsort(-steepness[candidates], kind="stable")[:room]])
     large = np.exp(gaussians.log_scale[:, candidates]).max(axis=0, initial=0) > config.dense_fraction * extent
     clone, split = candidates[~large], candidates[large]

@@ -43,7 +43,7 @@ def coarse_start(sequence: Sequence, config: Config) -> CoarseStart:
 
 def coarse_config(config: Config) -> Config:
     """The settings for half the size, with half the smoothness: a step between two pixels is twice as long there."""
-    loss = msgspec.structs.replace(config.loss, smoothness_weight=config.loss.smoothness_weight / 2)
+    loss = msgspec.structs.replace(config.loss, smoothness_weight=config.loss.smoothness_weight / 2)  # (20.7)
     return msgspec.structs.replace(config, loss=loss)
 
 
@@ -53,7 +53,7 @@ def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
         return True
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
         return False
-    return fit_error(state, coarse.workshop, coarse.frames) < coarse.lacking
+    return fit_error(state, coarse.workshop, coarse.frames) < coarse.lacking  # (20.5)
 
 
 def fit_error(state: TrainingState, shop: Workshop, frames: NDArray[np.intp]) -> float:
@@ -77,5 +77,5 @@ def lacking(sequence: Sequence, frames: NDArray[np.intp]) -> float:
         frame = sequence.frame(index)
         valid = support_masks(frame.mask, 1).bands[0]
         if valid.any():
-            found.append(np.abs(laplacian_levels(frame.image, 1).bands[0][:, valid]).mean(dtype=np.float64))
+            found.append(np.abs(laplacian_levels(frame.image, 1).bands[0][:, valid]).mean(dtype=np.float64))  # (20.4)
     return float(np.mean(found)) if found else 0.0

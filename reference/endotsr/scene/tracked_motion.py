@@ -44,7 +44,7 @@ def with_tracked_motion(
     """
     atoms = np.stack([dictionary_forward(float(t), omega)[0] for t in times])
     design = np.concatenate([np.ones((len(times), 1)), atoms], axis=1)  # (n, 1 + 2F)
-    ridge = np.diag([0.0, *np.tile(RIDGE * rho + LEAST_RIDGE, 2)])
+    ridge = np.diag([0.0, *np.tile(RIDGE * rho + LEAST_RIDGE, 2)])  # (19.8), (19.9)
     centre = gaussians.position.copy()
     coefficients = np.zeros((3, atoms.shape[1], gaussians.count), centre.dtype)
     for first in range(0, gaussians.count, POINTS_AT_ONCE):
@@ -52,7 +52,7 @@ def with_tracked_motion(
         trust = np.where(followed[:, chosen], 1.0, UNFOLLOWED)
         normal = np.einsum("na,nb,np->pab", design, design, trust, optimize=True) + ridge
         right = np.einsum("na,np,ndp->pad", design, trust, position[:, :, chosen], optimize=True)
-        solved = np.linalg.solve(normal, right)  # (P, 1 + 2F, 3)
+        solved = np.linalg.solve(normal, right)  # (19.7); (P, 1 + 2F, 3)
         centre[:, chosen] = solved[:, 0].T
         coefficients[:, :, chosen] = solved[:, 1:].transpose(2, 1, 0)
     return gaussians._replace(position=centre, motion_coefficients=coefficients)

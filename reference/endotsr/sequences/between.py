@@ -56,9 +56,9 @@ def motion_between(flows: Flows, fraction: float) -> FloatArray:
     a, b = np.float32(fraction), np.float32(1.0 - fraction)
     from_earlier, from_later = flows.forward, -flows.backward
     for _ in range(STEPS):
-        from_earlier = warp_bilinear(flows.forward, -a * from_earlier)
-        from_later = -warp_bilinear(flows.backward, b * from_later)
-    return b * from_earlier + a * from_later
+        from_earlier = warp_bilinear(flows.forward, -a * from_earlier)  # (18.2), (18.4)
+        from_later = -warp_bilinear(flows.backward, b * from_later)  # (18.3)
+    return b * from_earlier + a * from_later  # (18.5)
 
 
 def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float, flows: Flows) -> Frame:
@@ -77,7 +77,7 @@ def frame_between(sequence: Sequence, earlier: int, later: int, fraction: float,
     pair, a = [earlier, later], np.float32(fraction)
     weights = np.array([1.0 - fraction, fraction], np.float32)
     field = motion_between(flows, fraction)
-    places = (-a * field, (1 - a) * field)
+    places = (-a * field, (1 - a) * field)  # (18.1)
 
     def moved(planes: NDArray, warp) -> FloatArray:
         return np.stack([warp(plane.astype(np.float32), place) for plane, place in zip(planes, places, strict=True)])
@@ -103,15 +103,15 @@ def _mixed(moved: FloatArray, still: FloatArray, seen: BoolArray, both: BoolArra
     weights       (2,) of the two frames
     """
     of_moved, of_still = _difference(moved), _difference(still)
-    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the still pair
-    return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)
+    fraction = np.where(both, of_moved / (of_moved + of_still), np.float32(0))  # of the still pair: (18.7), (18.9)
+    return (1 - fraction) * _blended(moved, seen, weights) + fraction * np.tensordot(weights, still, 1)  # (18.6)
 
 
 def _difference(pair: FloatArray) -> FloatArray:
     """(H, W) mean squared difference of two pictures (2, 3, H, W) around a pixel, at least `ONE_STEP`."""
     from endotsr.opencv import gaussian_blur
 
-    return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)
+    return gaussian_blur(np.square(pair[0] - pair[1]).mean(axis=0), NEARBY) + np.float32(ONE_STEP)  # (18.8)
 
 
 def _blended(pair: FloatArray, usable: BoolArray, weights: FloatArray) -> FloatArray:

@@ -50,5 +50,5 @@ def halved(sequence: Sequence, memory: float) -> Sequence:
     images, masks, depth = smaller_frames(
         sequence.images, sequence.masks, sequence.depth, width, height, memory, "half size"
     )
-    cameras = smaller_cameras(sequence.cameras, width, height)
+    cameras = smaller_cameras(sequence.cameras, width, height)  # (20.6)
     return replace(sequence, images=images, masks=masks, depth=depth, cameras=cameras)

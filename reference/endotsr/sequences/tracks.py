@@ -77,13 +77,13 @@ def _step(sequence: Sequence, frames: tuple[int, int], here: _Points, flows: Flo
     moved = pixel + _sampled(flows.forward, pixel)
     apart = moved + _sampled(flows.backward, moved) - pixel
     lengths = np.square(moved - pixel).sum(axis=0)
-    agree = np.square(apart).sum(axis=0) <= 2 * CONSISTENT * lengths + TOLERANCE
-    found, at = _lifted(sequence, frames[1], moved)
-    followed = here.followed & agree & _near(at, _project(target, here.position)[1], 2 * DEPTH_JUMP)
+    agree = np.square(apart).sum(axis=0) <= 2 * CONSISTENT * lengths + TOLERANCE  # (19.2)
+    found, at = _lifted(sequence, frames[1], moved)  # (19.1)
+    followed = here.followed & agree & _near(at, _project(target, here.position)[1], 2 * DEPTH_JUMP)  # (19.3)
     position = np.where(followed, found, here.position)
     lost = ~followed
     if lost.any() and np.count_nonzero(followed) >= FEWEST:
-        position[:, lost] += _motion_around(here.position, position, followed, lost)
+        position[:, lost] += _motion_around(here.position, position, followed, lost)  # (19.4)
     _refind(sequence, frames[1], position, followed, lost)
     return _Points(position, followed)
 
@@ -102,7 +102,7 @@ def _refind(sequence: Sequence, frame: int, position: FloatArray, followed: Bool
     """Follow lost points again, in place, that are where the frame shows tissue at their depth."""
     pixel, depth = _project(sequence.cameras[frame], position[:, lost])
     found, at = _lifted(sequence, frame, pixel)
-    again = _near(at, depth, DEPTH_JUMP / 4)
+    again = _near(at, depth, DEPTH_JUMP / 4)  # (19.5)
     places = np.flatnonzero(lost)[again]
     position[:, places], followed[places] = found[:, again], True
 
