@@ -20,13 +20,16 @@
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
 #
-# In these notebooks each equation is printed as in the specification. It is then **transcribed** into NumPy symbol by
-# symbol, and compared with the compiled function by an `assert`. If one sign is changed in either, the notebook stops.
+# In these notebooks each equation is printed as in the specification. Its **definition** in plain NumPy follows, and is
+# compared with the compiled function by an `assert`. If one sign is changed in either, the notebook stops.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import dictionary as definition
 from endotsr.equations.dictionary import (
     atom_statistics,
     dictionary_forward,
@@ -54,28 +57,21 @@ from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, ta
 # $$
 
 # %% tags=["transcription"]
-F, omega_min, omega_max = 8, 1.0, 16.0
-f = np.arange(1, F + 1)
-omega_text = omega_min * (omega_max / omega_min) ** ((f - 1) / (F - 1))
-
-
-def phi_text(t, omega):
-    """Equation (1) as printed."""
-    return np.concatenate([np.sin(2 * np.pi * omega * t), np.cos(2 * np.pi * omega * t)])
-
+print(inspect.getsource(definition.frequencies))
+print(inspect.getsource(definition.dictionary_forward))
 
 # %% [markdown]
-# The functions of the package are `frequencies` and `dictionary_forward`. They agree with the transcription to
-# rounding.
+# The compiled functions have the same names. They agree with the definition to rounding.
 
 # %%
+F, omega_min, omega_max = 8, 1.0, 16.0
 omega = frequencies(F, omega_min, omega_max)
-np.testing.assert_allclose(omega, omega_text, rtol=1e-14)
+np.testing.assert_allclose(omega, definition.frequencies(F, omega_min, omega_max), rtol=1e-14)
 assert omega[0] == 1.0 and omega[-1] == 16.0, "the end points are set, not computed"
 
 for t in (0.0, 0.137, 0.37, 0.81, -0.4, 1.9):
     phi, _ = dictionary_forward(t, omega)
-    np.testing.assert_allclose(phi, phi_text(t, omega), atol=1e-13)
+    np.testing.assert_allclose(phi, definition.dictionary_forward(t, omega)[0], atol=1e-15)
 
 # %% [markdown]
 # ### Why the phase is reduced first
@@ -96,28 +92,14 @@ for t in (0.0, 0.137, 0.37, 0.81, -0.4, 1.9):
 # \pmod 4 .
 # $$
 
-
-# %% tags=["transcription"]
-def folded_text(p):
-    """(sin 2 pi p, cos 2 pi p) with the phase p in turns, case by case."""
-    r = p - np.round(p)
-    k = np.round(4 * r)
-    delta = r - k / 4
-    assert abs(r) <= 1 / 2 and abs(delta) <= 1 / 8
-    s, c = np.sin(2 * np.pi * delta), np.cos(2 * np.pi * delta)
-    return {0: (s, c), 1: (c, -s), 2: (-s, -c), 3: (-c, s)}[int(k) % 4]
-
-
 # %%
+as_printed = lambda t: np.sin(2 * np.pi * omega * t)
+phi, _ = dictionary_forward(5 / 32, omega)
+print("as printed:", as_printed(5 / 32)[F - 1], "  folded:", phi[F - 1])
+assert phi[F - 1] == 0.0 and as_printed(5 / 32)[F - 1] != 0.0
 rng = np.random.default_rng(1)
 for t in rng.uniform(0, 1, 20):
-    phi, _ = dictionary_forward(t, omega)
-    sines, cosines = zip(*(folded_text(w * t) for w in omega))
-    np.testing.assert_allclose(phi, [*sines, *cosines], atol=1e-16)
-
-phi, _ = dictionary_forward(5 / 32, omega)
-print("as printed:", phi_text(5 / 32, omega)[F - 1], "  folded:", phi[F - 1])
-assert phi[F - 1] == 0.0 and phi_text(5 / 32, omega)[F - 1] != 0.0
+    np.testing.assert_allclose(dictionary_forward(t, omega)[0][:F], as_printed(t), atol=1e-13)
 
 # %% [markdown]
 # ## Centred and scaled over the training stamps
@@ -134,16 +116,9 @@ assert phi[F - 1] == 0.0 and phi_text(5 / 32, omega)[F - 1] != 0.0
 # \end{aligned}
 # $$
 
-
 # %% tags=["transcription"]
-def normalise_text(phi, stamps, omega):
-    """Equation (1b) as printed, for one vector of raw atoms."""
-    atoms = np.array([phi_text(t, omega) for t in stamps])
-    n = len(stamps)
-    m = atoms.sum(axis=0) / n
-    rms = np.sqrt(((atoms - m) ** 2).sum(axis=0) / n)
-    return np.array([(p - mk) / rk if rk >= 1e-6 else 0.0 for p, mk, rk in zip(phi, m, rms)])
-
+print(inspect.getsource(definition.atom_statistics))
+print(inspect.getsource(definition.normalise_forward))
 
 # %%
 stamps = np.delete(np.arange(24), [1, 9, 17]) / 24  # 24 frames, every eighth is held out
@@ -151,7 +126,8 @@ statistics = atom_statistics(stamps, omega)
 for t in (0.0, 0.31, 0.77):
     phi, _ = dictionary_forward(t, omega)
     phi_bar, saved_bar = normalise_forward(phi, statistics)
-    np.testing.assert_allclose(phi_bar, normalise_text(phi, stamps, omega), atol=1e-12)
+    text = definition.normalised_atoms(t, omega, definition.atom_statistics(stamps, omega))
+    np.testing.assert_allclose(phi_bar, text, atol=1e-12)
 
 bars = np.array(
     [normalise_forward(dictionary_forward(t, omega)[0], statistics)[0] for t in stamps]
@@ -238,31 +214,22 @@ plt.show()
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
 # $$
 
-
 # %% tags=["transcription"]
-def dictionary_reverse_text(g_phi, t, omega):
-    s, c = np.sin(2 * np.pi * omega * t), np.cos(2 * np.pi * omega * t)
-    g_omega = 2 * np.pi * t * (g_phi[:F] * c - g_phi[F:] * s)
-    g_t = np.sum(2 * np.pi * omega * (g_phi[:F] * c - g_phi[F:] * s))
-    return g_t, g_omega
-
-
-def normalise_reverse_text(g_phi_bar, rms):
-    return np.array([g / rk if rk >= 1e-6 else 0.0 for g, rk in zip(g_phi_bar, rms)])
-
+print(inspect.getsource(definition.dictionary_reverse))
+print(inspect.getsource(definition.normalise_reverse))
 
 # %%
 g_phi = rng.normal(size=2 * F)
 _, saved = dictionary_forward(0.37, omega)
 grads = dictionary_reverse(g_phi, saved)
-g_t, g_omega = dictionary_reverse_text(g_phi, 0.37, omega)
-np.testing.assert_allclose(grads.d_t, g_t, rtol=1e-12)
-np.testing.assert_allclose(grads.d_omega, g_omega, rtol=1e-11)
+text = definition.dictionary_reverse(g_phi, definition.dictionary_forward(0.37, omega)[1])
+np.testing.assert_allclose(grads.d_t, text.d_t, rtol=1e-12)
+np.testing.assert_allclose(grads.d_omega, text.d_omega, rtol=1e-11)
 
 _, saved_32 = normalise_forward(phi, statistics_32)
 np.testing.assert_allclose(
     normalise_reverse(g_phi, saved_32),
-    normalise_reverse_text(g_phi, statistics_32.rms),
+    definition.normalise_reverse(g_phi, definition.atom_statistics(stamps_32, omega)),
     rtol=1e-14,
 )
 
@@ -285,9 +252,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The dictionary has 16 atoms. Over 24 frames with three held out there are 21 stamps, which is more than 16. Are all 16
-# atoms linearly independent over these stamps? Are they with 32 frames, none held out? Estimate the rank of the
-# normalised dictionary in both cases, then open the answer.
+# 1. The clip has $n$ frames at $t=k/n$, none held out. Which $n$ make the sine of 16 cycles dead? Which atoms of other
+#    frequencies can be dead for $n\ge20$?
+# 2. Write `dictionary_forward` and `dictionary_reverse`, with the folding above, and let the golden cases judge them:
+#    `--only dictionary`. The case `quarter_turns` refuses the formula as printed.
+# 3. The cell below answers this one. The dictionary has 16 atoms. Over 24 frames with three held out there are 21
+#    stamps, which is more than 16. Are all 16 atoms linearly independent over these stamps? Are they with 32 frames,
+#    none held out? Estimate the rank of the normalised dictionary in both cases.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 21 stamps carry 16 independent atoms. On 32 equally spaced stamps one atom is dead,

@@ -20,9 +20,12 @@
 # The equations are {eq}`eq-b5`, {eq}`eq-b5b` and {eq}`eq-b5c` of {doc}`/specification/b05_compositing`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import compositing as definition
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
 from endotsr.splatting.binning import depth_order, screen_boxes, tile_lists
 from endotsr.splatting.camera import Camera
@@ -55,14 +58,7 @@ background = np.array([0.1, 0.2, 0.3])
 
 def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background):
     """The stages of the package between projection and image."""
-    a, b, c = scene["covariance2d"]
-    projected = Projected(
-        scene["mean2d"],
-        scene["covariance2d"],
-        a * c - b * b,
-        scene["depth"],
-        np.ones(a.size, bool),
-    )
+    projected = on_screen(scene)
     log_o = log_opacity(scene["logit"])
     box, visible = screen_boxes(projected, log_o, settings, width, height)
     order = depth_order(scene["depth"], visible)
@@ -104,65 +100,49 @@ def composite(scene, settings, width=WIDTH, height=HEIGHT, background=background
 # A Gaussian with $\alpha<\alpha_{\mathrm{cut}}$ does not contribute. If $T_k(1-\alpha_k)<T_{\mathrm{stop}}$, the pixel
 # ends before Gaussian $k$ is blended.
 
-
 # %% tags=["transcription"]
-def footprint_text(i, column, row, scene):
-    """q, eta and their parts of Gaussian i at a pixel."""
-    (u, v), (a, b, c) = scene["mean2d"][:, i], scene["covariance2d"][:, i]
-    det = a * c - b**2
-    d_x, d_y = column + 1 / 2 - u, row + 1 / 2 - v
-    m, r, A = b / c, 1 / c, c / det
-    eta = d_x - m * d_y
-    q = r * d_y**2 + A * eta**2
-    return q, eta, d_y, m, r, A
+print(inspect.getsource(definition.opacity_of))
+print(inspect.getsource(definition.layers_of))
+print(inspect.getsource(definition.composite_forward))
 
 
-def pixel_text(column, row, scene, settings):
-    """Contributors of one pixel, front to back: (index, alpha, T), and the final T."""
-    T, contributors = 1.0, []
-    for i in sorted(range(len(scene["depth"])), key=lambda i: (scene["depth"][i], i)):
-        o = 1 / (1 + np.exp(-scene["logit"][i]))
-        q = footprint_text(i, column, row, scene)[0]
-        alpha = min(settings.alpha_max, o * np.exp(-q / 2))
-        if alpha < settings.alpha_cutoff:
-            continue
-        if T * (1 - alpha) < settings.transmittance_stop:
-            break
-        contributors.append((i, alpha, T))
-        T = T * (1 - alpha)
-    return contributors, T
-
-
-def images_text(scene, settings):
-    colour, depth, opacity = (
-        np.zeros((3, HEIGHT, WIDTH)),
-        np.zeros((HEIGHT, WIDTH)),
-        np.zeros((HEIGHT, WIDTH)),
+# %%
+def on_screen(scene):
+    """What the projection gives to the compositing."""
+    a, b, c = scene["covariance2d"]
+    return Projected(
+        scene["mean2d"],
+        scene["covariance2d"],
+        a * c - b * b,
+        scene["depth"],
+        np.ones(a.size, bool),
     )
-    for row in range(HEIGHT):
-        for column in range(WIDTH):
-            contributors, T_n = pixel_text(column, row, scene, settings)
-            colour[:, row, column] = (
-                sum(alpha * T * scene["colour"][:, i] for i, alpha, T in contributors)
-                + T_n * background
-            )
-            depth[row, column] = sum(
-                alpha * T * scene["depth"][i] for i, alpha, T in contributors
-            )
-            opacity[row, column] = sum(alpha * T for i, alpha, T in contributors)
-    return colour, depth, opacity
+
+
+def by_definition(scene, settings):
+    """(images, saved) of the definition."""
+    arguments = on_screen(scene), scene["logit"], scene["colour"], settings, background
+    return definition.composite_forward(*arguments, WIDTH, HEIGHT)
+
+
+def contributors_of(column, row, scene, settings):
+    """Contributors of one pixel, front to back: (index, alpha, T), and the final T."""
+    saved = by_definition(scene, settings)[1]
+    at = row, column
+    taken = [layer for layer in saved.layers if layer.taken[at]]
+    return [(k.index, k.alpha[at], k.front[at]) for k in taken], saved.transmittance[at]
 
 
 # %%
 opaque = scene | {"logit": np.full(N, 7.0)}  # so opaque that some pixels end early
 assert any(
-    len(pixel_text(x, y, opaque, PAPER)[0]) < len(pixel_text(x, y, opaque, EXACT)[0])
+    len(contributors_of(x, y, opaque, PAPER)[0]) < len(contributors_of(x, y, opaque, EXACT)[0])
     for x in range(5, 12)
     for y in range(5, 9)
 )
 for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
     out, _ = composite(some, settings)
-    for found, text in zip(out, images_text(some, settings)):
+    for found, text in zip(out, by_definition(some, settings)[0]):
         np.testing.assert_allclose(found, text, rtol=1e-11, atol=1e-13)
 
 # %% [markdown]
@@ -177,7 +157,7 @@ for settings, some in ((PAPER, scene), (PAPER, opaque), (EXACT, scene)):
 figure, axes = plt.subplots(
     1, 4, figsize=(14, 3.6), layout="constrained", width_ratios=[1.3, 1, 1, 1]
 )
-contributors, T_n = pixel_text(9, 7, scene, PAPER)
+contributors, T_n = contributors_of(9, 7, scene, PAPER)
 for k, (i, alpha, T) in enumerate(contributors):
     axes[0].bar(k, T, color="0.9", edgecolor="0.6")
     axes[0].bar(k, alpha * T, color=scene["colour"][:, i], edgecolor="k", lw=0.5)
@@ -282,46 +262,12 @@ plt.show()
 # g_a=-A^2g_A,\qquad g_b=2A^2m\,g_A+r\,g_m,\qquad g_c=-A^2m^2g_A-m\,r\,g_m-r^2g_r .
 # $$
 
+#
+# The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
+# with $Q=\Sigma^{-1}$, in place of (8.8). The sums are the same.
 
 # %% tags=["transcription"]
-def reverse_text(g_I, g_D, g_O, scene, settings):
-    n = len(scene["depth"])
-    g = {name: np.zeros_like(scene[name]) for name in scene} | {"background": np.zeros(3)}
-    g_A, g_m, g_r = np.zeros(n), np.zeros(n), np.zeros(n)
-    for row in range(HEIGHT):
-        for column in range(WIDTH):
-            g_I_p, g_D_p, g_O_p = g_I[:, row, column], g_D[row, column], g_O[row, column]
-            contributors, T_n = pixel_text(column, row, scene, settings)
-            R, Z, Q = background, 0.0, 0.0  # (8.1), (8.4): what is behind the last one
-            g["background"] += T_n * g_I_p
-            for i, alpha, T in reversed(contributors):
-                rgb, z = scene["colour"][:, i], scene["depth"][i]
-                g_alpha = T * ((rgb - R) @ g_I_p + (z - Z) * g_D_p + (1 - Q) * g_O_p)  # (8.3)
-                g["colour"][:, i] += alpha * T * g_I_p  # (8.5)
-                g["depth"][i] += alpha * T * g_D_p
-                R, Z, Q = (
-                    alpha * rgb + (1 - alpha) * R,
-                    alpha * z + (1 - alpha) * Z,
-                    alpha + (1 - alpha) * Q,
-                )
-                o = 1 / (1 + np.exp(-scene["logit"][i]))
-                q, eta, d_y, m, r, A = footprint_text(i, column, row, scene)
-                if o * np.exp(-q / 2) > settings.alpha_max:
-                    continue  # (8.6): the clamp holds
-                g["logit"][i] += alpha * (1 - o) * g_alpha
-                g_q = -1 / 2 * alpha * g_alpha
-                g_A[i] += eta**2 * g_q  # (8.7)
-                g_m[i] += -2 * A * eta * d_y * g_q
-                g_r[i] += d_y**2 * g_q
-                g["mean2d"][0, i] += -2 * A * eta * g_q
-                g["mean2d"][1, i] += -2 * (r * d_y - A * m * eta) * g_q
-    a, b, c = scene["covariance2d"]
-    m, r, A = b / c, 1 / c, c / (a * c - b**2)
-    g["covariance2d"][0] = -(A**2) * g_A  # (8.8)
-    g["covariance2d"][1] = 2 * A**2 * m * g_A + r * g_m
-    g["covariance2d"][2] = -(A**2) * m**2 * g_A - m * r * g_m - r**2 * g_r
-    return g
-
+print(inspect.getsource(definition.composite_reverse))
 
 # %%
 g_I, g_D, g_O = (
@@ -349,12 +295,11 @@ def kernel_reverse(scene, settings, g_I, g_D, g_O, conic_epsilon=0.0, **size):
 
 
 for settings in (PAPER, EXACT):
-    found, text = (
-        kernel_reverse(scene, settings, g_I, g_D, g_O),
-        reverse_text(g_I, g_D, g_O, scene, settings),
-    )
-    for name in text:
-        np.testing.assert_allclose(found[name], text[name], rtol=1e-9, atol=1e-11, err_msg=name)
+    found = kernel_reverse(scene, settings, g_I, g_D, g_O)
+    grads = definition.composite_reverse(g_I, g_D, g_O, by_definition(scene, settings)[1])
+    for name, text in grads._asdict().items():
+        name = name.removeprefix("d_").removeprefix("opacity_")
+        np.testing.assert_allclose(found[name], text, rtol=1e-9, atol=1e-11, err_msg=name)
 
 # %% [markdown]
 # The released program adds a small number to $\det^2$ in this last step, so that its $g_a,g_b,g_c$ are multiplied by
@@ -396,9 +341,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back. Which of the three opacities and
-# colours have a gradient? Many programs recover $T_k$ in the reverse pass by dividing the final $T_n$ by $1-\alpha$.
-# What would such a program compute here?
+# 1. A pixel has two contributors, both with $\alpha=\frac12$ and the same colour. Use (8.3) to find which of the two
+#    opacities has the larger gradient, and why it depends on the background alone.
+# 2. Write the pair of {eq}`eq-b5` from (8.1) to (8.8) and let the golden cases judge it: `--only composite`
+#    ({doc}`index`). The case `opaque_exact` refuses a division by $1-\alpha$.
+# 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back.
+#    Which of the three opacities and colours have a gradient? Many programs recover $T_k$ in the reverse pass by dividing
+#    the final $T_n$ by $1-\alpha$. What would such a program compute here?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The first two have gradients, the opaque one included (less opacity would show the

@@ -19,9 +19,12 @@
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from endotsr.definition import laplacian as definition
 from endotsr.equations.laplacian import (
     laplacian_levels,
     laplacian_loss_forward,
@@ -55,74 +58,37 @@ rng = np.random.default_rng(9)
 # \end{aligned}
 # $$
 #
-# Both are linear and act on each axis separately, so each is a small matrix per axis. The next cell writes these
-# matrices down from the text.
+# Both are linear and act on each axis separately, so each is a small matrix per axis. The definition writes these
+# matrices down. The compiled functions never form them.
 
 # %% tags=["transcription"]
-b = np.array([1, 4, 6, 4, 1]) / 16
+print(inspect.getsource(definition.reduce_matrix))
+print(inspect.getsource(definition.expand_matrix))
+print(inspect.getsource(definition.laplacian_levels))
 
-
-def refl(k, n):
-    if n == 1:
-        return 0
-    k = k % (2 * (n - 1))
-    return k if k < n else 2 * (n - 1) - k
-
-
-def D_matrix(n):
-    D = np.zeros((-(-n // 2), n))
-    for y in range(D.shape[0]):
-        for r in range(-2, 3):
-            D[y, refl(2 * y + r, n)] += b[r + 2]
-    return D
-
-
-def U_matrix(n, rule):
-    n_c = -(-n // 2)
-    U = np.zeros((n, n_c))
-    for k in range(n_c):
-        if rule == "co_sited":
-            even, odd = [(k, 1)], [(k, 1 / 2), (min(k + 1, n_c - 1), 1 / 2)]
-        else:
-            even, odd = (
-                [(max(k - 1, 0), 1 / 4), (k, 3 / 4)],
-                [(k, 3 / 4), (min(k + 1, n_c - 1), 1 / 4)],
-            )
-        for row, parents in ((2 * k, even), (2 * k + 1, odd)):
-            for q, weight in parents:
-                if row < n:
-                    U[row, q] += weight
-    return U
-
-
-def down(G):
-    return D_matrix(G.shape[1]) @ G @ D_matrix(G.shape[2]).T
+# %%
+for matrix in (
+    definition.reduce_matrix(9),
+    definition.expand_matrix(9, "co_sited"),
+    definition.expand_matrix(9, "half_pixel"),
+):
+    np.testing.assert_allclose(matrix.sum(axis=1), 1)  # a constant stays what it is
 
 
 def up(g, fine, rule):
-    return U_matrix(fine.shape[1], rule) @ g @ U_matrix(fine.shape[2], rule).T
+    rows, columns = (definition.expand_matrix(n, rule) for n in fine.shape[1:])
+    return rows @ g @ columns.T
 
-
-def bands_text(image, rule):
-    G, P = [image], []
-    for j in (1, 2, 3):
-        G.append(down(G[j - 1]))
-        P.append(G[j - 1] - up(G[j], G[j - 1], rule))
-    return P, G
-
-
-# %%
-for matrix in (D_matrix(9), U_matrix(9, "co_sited"), U_matrix(9, "half_pixel")):
-    np.testing.assert_allclose(matrix.sum(axis=1), 1)  # a constant stays what it is
 
 for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
     image = rng.uniform(size=shape)
     for rule in ("co_sited", "half_pixel"):
-        P, G = bands_text(image, rule)
+        text = definition.laplacian_levels(image, 3, rule)
         found = laplacian_levels(image, 3, rule)
-        for text, band in zip([*P, G[3]], [*found.bands, found.coarse]):
-            np.testing.assert_allclose(band, text, atol=1e-14)
-        rebuilt = P[0] + up(P[1] + up(P[2] + up(G[3], G[2], rule), G[1], rule), G[0], rule)
+        for expected, band in zip([*text.bands, text.coarse], [*found.bands, found.coarse]):
+            np.testing.assert_allclose(band, expected, atol=1e-14)
+        P, coarse = text.bands, text.coarse
+        rebuilt = P[0] + up(P[1] + up(P[2] + up(coarse, P[2], rule), P[1], rule), P[0], rule)
         np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
 
 # %% [markdown]
@@ -162,43 +128,9 @@ for rule, values in (("co_sited", (0, 0, 0)), ("half_pixel", (0.5, 1, 2))):
 # \end{aligned}
 # $$
 
-
 # %% tags=["transcription"]
-def support_text(M, rule):
-    S, V = [M], []
-    for j in (1, 2, 3):
-        h, w = S[j - 1].shape
-        coarse = np.ones((-(-h // 2), -(-w // 2)), bool)
-        for y in range(coarse.shape[0]):
-            for x in range(coarse.shape[1]):
-                coarse[y, x] = all(
-                    S[j - 1][refl(2 * y + r, h), refl(2 * x + s, w)]
-                    for r in range(-2, 3)
-                    for s in range(-2, 3)
-                )
-        U_rows, U_columns = U_matrix(h, rule) != 0, U_matrix(w, rule) != 0
-        V.append(
-            S[j - 1]
-            & np.array(
-                [
-                    [coarse[np.ix_(rows, columns)].all() for columns in U_columns]
-                    for rows in U_rows
-                ]
-            )
-        )
-        S.append(coarse)
-    return V
-
-
-def loss_text(rendered, observed, V, rule):
-    P, _ = bands_text(rendered, rule)
-    P_observed, _ = bands_text(observed, rule)
-    L = []
-    for j in range(3):
-        n_j = V[j].sum()
-        L.append(np.abs(P[j] - P_observed[j])[:, V[j]].sum() / (3 * n_j) if n_j > 0 else 0.0)
-    return sum(L) / 3
-
+print(inspect.getsource(definition.support_masks))
+print(inspect.getsource(definition.laplacian_loss_forward))
 
 # %%
 sequence = simulate(SimulatorSettings(width=96, height=72, frames=8)).sequence
@@ -207,10 +139,11 @@ observed, mask = frame.image, frame.mask
 rendered = observed + rng.normal(0, 0.05, observed.shape)
 for rule in ("co_sited", "half_pixel"):
     masks = support_masks(mask, 3, rule)
-    V = support_text(mask, rule)
-    assert all(np.array_equal(found, text) for found, text in zip(masks.bands, V))
+    text = definition.support_masks(mask, 3, rule)
+    assert all(map(np.array_equal, masks.bands, text.bands))
     loss, saved = laplacian_loss_forward(rendered, observed, masks, rule)
-    np.testing.assert_allclose(loss, loss_text(rendered, observed, V, rule), rtol=1e-12)
+    expected, _ = definition.laplacian_loss_forward(rendered, observed, text, rule)
+    np.testing.assert_allclose(loss, expected, rtol=1e-12)
 
 # %% [markdown]
 # **No value under the instrument is read.** The next cell puts NaN there, in the render and in the observed frame:
@@ -274,31 +207,17 @@ plt.show()
 # \end{aligned}
 # $$
 
-
 # %% tags=["transcription"]
-def reverse_text(g_L, rendered, observed, V, rule):
-    P, G = bands_text(rendered, rule)
-    P_observed, _ = bands_text(observed, rule)
-    down_T = lambda g, fine: D_matrix(fine.shape[1]).T @ g @ D_matrix(fine.shape[2])
-    up_T = lambda g: U_matrix(g.shape[1], rule).T @ g @ U_matrix(g.shape[2], rule)
-    g_P = []
-    for j in range(3):
-        sigma = np.sign(P[j] - P_observed[j])
-        g_P.append(np.where(V[j], g_L / (9 * max(V[j].sum(), 1)) * sigma, 0))
-    g_G3 = -up_T(g_P[2])
-    g_G2 = g_P[2] - up_T(g_P[1]) + down_T(g_G3, G[2])
-    g_G1 = g_P[1] - up_T(g_P[0]) + down_T(g_G2, G[1])
-    return g_P[0] + down_T(g_G1, G[0])
-
+print(inspect.getsource(definition.laplacian_loss_reverse))
 
 # %%
 for rule in ("co_sited", "half_pixel"):
     masks = support_masks(mask, 3, rule)
     _, saved = laplacian_loss_forward(rendered, observed, masks, rule)
     found = laplacian_loss_reverse(0.83, saved)
-    np.testing.assert_allclose(
-        found, reverse_text(0.83, rendered, observed, masks.bands, rule), rtol=1e-9, atol=1e-16
-    )
+    _, of_text = definition.laplacian_loss_forward(rendered, observed, masks, rule)
+    text = definition.laplacian_loss_reverse(0.83, of_text)
+    np.testing.assert_allclose(found, text, rtol=1e-9, atol=1e-16)
     assert not np.any(found[:, ~mask])
 
 # %% [markdown]
@@ -326,8 +245,13 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# One single pixel in the middle of a large image is excluded. How many values of each band become invalid (`co_sited`)?
-# Does the number depend on whether the coordinates of the pixel are even or odd?
+# 1. A render is brighter than the frame by the same amount everywhere. Which bands differ? Which component of the model,
+#    and which other loss, corrects such an error?
+# 2. Write the pair of {eq}`eq-5` and let the golden cases judge it: `--only laplacian` ({doc}`index`). The case
+#    `not_finite_under_mask` refuses a pyramid that reads the instrument and multiplies afterwards.
+# 3. The cell below answers this one. One single pixel in the middle of a large image is excluded. How many values of
+#    each band become invalid (`co_sited`)? Does the number depend on whether the coordinates of the pixel are even or
+#    odd?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The footprint of one value is 5 to 7, 13 to 17 and 29 to 37 pixels per axis. Turned

@@ -21,10 +21,15 @@
 # {doc}`/specification/b11_density`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+
 import matplotlib.pyplot as plt
 import numpy as np
 
 from endotsr.config import PAPER, DensityConfig
+from endotsr.definition import adam as definition
+from endotsr.definition import density_control as definition_of_density
+from endotsr.definition import schedules as definition_of_schedules
 from endotsr.fitting.adam import adam_state, adam_step, adam_update, regather
 from endotsr.fitting.schedules import active_degree, densify_now, learning_rates
 from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
@@ -56,29 +61,18 @@ rng = np.random.default_rng(12)
 # The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
 
 # %% tags=["transcription"]
-beta_1, beta_2, epsilon = 0.9, 0.999, 1e-15
-
-
-def adam_text(theta, g, m, v, k, eta):
-    m = beta_1 * m + (1 - beta_1) * g
-    v = beta_2 * v + (1 - beta_2) * g**2
-    theta = theta - eta * (m / (1 - beta_1**k)) / (np.sqrt(v / (1 - beta_2**k)) + epsilon)
-    return theta, m, v
-
+print(inspect.getsource(definition.adam_step))
 
 # %%
-assert (PAPER.optimiser.beta1, PAPER.optimiser.beta2, PAPER.optimiser.epsilon) == (
-    beta_1,
-    beta_2,
-    epsilon,
-)
+constants = (PAPER.optimiser.beta1, PAPER.optimiser.beta2, PAPER.optimiser.epsilon)
+assert constants == (0.9, 0.999, 1e-15)
 theta = rng.normal(size=(3, 40))
 mine = (theta.copy(), np.zeros_like(theta), np.zeros_like(theta))
 kernel = [part.copy() for part in mine]
 for k in range(1, 30):
     g = rng.normal(size=theta.shape) * 10.0 ** rng.integers(-8, 3, theta.shape)
-    mine = adam_text(mine[0], g, mine[1], mine[2], k, 1e-3)
-    adam_step(kernel[0], g, kernel[1], kernel[2], k, 1e-3, beta_1, beta_2, epsilon)
+    mine = definition.adam_step(mine[0], g, mine[1], mine[2], k, 1e-3, *constants)
+    adam_step(kernel[0], g, kernel[1], kernel[2], k, 1e-3, *constants)
     for found, text in zip(kernel, mine):
         np.testing.assert_allclose(found, text, rtol=1e-12)
 
@@ -86,8 +80,8 @@ for k in range(1, 30):
 state, named = adam_state({"theta": theta}), {"theta": theta.copy()}
 mine = (theta.copy(), np.zeros_like(theta), np.zeros_like(theta))
 for k in (1, 2, 3):
-    mine = adam_text(mine[0], theta**k, mine[1], mine[2], k, 1e-3)
-    adam_update(state, named, {"theta": theta**k}, {"theta": 1e-3}, beta_1, beta_2, epsilon)
+    mine = definition.adam_step(mine[0], theta**k, mine[1], mine[2], k, 1e-3, *constants)
+    adam_update(state, named, {"theta": theta**k}, {"theta": 1e-3}, *constants)
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
@@ -98,9 +92,7 @@ np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 # %%
 for size in (1.0, 1e-10):
     p = np.zeros(2)
-    adam_step(
-        p, np.array([size, -size]), np.zeros(2), np.zeros(2), 1, 0.01, beta_1, beta_2, epsilon
-    )
+    adam_step(p, np.array([size, -size]), np.zeros(2), np.zeros(2), 1, 0.01, *constants)
     np.testing.assert_allclose(p, [-0.01, 0.01], rtol=2e-5)
 
 # %% [markdown]
@@ -114,27 +106,25 @@ for size in (1.0, 1e-10):
 # \tau=\begin{cases}\mathrm{clip}(i/T,0,1)&\text{position, FDM, exposure, poses}\\ \mathrm{clip}\bigl((i-K_s)/(T-K_s),0,1\bigr)&\text{residuals.}\end{cases}
 # $$
 
-
 # %% tags=["transcription"]
-def rate_text(i, eta_0, first, T, final=0.01):
-    tau = np.clip((i - first) / (T - first), 0, 1)
-    return eta_0 * final**tau
-
+print(inspect.getsource(definition_of_schedules.decay))
+print(inspect.getsource(definition_of_schedules.learning_rates))
 
 # %%
 T, K_s = PAPER.training.iterations, PAPER.training.residual_activation
 for i in (1, 1500, 3000, 3001, 4500, 6000):
-    rates = learning_rates(i, PAPER)
-    np.testing.assert_allclose(rates["position"], rate_text(i, 1.6e-3, 0, T), rtol=1e-12)
-    np.testing.assert_allclose(rates["fdm_centre"], rate_text(i, 1.6e-3, 0, T), rtol=1e-12)
-    assert ("appearance_coefficients" in rates) == (i > K_s)
+    rates, text = learning_rates(i, PAPER), definition_of_schedules.learning_rates(i, PAPER)
+    assert set(rates) == set(text) and ("appearance_coefficients" in rates) == (i > K_s)
+    for name in ("position", "fdm_centre", "quaternion", "log_scale", "opacity_logit"):
+        np.testing.assert_allclose(rates[name], text[name], rtol=1e-12)
     if i > K_s:
-        np.testing.assert_allclose(
-            rates["appearance_coefficients"], rate_text(i, 3.125e-3, K_s, T), rtol=1e-12
-        )
-        np.testing.assert_allclose(
-            rates["motion_coefficients"], rate_text(i, 1.6e-4, K_s, T), rtol=1e-12
-        )
+        for name, start in (
+            ("appearance_coefficients", 3.125e-3),
+            ("motion_coefficients", 1.6e-4),
+        ):
+            np.testing.assert_allclose(rates[name], text[name], rtol=1e-12)
+            share = (i - K_s) / (T - K_s)
+            np.testing.assert_allclose(rates[name], start * 0.01**share, rtol=1e-12)
 assert [active_degree(i, PAPER) for i in (499, 500, 1000, 1500, 6000)] == [0, 1, 2, 3, 3]
 assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000, 100))
 
@@ -153,30 +143,10 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # largest semi-axis is at most $p\,e=0.1$ scene units. **Split** a larger candidate into two children of $1/1.6$ of its
 # size, whose positions are drawn from it. Children inherit all other parameters; their moments start at 0.
 
-
 # %% tags=["transcription"]
-def statistic_text(views, width, height):
-    """views: (g_u, g_v, visible) of each view."""
-    total = sum(
-        np.where(seen, np.sqrt((width / 2 * g_u) ** 2 + (height / 2 * g_v) ** 2), 0)
-        for g_u, g_v, seen in views
-    )
-    count = sum(seen.astype(int) for _, _, seen in views)
-    return np.where(count > 0, total / np.maximum(count, 1), 0)
-
-
-def children_text(mu, q, s, xi):
-    """Centres (2, 3) and log-scale of the two children of one Gaussian."""
-    w, x, y, z = q / np.sqrt((q**2).sum())
-    R = np.array(
-        [
-            [1 - 2 * (y**2 + z**2), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x**2 + z**2), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x**2 + y**2)],
-        ]
-    )
-    return [mu + R @ (np.exp(s) * xi[child]) for child in (0, 1)], s - np.log(1.6)
-
+print(inspect.getsource(definition_of_density.gather_statistics))
+print(inspect.getsource(definition_of_density.densify))
+print(inspect.getsource(definition_of_density.with_children))
 
 # %%
 N = 60
@@ -196,14 +166,16 @@ scene = Scene(
     gaussians.opacity_logit,
     gaussians.harmonics,
 )
-statistics, views = empty_statistics(N), []
+statistics, text = empty_statistics(N), definition_of_density.empty_statistics(N)
 for _ in range(3):  # three views: a shifted camera, and a random pull on the image
     seen_from = camera._replace(translation=rng.normal(0, 0.2, 3))
     out, saved = render_forward(scene, seen_from, RASTER, degree=0)
     grads = render_reverse(rng.normal(0, 1e-5, out.colour.shape), 0 * out.depth, None, saved)
     gather_statistics(statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
-    views.append((*grads.d_mean2d, grads.visible))
-steep = statistic_text(views, 64, 48)
+    text = definition_of_density.gather_statistics(
+        text, grads.d_mean2d, grads.visible, camera.width, camera.height
+    )
+steep = text.gradient_sum / np.maximum(text.visits, 1)
 np.testing.assert_allclose(
     statistics.gradient_sum / np.maximum(statistics.visits, 1), steep, rtol=1e-12
 )
@@ -238,19 +210,16 @@ np.testing.assert_array_equal(
     after.gaussians.position[:, len(survivors) :][:, : len(to_clone)],
     gaussians.position[:, to_clone],
 )
-xi = np.random.default_rng(5).standard_normal((2, 3, len(to_split)))
-start = len(survivors) + len(to_clone)
-for column, parent in enumerate(to_split):
-    centres, log_scale = children_text(
-        gaussians.position[:, parent],
-        gaussians.quaternion[:, parent],
-        gaussians.log_scale[:, parent],
-        xi[:, :, column],
-    )
-    for child in (0, 1):
-        at = start + child * len(to_split) + column
-        np.testing.assert_allclose(after.gaussians.position[:, at], centres[child], rtol=1e-12)
-        np.testing.assert_allclose(after.gaussians.log_scale[:, at], log_scale, rtol=1e-12)
+made = definition_of_density.densify(
+    gaussians, statistics, rule, np.random.default_rng(5), extent
+)
+np.testing.assert_array_equal(after.plan.source, made.plan.source)
+for name in ("position", "quaternion", "log_scale", "opacity_logit", "harmonics"):
+    found, expected = getattr(after.gaussians, name), getattr(made.gaussians, name)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+children = after.gaussians.log_scale[:, -2 * len(to_split) :]
+parents = np.tile(gaussians.log_scale[:, to_split], 2)
+np.testing.assert_allclose(children, parents - np.log(1.6), rtol=1e-12)
 
 # %% [markdown]
 # ## Figure: rates over a run, and one step of density control
@@ -317,15 +286,20 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and continues. How large is the first update
-# of a child added at $k=600$, in units of $\eta$? How large is it when the count is very large?
+# 1. A Gaussian of opacity 0.5 covers a region that one Gaussian explains well. Its screen gradient has a random sign in
+#    every view. Is $\bar g_i$ small or large? Compare with the norm of the mean gradient.
+# 2. Write `adam_step` and let the golden cases judge it: `--only adam` ({doc}`index`). Then write `densify`:
+#    `--only density`. The case `on_the_thresholds` decides between $<$ and $\le$.
+# 3. The cell below answers this one. A new Gaussian has $m=v=0$, but the step count $k$ belongs to the array and
+#    continues. How large is the first update of a child added at $k=600$, in units of $\eta$? How large is it when the
+#    count is very large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 2.1 eta, and 3.16 eta in the limit: m is 0.1 g, sqrt(v) is 0.0316 g, and bias
 # correction no longer compensates.
 for k, factor in ((600, 2.13), (10**6, 3.162)):
     p = np.zeros(1)
-    adam_step(p, np.ones(1), np.zeros(1), np.zeros(1), k, 1.0, beta_1, beta_2, epsilon)
+    adam_step(p, np.ones(1), np.zeros(1), np.zeros(1), k, 1.0, *constants)
     print(k, -p[0])
     np.testing.assert_allclose(-p[0], factor, rtol=2e-2)
 assert isinstance(after.statistics, DensityStatistics) and not after.statistics.visits.any()

@@ -16,16 +16,8 @@ ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.py"))
 SPECIFICATION = ROOT / "docs" / "specification"
 DISPLAY = re.compile(r"^\$\$\n(.*?)\n\$\$(?: \(eq-([\w-]+)\))?$", flags=re.MULTILINE | re.DOTALL)
-SHOWS_THE_DEFINITION = {
-    "00_why",
-    "02_colour_residual",
-    "03_deformation",
-    "04_motion_and_prior",
-    "05_covariance",
-    "06_projection",
-    "07_harmonics",
-    "10_base_losses",
-}  # in place of a transcription of its own
+TRANSCRIBED = ("13_simulated_scene", "14_full_sequence", "15_hard_cases", "16_tradeoff", "17_effects")
+"""Notebooks of what no equation of the definition says; all others show the definition."""
 WITHOUT_DERIVATIVE = {"00_why", "16_tradeoff", "17_effects"}  # measure what the others derive
 COLUMNS = 96  # of code on a page of the book
 LINK = re.compile(r"\{eq\}`eq-([\w-]+)`")
@@ -111,13 +103,19 @@ def test_notebook_has_all_its_parts(file):
         assert re.search(r"print\(table\(", text), "the table of the gradient check"
 
 
-@pytest.mark.parametrize("file", NOTEBOOKS[:13], ids=lambda file: file.stem)
-def test_a_flipped_sign_of_a_transcription_is_noticed(file):
-    """One sign a notebook; all of them: notebook_signs.py. Those of the definition: definition/signs.py."""
-    if file.stem in SHOWS_THE_DEFINITION:
-        assert "print(inspect.getsource(definition." in file.read_text(encoding="utf-8")
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_an_equation_is_shown_as_its_definition_and_not_written_again(file):
+    cells = [body for formula, body in notebook_signs.code_cells(file) if formula]
+    if file.stem in TRANSCRIBED:
         return
-    noticed, line = notebook_signs.a_flip_is_noticed(file)
+    assert any("print(inspect.getsource(definition." in body for body in cells)
+    assert not [body for body in cells if "def " in body], "a second text of an equation"
+
+
+@pytest.mark.parametrize("name", [name for name in TRANSCRIBED if name != "14_full_sequence"])
+def test_a_flipped_sign_of_a_transcription_is_noticed(name):
+    """One sign a notebook; all of them: notebook_signs.py. Those of the definition: definition/signs.py."""
+    noticed, line = notebook_signs.a_flip_is_noticed(ROOT / "notebooks" / f"{name}.py")
     assert noticed, f"with the sign flipped, nothing failed: {line}"
 
 
