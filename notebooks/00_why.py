@@ -288,15 +288,15 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 # The painted colour has no reason to be right there, and A loses several decibels. A gain on training frames occurs in
 # both cases, so it does not tell them apart.
 #
-# The two rates were chosen because they differ most. A short sweep with one seed, noted by hand, gave A +0.7 dB held out
-# for one breath, +0.1 for two, -3.5 for four and -0.5 for six. The loss does not simply grow with the rate.
+# The two rates were chosen because they differ most. A short sweep with one seed, noted by hand, gave A +0.7 dB held
+# out for one breath, +0.1 for two, -3.5 for four and -0.5 for six. The loss does not simply grow with the rate.
 #
 # The other pages of the book report the numbers below; the reasons beside them are our reading and were not tested:
 #
 # - On the **simulated clip of the demonstration**, with the preset `paper`, A loses 0.28 dB on held-out frames
 #   ({doc}`/claims`) and gains almost 2 dB on training frames. That clip has a beat with five cycles in 24 frames.
-# - On the **real clip**, A gains 0.26 dB beside S ({doc}`/claims`). Most of its held-out frames lie between two training
-#   frames that differ little, as in the slow clip.
+# - On the **real clip**, A gains 0.26 dB beside S ({doc}`/claims`). Most of its held-out frames lie between two
+#   training frames that differ little, as in the slow clip.
 # - After **721 iterations** on the real clip, a model without residuals is 2.05 dB worse ({doc}`/tradeoff`); after 6000
 #   iterations the difference is some tenths of a decibel ({doc}`/claims`). The deformation may have hardly begun to
 #   follow the motion after 721 iterations, so that A paints what the deformation leaves.
@@ -309,9 +309,14 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 #
 # ## Exercise
 #
-# Render the model of the motion clip that was trained with A, but leave A out of the picture
-# (`run.render(..., without=("appearance",))`). Is the result on held-out frames better than the render with A? Is it as
-# good as the model that was trained without A? What does this say about the colours that the Gaussians have learned?
+# 1. In the clip with light alone the true motion is zero. Which two numbers of the table show that A explains the light
+#    without false motion? Which number would show that a model paints?
+# 2. Come back after chapter 10. Write the objective {eq}`eq-6` of one view with its gradients, and let the golden cases
+#    judge it: `--only objective` ({doc}`index`). The case `components_off` has neither A, S nor L.
+# 3. The cell below answers this one. Render the model of the motion clip that was trained with A, but leave A out of
+#    the picture (`run.render(..., without=("appearance",))`). Is the result on held-out frames better than the render
+#    with A? Is it as good as the model that was trained without A? What does this say about the colours that the
+#    Gaussians have learned?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Leaving A out repairs most of the damage: the painted colours are gone, and the

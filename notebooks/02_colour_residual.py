@@ -211,8 +211,13 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# The **argument** $x$ of the residual has mean 0 over the training stamps, because each $\bar\phi_k$ has mean 0. Is the
-# mean of $\beta\tanh x$ also 0? Find an $A$ for which the mean colour over the training stamps changes.
+# 1. Two Gaussians have the same $A$, and one has twice the bound $\beta$. How do their colour changes compare for small
+#    and for large $x$?
+# 2. Write `appearance_forward` and `appearance_reverse` and let the golden cases judge them: `--only appearance`
+#    ({doc}`index`). The case `deep_saturation` refuses $1-\tanh^2x$ computed from a rounded $\tanh x$.
+# 3. The cell below answers this one. The **argument** $x$ of the residual has mean 0 over the training stamps, because
+#    each $\bar\phi_k$ has mean 0. Is the mean of $\beta\tanh x$ also 0? Find an $A$ for which the mean colour over the
+#    training stamps changes.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. No: tanh is not linear. A curve that is high for a short time and slightly low for

@@ -85,9 +85,9 @@ print(", ".join(f"{at_distance[k]:.2f} at {k:.0f} l" for k in (1, 2, 3)))
 assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 
 # %% [markdown]
-# The penalty takes the spectral density as the prior variance of a coefficient at frequency $\omega_f$. Up to constants,
-# the negative logarithm of that prior is a sum of squares weighted by $1/S$. Scaled so that the weights have mean 1, this
-# is the equation:
+# The penalty takes the spectral density as the prior variance of a coefficient at frequency $\omega_f$. Up to
+# constants, the negative logarithm of that prior is a sum of squares weighted by $1/S$. Scaled so that the weights have
+# mean 1, this is the equation:
 #
 # $$
 # \begin{aligned}
@@ -116,8 +116,8 @@ np.testing.assert_allclose(penalty, text, rtol=1e-13)
 # %% [markdown]
 # **What does not follow.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are no uniform
 # grid of frequencies. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
-# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is no Matérn covariance: its correlation at $\ell$ is 0.02 and not 0.52, and
-# it does not decay. What the penalty states is which of two frequencies is dearer, and by how much.
+# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is no Matérn covariance: its correlation at $\ell$ is 0.02 and not 0.52,
+# and it does not decay. What the penalty states is which of two frequencies is dearer, and by how much.
 
 # %%
 implied = lambda tau: np.sum(np.cos(2 * np.pi * omega * tau) / rho) / np.sum(1 / rho)
@@ -262,8 +262,8 @@ np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rto
 # %% [markdown]
 # ## Play: correlation length and penalty
 #
-# A trajectory is fitted to noisy frames by least squares with the penalty of {eq}`eq-4`. A small penalty fits the noise; a
-# large one removes the beat. A longer correlation length moves weight to the high frequencies.
+# A trajectory is fitted to noisy frames by least squares with the penalty of {eq}`eq-4`. A small penalty fits the
+# noise; a large one removes the beat. A longer correlation length moves weight to the high frequencies.
 #
 # <div class="widget" data-widget="matern">The figure is live in the built book.</div>
 
@@ -286,9 +286,14 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# The raw cosines are 1 at $t=0$, so $C$ can contain a constant offset of the position. The canonical position could
-# represent that offset at no cost. Does the penalty allow the offset in $C$? What is the penalty of a slow drift $x=t$,
-# fitted by the atoms, compared with an oscillation of the same size at 16 cycles?
+# 1. The correlation length is doubled. How do the weights of the slowest and of the fastest frequency change, if their
+#    mean stays 1?
+# 2. Write the pair of the penalty {eq}`eq-4` and let the golden cases judge it: `--only matern`. Then write the pair of
+#    {eq}`eq-3`: `--only motion` ({doc}`index`).
+# 3. The cell below answers this one. The raw cosines are 1 at $t=0$, so $C$ can contain a constant offset of the
+#    position. The canonical position could represent that offset at no cost. Does the penalty allow the offset in $C$?
+#    What is the penalty of a slow drift $x=t$, fitted by the atoms, compared with an oscillation of the same size at 16
+#    cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Nothing forbids it, but it costs, and the canonical position costs nothing: so

@@ -346,8 +346,8 @@ assert all(report.passed for report in reports)
 # 2. Write the pair of {eq}`eq-b5` from (8.1) to (8.8) and let the golden cases judge it: `--only composite`
 #    ({doc}`index`). The case `opaque_exact` refuses a division by $1-\alpha$.
 # 3. The cell below answers this one. At one pixel there are three Gaussians with $\alpha=0.3,\ 1,\ 0.5$, front to back.
-#    Which of the three opacities and colours have a gradient? Many programs recover $T_k$ in the reverse pass by dividing
-#    the final $T_n$ by $1-\alpha$. What would such a program compute here?
+#    Which of the three opacities and colours have a gradient? Many programs recover $T_k$ in the reverse pass by
+#    dividing the final $T_n$ by $1-\alpha$. What would such a program compute here?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The first two have gradients, the opaque one included (less opacity would show the

@@ -245,8 +245,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## Exercise
 #
-# 1. A render is brighter than the frame by the same amount everywhere. Which bands differ? Which component of the model,
-#    and which other loss, corrects such an error?
+# 1. A render is brighter than the frame by the same amount everywhere. Which bands differ? Which component of the
+#    model, and which other loss, corrects such an error?
 # 2. Write the pair of {eq}`eq-5` and let the golden cases judge it: `--only laplacian` ({doc}`index`). The case
 #    `not_finite_under_mask` refuses a pyramid that reads the instrument and multiplies afterwards.
 # 3. The cell below answers this one. One single pixel in the middle of a large image is excluded. How many values of

@@ -183,10 +183,10 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 #
 # 1. One of the 16 views is black and its render is exact, so that both gradients are 0. What happens to the median if
 #    the view counts with the ratio 0, and what if it is left out?
-# 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases hold an even and
-#    an odd number of valid views.
-# 3. The cell below answers this one. Make every error of the render half as large. Does the calibrated weight change for
-#    $w=0$? Consider what the gradient of a mean of absolute values depends on.
+# 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases hold an even
+#    and an odd number of valid views.
+# 3. The cell below answers this one. Make every error of the render half as large. Does the calibrated weight change
+#    for $w=0$? Consider what the gradient of a mean of absolute values depends on.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Not at all. The gradient of a mean of absolute values depends on the signs of the

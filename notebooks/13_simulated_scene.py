@@ -245,8 +245,11 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# Held-out frames contribute nothing to the initial Gaussians. How would you test whether that is true of a program
-# whose source you cannot read?
+# 1. A pixel has no prior depth. Why can no Gaussian start there, and which pixels of an instrument are meant by that?
+# 2. Write `initialise` for given draws and let the golden cases judge it: `--only initialisation` ({doc}`index`). The
+#    case `one_point` has no neighbour from which a scale could be made.
+# 3. The cell below answers this one. Held-out frames contribute nothing to the initial Gaussians. How would you test
+#    whether that is true of a program whose source you cannot read?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Change the held-out frames to anything, and see whether one bit of the result moves.

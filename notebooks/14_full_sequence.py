@@ -482,8 +482,13 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# Remove component A from the **trained** model (`render_at(..., appearance=False)`), and compare with the model that
-# was trained without A. Which is better on the training frames? Why does an ablation need a separate training run?
+# 1. The average of two neighbouring frames has less noise than a frame. By how many decibels does this alone raise its
+#    PSNR, if nothing moves and the held-out frame has the same noise? Compare with {doc}`18_between`, step (18.6).
+# 2. Let the golden cases judge whole iterations of your own program: `--only training` ({doc}`index`). The case
+#    `twenty_iterations` needs every equation of this book.
+# 3. The cell below answers this one. Remove component A from the **trained** model (`render_at(...,
+#    appearance=False)`), and compare with the model that was trained without A. Which is better on the training frames?
+#    Why does an ablation need a separate training run?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The one trained without A: its other parameters have learned to do without (wrongly,

@@ -399,8 +399,13 @@ assert report.passed and precision.passed
 # %% [markdown]
 # ## Exercise
 #
-# A quaternion of exactly 0 is not a rotation. The deformation model can produce it, because it adds to the raw
-# quaternion. What should the image be, and what the gradient? Why is it worse to add a small epsilon to the norm?
+# 1. A needle has $\sigma_1/\sigma_2=10^4$. How many of the 7 digits of float32 does $ac-b^2$ keep, and how many does a
+#    sum of two squares keep?
+# 2. Run the hardest cases of the compositing on your own pair: `--only composite` ({doc}`index`). Which of your
+#    formulas fails in float32 and passes in float64?
+# 3. The cell below answers this one. A quaternion of exactly 0 is not a rotation. The deformation model can produce it,
+#    because it adds to the raw quaternion. What should the image be, and what the gradient? Why is it worse to add a
+#    small epsilon to the norm?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The identity rotation and no gradient: a defined result. With an epsilon the

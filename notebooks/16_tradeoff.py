@@ -226,16 +226,20 @@ plt.show()
 # %% [markdown]
 # ## Play: cutoff and stop
 #
-# 160 Gaussians are blended from front to back. Move the cutoff below 1e-5: the error vanishes while the visits grow. Move
-# the stop above 1e-2: the picture loses what lies behind.
+# 160 Gaussians are blended from front to back. Move the cutoff below 1e-5: the error vanishes while the visits grow.
+# Move the stop above 1e-2: the picture loses what lies behind.
 #
 # <div class="widget" data-widget="cutoff">The figure is live in the built book.</div>
 
 # %% [markdown]
 # ## Exercise
 #
-# The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you expect at $10^{-7}$, and why is this
-# estimate too large?
+# 1. A pixel has $T=10^{-3}$ left. How large can the error of its colour be if the pixel ends here? Which dial sets this
+#    bound?
+# 2. Change the cutoff of your pair of {eq}`eq-b5` from $1/255$ to $10^{-6}$ and let the golden cases judge it:
+#    `--only composite` ({doc}`index`). Which cases notice?
+# 3. The cell below answers this one. The visits at the cutoffs $10^{-3}$ and $10^{-5}$ are known. How many do you
+#    expect at $10^{-7}$, and why is this estimate too large?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. If the visits were a straight line in ln(1 / cutoff): as many more as between the

@@ -173,8 +173,8 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # rank of the dictionary over the stamps, centred and scaled to RMS 1, need not show this: the slower sinusoid is seldom
 # one of the eight, so that the rank is full for 20 frames and 16 cycles. The plan therefore limits three things: the
 # highest frequency, the rank, and the condition. The condition is the largest over the smallest singular value, by
-# which noise in the frames becomes noise in the coefficients. It is large for the shortest clips, and varies little from
-# 33 frames on.
+# which noise in the frames becomes noise in the coefficients. It is large for the shortest clips, and varies little
+# from 33 frames on.
 
 
 # %% tags=["transcription"]
@@ -259,8 +259,13 @@ for name, inspection in found.items():
 # %% [markdown]
 # ## Exercise
 #
-# A clip has 63 frames at 15 frames a second. The heart beats 72 times a minute, and the patient breathes 15 times. How
-# many cycles of both does the clip hold, and which of them can the test of rates and the dictionary find?
+# 1. The noise of a clip is estimated from second differences in time. Why not from first differences, if the tissue
+#    breathes?
+# 2. Write `frequencies` and the statistics of the atoms {eq}`eq-1b` and let the golden cases judge them:
+#    `--only frequencies` and `--only atoms` ({doc}`index`).
+# 3. The cell below answers this one. A clip has 63 frames at 15 frames a second. The heart beats 72 times a minute, and
+#    the patient breathes 15 times. How many cycles of both does the clip hold, and which of them can the test of rates
+#    and the dictionary find?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles

@@ -22,6 +22,13 @@ def test_the_judge_reads_the_script_of_the_exercises(tmp_path, text, accepted):
     assert (answer.returncode == 0) == accepted, answer.stdout + answer.stderr
 
 
+@pytest.mark.parametrize("file", sorted((ROOT / "notebooks").glob("*.py")), ids=lambda file: file.stem)
+def test_a_chapter_has_graded_exercises_of_which_the_golden_cases_judge_one(file):
+    text = file.read_text("utf-8").split("\n# ## Exercise\n")[1].split("\n# %% jupyter")[0]
+    assert re.findall(r"^# (\d)\. ", text, re.M) == ["1", "2", "3"]
+    assert re.search(r"`--only \w+`", text), "or a line break stands inside the option"
+
+
 @pytest.mark.parametrize("family", re.findall(r"`--only (\w+)`", "".join(
     file.read_text("utf-8") for file in sorted((ROOT / "notebooks").glob("*.py")))))  # fmt: skip
 def test_an_exercise_names_a_family_of_cases(family):
