@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = (
     "definition", "errors", "untrusted", "kernels", "equations", "losses", "splatting", "config", "opencv",
     "sequences", "scene", "fitting", "simulator", "effects", "runs", "evaluation", "report", "export", "views",
-    "stages", "gradcheck", "golden", "bench", "tradeoff", "sweeps", "api", "cli", "__main__",
+    "stages", "gradcheck", "golden", "bench", "tradeoff", "sweeps", "windows", "api", "cli", "__main__",
 )  # fmt: skip
 METHOD = ("definition", "kernels", "equations", "losses", "splatting", "scene", "fitting")
 GROUND = ("errors", "untrusted", "config", "opencv", "sequences")  # what the method may know beside itself

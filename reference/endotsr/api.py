@@ -56,6 +56,7 @@ from endotsr.untrusted.toml import read_toml
 if TYPE_CHECKING:
     from endotsr.export.scene import MovingScene
     from endotsr.fitting.state import TrainingState
+    from endotsr.windows.run import WindowedRun
 
 Component = Literal["appearance", "spectral_motion"]
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
@@ -216,15 +217,21 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
     return inspection_record(found) | {"plan": plan_record(make_plan(found, PAPER if config is None else config))}
 
 
-def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run":
+def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | WindowedRun":
     """The run of a run folder at its latest checkpoint, whether a command or `Run.save` wrote it.
+
+    A folder of `endotsr train --windows` gives a `WindowedRun`, which renders and evaluates as a `Run` does.
 
     sequence   current location of the sequence of the run; default: the recorded location. It is read at first use
 
     Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
     """
     from endotsr.report.curves import read_log
+    from endotsr.windows.record import is_windowed
+    from endotsr.windows.run import WindowedRun
 
+    if is_windowed(Path(path)):
+        return WindowedRun(Path(path), None if sequence is None else str(sequence))
     folder = run_folders.open_run(Path(path))
     model = load_model(folder)
     log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]

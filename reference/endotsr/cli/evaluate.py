@@ -115,11 +115,18 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     """Metrics of the run, written to its folder."""
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence
+    from endotsr.windows.record import is_windowed
 
     if options.run is None:
         raise InputError("evaluate: RUN is missing: a run folder, or --pictures FOLDER with --sequence SEQUENCE")
     if options.settings != SHOWN:
         raise InputError(f"evaluate: --sequence.* beside {options.run} is not allowed: the run has fixed its settings")
+    if is_windowed(options.run):
+        from endotsr.cli.parts.windows import evaluate_windows
+
+        if options.measures or published:
+            raise InputError(f"evaluate: --measures and --paper-row are for a run without windows, not {options.run}")
+        return evaluate_windows(options.run, options.lpips, options.sequence)
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)

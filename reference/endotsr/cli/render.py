@@ -13,9 +13,9 @@ from endotsr.cli.parts.result import JsonFile, write_result
 class RenderOptions:
     """Render a scene as pictures (--out), as a film (--film), or as both.
 
-    SCENE is a run folder, a slim model of `endotsr export`, or a 3DGS .ply file. Times are those of frames, or any
-    others in [0, 1]; a time between frames has the camera of the frame nearest in time. The folder holds colour/,
-    depth/, opacity/ and render.json (time, camera and file of every picture, depth scale).
+    SCENE is a run folder (also one of windows), a slim model of `endotsr export`, or a 3DGS .ply file. Times are those
+    of frames, or any others in [0, 1]; a time between frames has the camera of the frame nearest in time. The folder
+    holds colour/, depth/, opacity/ and render.json (time, camera and file of every picture, depth scale).
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
@@ -58,13 +58,13 @@ class RenderOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.export.scene import open_scene
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
     from endotsr.views.plan import ViewRequest
+    from endotsr.windows.scene import open_any
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
@@ -72,7 +72,7 @@ def run(words: list[str]) -> int:
     pictures.check_outputs(options.out, options.film, options.rate)
     refuse_unwritable(options.json)
     use_threads(options.threads)
-    scene = open_scene(options.scene)
+    scene = open_any(options.scene)
     for path in filter(None, (options.out, options.film)):
         if scene.folder is not None:
             refuse_inside_data(path, scene.folder)

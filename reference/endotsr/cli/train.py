@@ -20,6 +20,7 @@ from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
+from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
@@ -59,6 +60,16 @@ class TrainOptions:
     """threads, 0 = all cores (= --training.threads)"""
     effects: Literal["everything", "auto"] = "everything"
     """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
+    windows: Annotated[str | None, Option("auto|N")] = None
+    """cut a recording into windows of about N frames, or by its motion and cuts; each is a run in RUN/windows"""
+    overlap: int = 8
+    """of windows: frames that neighbours share"""
+    chain: int = 1
+    """of windows: this many in a row, each but the first started from its neighbour; 1 = all start independently"""
+    workers: Annotated[int | None, Option("N")] = None
+    """of windows: windows trained at a time (default: as many as cores and free memory allow)"""
+    scheduler: Annotated[str | None, Option("ADDRESS")] = None
+    """of windows: send them to the workers of this Dask scheduler; RUN and SEQUENCE are on a disk that all see"""
     resume: bool = False
     """continue the run in --out"""
     calibrate_only: bool = False
@@ -86,6 +97,8 @@ def run(words: list[str]) -> int:
     refuse_unwritable(options.json)
     if options.evaluate:
         check_lpips(options.lpips)
+    if options.windows is not None or (options.resume and is_windowed(options.out)):
+        return _train_windows(options, words)
     if options.resume:
         folder, sequence = _resume(options.out, options.sequence, words)
     else:
@@ -96,6 +109,38 @@ def run(words: list[str]) -> int:
         found = evaluate_run(folder, sequence, lpips=options.lpips, source=options.sequence or None)
         write_result(options.json, **found)
     return 0
+
+
+def _train_windows(options: TrainOptions, words: list[str]) -> int:
+    """Train a recording in windows, or what is missing of it, and measure it."""
+    from endotsr.cli.parts.windows import WindowsWanted, evaluate_windows, train_windows
+    from endotsr.cli.sweep import Place
+
+    assert options.out is not None
+    if options.effects != "everything":
+        raise InputError("train: --effects auto beside --windows is not allowed; allowed: inspect a part, and settings")
+    if options.resume:
+        _refuse_other_settings(options.out, words)
+    place = Place(options.workers, options.threads or None, options.scheduler)
+    asked = WindowsWanted(
+        options.sequence, options.out, _settings(options), options.windows or "", options.overlap, options.chain, place
+    )
+    code = train_windows(asked, resume=options.resume)
+    if options.evaluate and code == 0:
+        write_result(options.json, **evaluate_windows(options.out, options.lpips, options.sequence or None))
+    return code
+
+
+def _refuse_other_settings(out: Path, words: list[str]) -> None:
+    """Raises InputError for settings that differ from those that the windows were planned with."""
+    from endotsr.windows.make import recording_settings
+
+    kept = recording_settings(out)
+    options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
+    asked = asked_settings(TrainOptions, words, _settings(options), kept)
+    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
+    if refused:
+        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
 
 
 def _calibrate(options: TrainOptions, words: list[str]) -> int:

@@ -49,7 +49,17 @@ def initialise(
     Raises: InputError if no training pixel is tissue with depth.
     Draws:  one `rng.choice` without replacement per visited frame that has more pixels than requested.
     """
-    points = training_points(sequence, config, rng)
+    return gaussians_of(sequence, training_points(sequence, config, rng), config, model, dtype)
+
+
+def gaussians_of(
+    sequence: Sequence,
+    points: "TrainingPoints",
+    config: InitialisationConfig,
+    model: ModelConfig,
+    dtype: DTypeLike = np.float32,
+) -> Gaussians:
+    """Gaussians on points of the training frames, with the motion of the points if the settings say so (B15)."""
     gaussians = gaussians_at(points.position, points.colour, model, dtype)
     if config.motion == "none" or not model.spectral_motion:
         return gaussians

@@ -33,12 +33,13 @@ TOKEN = "sweep.token"  # a file in the folder of the sweep
 
 
 def cluster_outcomes(
-    address: str, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
+    address: str, jobs: list[Job], sequence_of: Callable[[Job], Sequence] | None, out: Path, threads: int | None
 ) -> Generator[Outcome | None, None, None]:
     """Make the runs on the workers of a scheduler; after KeyboardInterrupt all of them stop.
 
-    threads   of each run; default: the cores of a worker's machine divided by its workers
-    Raises:   InputError of one line if the scheduler does not answer or is lost, or if a worker cannot be used.
+    sequence_of   None: each worker reads the sequence of its run, from a disk that all machines see
+    threads       of each run; default: the cores of a worker's machine divided by its workers
+    Raises:       InputError of one line if the scheduler does not answer or is lost, or if a worker cannot be used.
     """
     out = Path(out).absolute()
     with _connected(address) as client:
@@ -53,7 +54,7 @@ def cluster_outcomes(
 
 
 def _outcomes(
-    client: Any, jobs: list[Job], sequence_of: Callable[[Job], Sequence], out: Path, threads: int | None
+    client: Any, jobs: list[Job], sequence_of: Callable[[Job], Sequence] | None, out: Path, threads: int | None
 ) -> Generator[Outcome | None, None, None]:
     sent, losses = _Sent(client, sequence_of), Counter[str]()
     running = {_submitted(client, job, sent, out, threads): job for job in jobs}
@@ -75,12 +76,14 @@ def _outcomes(
 class _Sent:
     """Sequences that the workers hold, by what they were read from."""
 
-    def __init__(self, client: Any, sequence_of: Callable[[Job], Sequence]) -> None:
+    def __init__(self, client: Any, sequence_of: Callable[[Job], Sequence] | None) -> None:
         self._client, self._sequence_of = client, sequence_of
         self._found: dict[str, Any] = {}
 
     def of(self, job: Job) -> Any:
-        """The sequence of a job, as a future; it is sent to every worker the first time."""
+        """The sequence of a job, as a future; it is sent to every worker the first time. None: it is not sent."""
+        if self._sequence_of is None:
+            return None
         if job.input_key not in self._found:
             sequence = self._sequence_of(job)
             self._found[job.input_key] = self._client.scatter(sequence, broadcast=True, hash=False)
@@ -100,7 +103,12 @@ def _submitted(client: Any, job: Job, sent: _Sent, out: Path, threads: int | Non
 
 
 def _work(
-    job: Job, sequence: Sequence, out: str, expected: dict[str, str], on_host: dict[str, int], threads: int | None
+    job: Job,
+    sequence: Sequence | None,
+    out: str,
+    expected: dict[str, str],
+    on_host: dict[str, int],
+    threads: int | None,
 ) -> Outcome:
     """On a worker: one run."""
     from distributed import get_worker

@@ -18,6 +18,7 @@ from endotsr.runs.machine import now
 from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.jobs import Job, finished_folder, measured_at_the_end, refuse_other_settings
 from endotsr.sweeps.locks import file_lock, run_lock
+from endotsr.sweeps.spec import Start
 from endotsr.untrusted.names import plain_line
 
 if TYPE_CHECKING:
@@ -130,8 +131,11 @@ def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunF
     record = start_record([*COMMAND, job.name], job.source, sequence, job.config, job.simulator, threads)
     if job.start is None:
         return train_new_run(Path(job.folder), record, sequence, job.config, observer)
-    state = _start_state(job, sequence)
-    record["start"] = {"configuration": job.start.configuration, "iteration": job.start.iteration}
+    if isinstance(job.start, Start):
+        record["start"] = {"configuration": job.start.configuration, "iteration": job.start.iteration}
+        state = _start_state(job, sequence)
+    else:
+        record["start"], state = job.start.about(), job.start.state(sequence, job.config)
     folder = create_run(Path(job.folder), job.config, record, record_of(sequence))
     with folder.locked():
         save_training(folder, state, job.config)
@@ -159,7 +163,7 @@ def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
     from endotsr.fitting.trainer import training_step
     from endotsr.runs.stopping import stop_asked
 
-    assert job.start is not None
+    assert isinstance(job.start, Start)
     config = job.start.config
     compile_ahead(config, lambda line: None)
     shop, state = workshop(sequence, config), new_training(sequence, config)
@@ -178,7 +182,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
 
     if folder.record().get("status") != FINISHED:  # killed between the last checkpoint and this record
         folder.update(status=FINISHED, finished=now())
-    if measured_at_the_end(job):
+    if not job.measured or measured_at_the_end(job):
         return
     weights = load_lpips_weights(job.lpips)
     _, metrics, held_out = measure_folder(folder, sequence, job.source, weights=weights, measures=job.measures)

@@ -7,7 +7,7 @@ A job holds all that another process or machine needs to make the run.
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import msgspec
 
@@ -19,8 +19,24 @@ from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.sweeps.spec import Configuration, Spec, Start, split_name, split_settings
 
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
+    from endotsr.sequences.sequence import Sequence
+
 RUNS, SHARED = "runs", "shared"  # folders of the runs and of the checkpoints that several runs begin with
 STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
+
+
+class Beginning(Protocol):
+    """A state that a run begins with in place of the initialisation, made where the run takes place."""
+
+    def about(self) -> dict[str, Any]:
+        """`start` of run.json."""
+        ...
+
+    def state(self, sequence: "Sequence", config: Config) -> "TrainingState":
+        """The state. Raises InputError if it cannot be made."""
+        ...
 
 
 class Job(NamedTuple):
@@ -35,10 +51,11 @@ class Job(NamedTuple):
     config: Config
     simulator: SimulatorSettings
     folder: str  # absolute path of the run folder
-    start: Start | None = None
+    start: Start | Beginning | None = None
     measures: tuple[str, ...] = ()
     lpips: str | None = None
     keep_checkpoints: bool = True
+    measured: bool = True  # False: the run ends with its training
 
     @property
     def input_key(self) -> str:
@@ -47,8 +64,8 @@ class Job(NamedTuple):
 
     @property
     def shared_checkpoint(self) -> Path:
-        """The checkpoint that the run begins with, if it has a `start`."""
-        assert self.start is not None
+        """The checkpoint that the run begins with, if it starts as another configuration did."""
+        assert isinstance(self.start, Start)
         parts = (self.sequence, self.split, self.start.configuration, f"seed{self.seed}", str(self.start.iteration))
         return Path(self.folder).parents[1] / SHARED / f"{file_word('-'.join(parts))}.npz"
 
@@ -116,7 +133,7 @@ def _of_run(config: Config, split: str, seed: int) -> Config:
 
 def _lengthened(job: Job, training_frames: int) -> Job:
     start = job.start
-    if start is not None:
+    if isinstance(start, Start):
         start = start._replace(config=lengthened(start.config, training_frames))
     return job._replace(config=lengthened(job.config, training_frames), start=start)
 
@@ -132,7 +149,7 @@ def finished_folder(job: Job) -> RunFolder | None:
     folder = open_run(path)
     refuse_other_settings(job, folder)
     with contextlib.suppress(InputError):  # a record that cannot be read
-        if folder.record().get("status") == "finished" and measured_at_the_end(job):
+        if folder.record().get("status") == "finished" and (not job.measured or measured_at_the_end(job)):
             return folder
     return None
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from endotsr.cli.parts.shown import ShownSettings, shown_sequence
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json, replace_file, write_json
+from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
@@ -59,7 +60,7 @@ def _metrics(
     label: str, path: Path, asked: Comparison, paths: list[Path], sequence: "Sequence | None"
 ) -> tuple[dict[str, Any], "Sequence | None"]:
     """The metrics of one argument, and the sequence if it had to be read."""
-    if (path / "run.json").exists():
+    if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
         return read_json(path / "metrics.json"), sequence

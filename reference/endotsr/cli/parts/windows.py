@@ -1,0 +1,129 @@
+"""`endotsr train --windows`, and the evaluation of such a run."""
+
+from collections.abc import Generator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from endotsr.cli.parts.progress import StepBar
+from endotsr.cli.sweep import Place, check_place
+from endotsr.config import Config
+from endotsr.errors import InputError
+from endotsr.report.words import duration
+from endotsr.runs.files import refuse_inside, write_json
+from endotsr.runs.sources import SIMULATED
+
+if TYPE_CHECKING:
+    from endotsr.sweeps.execute import Outcome
+    from endotsr.sweeps.jobs import Job
+
+AUTO = "auto"
+
+
+class WindowsWanted(NamedTuple):
+    """What the options of `train` ask for."""
+
+    source: str
+    out: Path
+    config: Config
+    windows: str  # a number of frames, or auto
+    overlap: int
+    chain: int
+    place: Place
+
+
+def train_windows(asked: WindowsWanted, *, resume: bool) -> int:
+    """Plan the windows, unless a run is resumed, and train them; 0, or 1 if a window failed."""
+    from endotsr.sweeps.execute import FINISHED
+    from endotsr.windows.make import make_windows
+    from endotsr.windows.record import read_record
+
+    check_place("train", asked.place)
+    if not resume:
+        _plan(asked)
+    record = read_record(asked.out)
+    for gap in record.left_out:
+        print(f"left out: frames {gap.first}:{gap.end}: {gap.reason}")
+    for window in record.windows:
+        print(f"window {window.name}: frames {window.first}:{window.end}, {window.start} start, {window.begins}")
+    with StepBar("iterations") as bar:
+        found = make_windows(asked.out, lambda jobs: _outcomes(jobs, asked), bar)
+    return 0 if all(outcome.status == FINISHED for outcome in found) else 1
+
+
+def _plan(asked: WindowsWanted) -> None:
+    from endotsr.windows.make import plan_recording
+    from endotsr.windows.plan import Wanted
+
+    if asked.source in ("", SIMULATED):
+        raise InputError("train: --windows cuts a sequence folder; allowed: a folder of `prepare` or `simulate`")
+    frames = None if asked.windows == AUTO else _frames(asked.windows)
+    refuse_inside(asked.out, Path(asked.source), "the sequence")
+    with StepBar("frames") as bar:
+        bar.begin(0)
+        plan_recording(
+            Path(asked.source), asked.config, Wanted(frames, asked.overlap, asked.chain), asked.out, bar.step
+        )
+
+
+def _frames(text: str) -> int:
+    if not (text.isascii() and text.isdecimal()):
+        raise InputError(f"train: --windows {text!r} is not allowed; allowed: auto, or a number of frames")
+    return int(text)
+
+
+def _outcomes(jobs: list["Job"], asked: WindowsWanted) -> Generator["Outcome | None", None, None]:
+    """Make the runs of one wave, here or on a cluster, whose workers read the recording themselves."""
+    from endotsr.sweeps.capacity import Size, capacity
+    from endotsr.sweeps.local import local_outcomes
+
+    place = asked.place
+    if place.scheduler is not None:
+        from endotsr.sweeps.cluster import cluster_outcomes
+
+        return cluster_outcomes(place.scheduler, jobs, None, asked.out, place.threads)
+    from endotsr.windows.make import size_of
+
+    sizes = [Size(*size_of(job)) for job in jobs]
+    found = capacity(sizes, workers=place.workers, threads=place.threads)
+    print(
+        f"{len(jobs)} windows, {found.workers} at a time, threads of each: {found.threads} ({found.reason})", flush=True
+    )
+    return local_outcomes(jobs, found.workers, found.threads)
+
+
+def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:
+    """Measure a run of windows, write metrics.json into its folder, and print the tables; returns the metrics."""
+    from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.report.run_text import held_out_table
+    from endotsr.windows.measure import measure_windows
+    from endotsr.windows.scene import WindowFrames, open_windows
+
+    scene = open_windows(run)
+    metrics = measure_windows(scene, WindowFrames(scene, source), load_lpips_weights(lpips))
+    write_json(run / "metrics.json", metrics)
+    for row in metrics["windows"]:
+        print(_row(row))
+    if "held_out" in metrics:
+        print(held_out_table(metrics))
+    print(_seam_line(metrics["seams"]))
+    for gap in metrics["left_out"]:
+        print(f"left out: frames {gap['first']}:{gap['end']}: {gap['reason']}")
+    return metrics
+
+
+def _row(row: dict[str, Any]) -> str:
+    memory, psnr = row["peak_memory_bytes"], row["psnr_tissue"]
+    words = [f"window {row['name']}: frames {row['first']}:{row['end']}, {row['start']}"]
+    words += [f"{row['iterations']} iterations in {duration(row['seconds'])}"]
+    words += [f"{row['saved']} iterations saved"] if row["saved"] else []
+    words += [] if memory is None else [f"peak memory {memory / 1e9:.2f} GB"]
+    return ", ".join([*words, "no held-out frame" if psnr is None else f"PSNR tissue {psnr:.2f} dB"])
+
+
+def _seam_line(seams: dict[str, Any]) -> str:
+    def shown(values: dict[str, float | None]) -> str:
+        if values["ratio"] is None:
+            return "not measured"
+        return f"{values['seams']:.2f} at seams, {values['inside']:.2f} inside (ratio {values['ratio']:.2f})"
+
+    return f"flicker, grey levels: model {shown(seams['model'])}; recorded frames {shown(seams['recorded'])}"

@@ -1,0 +1,236 @@
+"""A warm start: the state of a window from its neighbour's, carried over at a frame that both share.
+
+The join is the shared training frame nearest the middle of the overlap, at the time t* of the neighbour and u* of this
+window. The neighbour's Gaussians are deformed to t* and become canonical here:
+
+    mu = mu_n(t*) - C phi(u*)      q = q_n(t*)      s = s_n(t*)      h_0 = h_0,n + beta tanh(A_n phi_bar(t*)) / Y00
+
+C is fitted to the tracks of the tissue that the Gaussians lie on, as in (B15), or is 0 where the settings start without
+motion. The weights of the FDM and A are 0. At the join the picture is that of the neighbour, to rounding.
+
+In: the run folder of the neighbour, and the sequence of this window. Out: a training state, within the schedule.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from endotsr.config import Config
+from endotsr.equations.dictionary import dictionary_forward
+from endotsr.equations.motion import motion_forward
+from endotsr.errors import InputError
+from endotsr.fitting.model import Spectral, raster_settings, scene_at, spectral_from
+from endotsr.fitting.schedules import active_degree, residuals_active
+from endotsr.fitting.state import fresh_state
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.kernels.gather import gather_columns
+from endotsr.scene.gaussians import Gaussians, arrays
+from endotsr.scene.initialisation import activate_residuals, gaussians_at, gaussians_of, training_points
+from endotsr.scene.parameters import FrameParameters, frame_parameters
+from endotsr.scene.tracked_motion import with_tracked_motion
+from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.tracks import follow
+from endotsr.splatting.camera import Camera, backproject, project
+from endotsr.splatting.render import render_forward
+
+if TYPE_CHECKING:
+    from endotsr.fitting.state import TrainingState
+    from endotsr.runs.model import Model
+
+COVERED = 0.5  # least opacity of a pixel that the carried Gaussians show; elsewhere new tissue is added
+MARGIN = 0.1  # of the picture's sides: a Gaussian farther outside of every training frame is out of sight
+CAMERA_TOLERANCE = 1e-3  # of the median depth: how far two windows may see one frame from different places
+
+
+class CarriedStart(NamedTuple):
+    """The start of a window from its neighbour; a `Beginning` of a job."""
+
+    folder: str  # run folder of the neighbour
+    shift: int  # frame i of this window is frame i + shift of the neighbour
+    shared: int  # frames that both have, the first ones of this window
+    iteration: int  # of the schedule at which the window begins
+
+    def about(self) -> dict[str, Any]:
+        """`start` of run.json."""
+        return {"carried_from": Path(self.folder).name, "shared_frames": self.shared, "iteration": self.iteration}
+
+    def state(self, sequence: Sequence, config: Config) -> "TrainingState":
+        """The state. Raises InputError for a neighbour without a usable checkpoint, or of another world."""
+        from endotsr.runs.folder import open_run
+        from endotsr.runs.model import load_model
+        from endotsr.runs.sources import remembered_cameras
+
+        folder = open_run(Path(self.folder))
+        record = folder.sequence_record("times", "cameras", "static_camera", "names")
+        _refuse_other_world(sequence, remembered_cameras(record)[self.shift], self.folder)
+        weight = folder.record().get("lambda_lap")
+        neighbour = Neighbour(load_model(folder), record["times"], self.shift, self.shared, weight)
+        return carried_state(neighbour, sequence, config, self.iteration)
+
+
+class Neighbour(NamedTuple):
+    """What is carried over."""
+
+    model: "Model"
+    times: list[float]  # of all its frames
+    shift: int
+    shared: int
+    lambda_lap: float | None  # the weight of equation (7), which is not calibrated again
+
+    def join(self, sequence: Sequence) -> int:
+        """The place among the training frames of the window of the frame at which the state is carried over."""
+        shared = sequence.train_index[sequence.train_index < self.shared]
+        if not shared.size:
+            raise InputError("windows: the overlap holds no training frame; allowed: a larger --overlap")
+        return int(np.abs(shared - (self.shared - 1) / 2).argmin())
+
+
+def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config, iteration: int) -> "TrainingState":
+    """The state with which a window begins after `iteration` iterations of its schedule.
+
+    Gaussians that lie outside of every training frame are dropped; if more than `density.maximum` are left, so are the
+    faintest. Where the others cover less than half of a pixel of tissue, points are drawn as at a cold start, as many
+    as the uncovered fraction asks for. Moments are 0. Exposures and poses are those of the neighbour, constant beyond
+    its last frame.
+    """
+    rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
+    place = neighbour.join(sequence)
+    gaussians = _canonical(neighbour, int(sequence.train_index[place]), config, dtype)
+    gaussians = _gathered(gaussians, _kept(gaussians, sequence, config.density.maximum))
+    spectral = spectral_from(config.model, sequence.times[sequence.train_index])
+    if config.initialisation.motion != "none" and config.model.spectral_motion:
+        gaussians = _with_motion(gaussians, sequence, place, spectral)
+    fresh = _new_tissue(gaussians, sequence, spectral, config, iteration, rng, dtype)
+    if fresh is not None:
+        gaussians = _joined(gaussians, fresh)
+    if residuals_active(iteration + 1, config):
+        model = config.model
+        gaussians = activate_residuals(gaussians, model.frequencies, model.appearance, model.spectral_motion)
+    frames = _frame_parameters(neighbour, sequence, config, dtype)
+    weight = config.loss.lambda_lap
+    weight = neighbour.lambda_lap if weight == "auto" else float(weight)
+    return fresh_state(gaussians, frames, rng, iteration=iteration, lambda_lap=weight)
+
+
+def _refuse_other_world(sequence: Sequence, camera: Camera, folder: str) -> None:
+    """Raises InputError if the neighbour sees the first frame of the window from another place."""
+    depth = sequence.tissue_depth(0) or 1.0
+    if np.abs(sequence.cameras[0].translation - camera.translation).max() > CAMERA_TOLERANCE * depth:
+        raise InputError(f"{folder}: its origin is another one than that of the next window; allowed: windows that"
+                         " start cold (--chain 1), or poses near the origin")  # fmt: skip
+
+
+def _canonical(neighbour: Neighbour, frame: int, config: Config, dtype: Any) -> Gaussians:
+    """The neighbour's Gaussians at the join as Gaussians that do not move."""
+    model = neighbour.model
+    scene, _ = scene_at(model.gaussians, model.spectral, model.config.model, neighbour.times[frame + neighbour.shift])
+    harmonics = scene.harmonics.copy()
+    if scene.residual is not None:
+        harmonics[0] += scene.residual
+    start = gaussians_at(scene.position.astype(np.float64), np.zeros((3, model.gaussians.count)), config.model, dtype)
+    return start._replace(
+        position=np.ascontiguousarray(scene.position, dtype),
+        quaternion=np.ascontiguousarray(scene.quaternion, dtype),
+        log_scale=np.ascontiguousarray(scene.log_scale, dtype),
+        opacity_logit=scene.opacity_logit.copy(),
+        harmonics=harmonics,
+    )
+
+
+def _kept(gaussians: Gaussians, sequence: Sequence, maximum: int) -> BoolArray:
+    """(N,) the Gaussians whose centre some training frame sees, or nearly; the `maximum` most opaque of them."""
+    seen = np.zeros(gaussians.count, bool)
+    for camera in {id(c): c for c in (sequence.cameras[i] for i in sequence.train_index)}.values():
+        u, v, depth = project(camera, gaussians.position)
+        x, y = MARGIN * camera.width, MARGIN * camera.height
+        inside = (u >= -x) & (u <= camera.width + x) & (v >= -y) & (v <= camera.height + y)
+        seen |= (depth > 0) & inside
+    if np.count_nonzero(seen) > maximum:
+        places = np.flatnonzero(seen)
+        faint = np.argsort(-gaussians.opacity_logit[places], kind="stable")[maximum:]
+        seen[places[faint]] = False
+    return seen
+
+
+def _gathered(gaussians: Gaussians, kept: BoolArray) -> Gaussians:
+    source = np.flatnonzero(kept)
+    return gaussians._replace(**{k: gather_columns(a, source, source.size) for k, a in arrays(gaussians).items()})
+
+
+def _with_motion(gaussians: Gaussians, sequence: Sequence, place: int, spectral: Spectral) -> Gaussians:
+    """The Gaussians with motion coefficients that follow the tissue they lie on, at rest at the join."""
+    frame = int(sequence.train_index[place])
+    surface = _surface(gaussians.position.astype(np.float64), sequence, frame)
+    tracks = follow(sequence, np.full(gaussians.count, place, np.intp), surface)
+    position = tracks.position + (gaussians.position - surface)[None].astype(np.float32)
+    times = sequence.times[sequence.train_index].astype(np.float64)
+    moving = with_tracked_motion(gaussians, times, position, tracks.followed, spectral.omega, spectral.rho)
+    assert moving.motion_coefficients is not None
+    phi = dictionary_forward(float(sequence.times[frame]), spectral.omega)[0].astype(gaussians.position.dtype)
+    return moving._replace(position=gaussians.position - motion_forward(moving.motion_coefficients, phi)[0])
+
+
+def _surface(position: FloatArray, sequence: Sequence, frame: int) -> FloatArray:
+    """(3, N) the tissue that a frame shows where each Gaussian is; the Gaussian itself where it shows none."""
+    camera, mask, depth = sequence.cameras[frame], sequence.masks[frame], sequence.depth[frame]
+    u, v, z = project(camera, position)
+    with np.errstate(invalid="ignore"):
+        column, row = (np.clip(np.nan_to_num(x), 0, side - 1).astype(np.intp) for x, side in
+                       ((u, camera.width), (v, camera.height)))  # fmt: skip
+        inside = (z > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    found = np.where(inside & mask[row, column], depth[row, column], 0.0).astype(np.float64)
+    lifted = backproject(camera, column.astype(np.float64), row.astype(np.float64), np.maximum(found, 1e-6))
+    return np.where(found > 0, lifted, position)
+
+
+def _new_tissue(
+    gaussians: Gaussians,
+    sequence: Sequence,
+    spectral: Spectral,
+    config: Config,
+    iteration: int,
+    rng: np.random.Generator,
+    dtype: Any,
+) -> Gaussians | None:
+    """Gaussians where the carried ones cover no tissue; None if they cover all of it."""
+    degree = active_degree(iteration, config)
+    missing = np.zeros_like(sequence.masks)
+    for i in sequence.train_index:
+        scene, _ = scene_at(gaussians, spectral, config.model, float(sequence.times[i]))
+        rendered, _ = render_forward(scene, sequence.cameras[i], raster_settings(config), degree=degree)
+        missing[i] = sequence.masks[i] & (rendered.opacity < COVERED)
+    fraction = missing[sequence.train_index].mean()
+    if not fraction:
+        return None
+    wanted = config.initialisation
+    wanted = msgspec.structs.replace(wanted, first_frame_points=max(1, round(wanted.first_frame_points * fraction)))
+    try:
+        points = training_points(replace(sequence, masks=missing), wanted, rng)
+    except InputError:  # no depth where tissue is missing
+        return None
+    return gaussians_of(sequence, points, wanted, config.model, dtype)
+
+
+def _joined(first: Gaussians, second: Gaussians) -> Gaussians:
+    """The Gaussians of both, which have the same arrays."""
+    other = arrays(second)
+    return first._replace(**{k: np.concatenate([a, other[k]], axis=-1) for k, a in arrays(first).items()})
+
+
+def _frame_parameters(neighbour: Neighbour, sequence: Sequence, config: Config, dtype: Any) -> FrameParameters | None:
+    """Exposures and poses of the training frames of the window, from those of the neighbour."""
+    found = frame_parameters(config.model, sequence.times[sequence.train_index], dtype)
+    known = neighbour.model.frames
+    if found is None or known is None:
+        return found
+    last = len(neighbour.times) - 1
+    at = [neighbour.times[min(int(i) + neighbour.shift, last)] for i in sequence.train_index]
+    carried = {
+        name: np.array([np.interp(at, known.times, row) for row in array], dtype)
+        for name, array in known._asdict().items()
+        if name != "times" and array is not None
+    }
+    return found._replace(**carried)

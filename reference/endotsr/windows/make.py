@@ -1,0 +1,206 @@
+"""The windows of a recording, trained: cold ones independently of one another, warm ones behind their neighbours.
+
+In: a folder with windows.json and config.toml, and a function that makes runs somewhere, as that of a sweep. Out: one
+run folder a window. A chain is a window that starts cold and the warm ones behind it; the first windows of all chains
+are made together, then the second ones, and so on. A window that fails is named and ends nothing else; a warm window
+whose neighbour has failed starts cold. Finished windows are kept, and one that was begun goes on from its checkpoint.
+"""
+
+import contextlib
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from endotsr.config import Config, config_to_toml, lengthened, load_config
+from endotsr.errors import InputError
+from endotsr.runs.files import replacing_folder, write_json
+from endotsr.runs.folder import open_run, refuse_existing
+from endotsr.runs.log import last_iteration
+from endotsr.sequences.splits import split_frames
+from endotsr.simulator.settings import SimulatorSettings
+from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
+from endotsr.sweeps.jobs import Job, finished_folder
+from endotsr.sweeps.locks import file_lock
+from endotsr.sweeps.sweep import Reporter, Watch
+from endotsr.windows.carry import CarriedStart
+from endotsr.windows.plan import Wanted, check_wanted, planned_windows
+from endotsr.windows.record import FILE, FOLDER, Window, WindowsRecord, read_record
+from endotsr.windows.survey import survey
+
+LOCK = "windows.lock"
+SETTINGS = "config.toml"
+WARM = 0.4  # of the schedule: its last part, which a warm window is trained for
+Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
+
+
+def plan_recording(
+    source: Path, config: Config, wanted: Wanted, out: Path, on_frame: Callable[[], object] = lambda: None
+) -> WindowsRecord:
+    """Survey a recording and write the run folder with the plan of its windows; no window is trained.
+
+    Raises: InputError for settings, a recording or a folder that cannot be used, and where no window remains.
+    """
+    refuse_existing(out)
+    check_wanted(wanted, config.sequence)
+    found = survey(source, config.sequence, on_frame)
+    windows, left_out = planned_windows(found, wanted, config.sequence)
+    if not windows:
+        raise InputError(f"{source}: no window remains: {left_out[0].reason}")
+    record = WindowsRecord(
+        source=str(source.resolve()), frames=len(found), overlap=wanted.overlap, chain=wanted.chain,
+        windows=windows, left_out=left_out,
+    )  # fmt: skip
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
+    with replacing_folder(out, replace=False) as folder:
+        (folder / SETTINGS).write_text(config_to_toml(config), encoding="utf-8", newline="\n")
+        write_json(folder / FILE, msgspec.to_builtins(record))
+    return record
+
+
+def recording_settings(run: Path) -> Config:
+    """The settings of a run of windows; those of a window have its frames and its length."""
+    return load_config(run / SETTINGS)
+
+
+def window_folder(run: Path, window: Window) -> Path:
+    """The run folder of a window."""
+    return Path(run).absolute() / FOLDER / window.name
+
+
+def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outcome]:
+    """Train every window that is not finished; returns one outcome a window, in their order.
+
+    outcomes   makes runs, anywhere; its outcomes come in any order, None when there is none
+    Raises:    InputError for a folder that cannot be used, one that is trained already, and a full disk;
+               KeyboardInterrupt with a line that says how to continue.
+    """
+    run = Path(run)
+    record, config = read_record(run), recording_settings(run)
+    found: dict[str, Outcome] = {}
+    (run / FOLDER).mkdir(exist_ok=True)
+    with file_lock(run / LOCK, f"{run}: another process trains these windows; wait until it ends, or stop it"):
+        jobs = [window_job(run, record, k, config) for k in range(len(record.windows))]
+        watch = Watch([job for job in jobs if finished_folder(job) is None])
+        reporter.begin(watch.total)
+        try:
+            for wave in waves(record):
+                todo = [_startable(jobs[k], found, reporter) for k in wave]
+                _made(todo, outcomes, reporter, watch, found)
+        except KeyboardInterrupt:
+            done = sum(outcome.status == FINISHED for outcome in found.values())
+            raise KeyboardInterrupt(
+                f"{done} of {len(jobs)} windows are finished; continue with `endotsr train --out {run} --resume`"
+            ) from None
+    return [found[job.name] for job in jobs]
+
+
+def waves(record: WindowsRecord) -> list[list[int]]:
+    """Windows by their places in their chains: those of one wave do not depend on one another."""
+    found: list[list[int]] = []
+    place = 0
+    for k, window in enumerate(record.windows):
+        place = place + 1 if window.start == "warm" else 0
+        found += [[]] if place == len(found) else []
+        found[place].append(k)
+    return found
+
+
+def window_job(run: Path, record: WindowsRecord, k: int, config: Config) -> Job:
+    """Window k as a run on its part of the sequence."""
+    window = record.windows[k]
+    sequence = msgspec.structs.replace(config.sequence, frames=frame_range(config.sequence.frames, window))
+    train, _ = split_frames(window.count, sequence.split, sequence.block_length)
+    own = lengthened(msgspec.structs.replace(config, sequence=sequence), len(train))
+    start = None
+    if window.start == "warm":
+        neighbour = record.windows[k - 1]
+        first = own.training.iterations - max(1, round(WARM * own.training.iterations))
+        folder = window_folder(run, neighbour)
+        start = CarriedStart(str(folder), window.first - neighbour.first, record.shared(k), first)
+    return Job(
+        window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
+        str(window_folder(run, window)), start, measured=False,
+    )  # fmt: skip
+
+
+def size_of(job: Job) -> tuple[int, int, int]:
+    """Frames, width and height of a window, as far as memory depends on them; the folder's first picture is read."""
+    from endotsr.sequences.layouts import open_recording
+    from endotsr.sequences.source_options import SourceOptions
+
+    first, end, step = (int(word) for word in job.config.sequence.frames.split(":"))
+    lens, scale = open_recording(Path(job.source), SourceOptions()).lens, job.config.sequence.scale
+    assert lens is not None
+    return len(range(first, end, step)), round(lens.width * scale), round(lens.height * scale)
+
+
+def frame_range(selected: str, window: Window) -> str:
+    """The frames of a window as a range of the whole sequence. `selected`: the range that the recording was cut from.
+
+    Edges:  negative bounds of `selected` count from the end of a folder whose length is not known here: refused.
+    """
+    words = [int(word) if word.strip() else None for word in selected.split(":")] if selected.strip() else []
+    first, _, step = (*words, None, None, None)[:3]
+    if (first or 0) < 0:
+        raise InputError(f"train: --frames {selected!r} with --windows: allowed: a first frame that is not negative")
+    first, step = first or 0, step or 1
+    return f"{first + window.first * step}:{first + (window.end - 1) * step + 1}:{step}"
+
+
+def _startable(job: Job, found: dict[str, Outcome], reporter: Reporter) -> Job:
+    """The job, cold if its neighbour is not finished."""
+    start = job.start
+    if not isinstance(start, CarriedStart) or Path(job.folder).exists():
+        return job
+    neighbour = Path(start.folder).name
+    if found[neighbour].status == FINISHED:
+        return job
+    reporter.say(f"window {job.name}: window {neighbour} is not finished; starting cold")
+    return job._replace(start=None)
+
+
+def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch, found: dict[str, Outcome]) -> None:
+    """The jobs of one wave, made; their outcomes are added to `found`."""
+    left = []
+    for job in jobs:
+        if finished_folder(job) is None:
+            left.append(job)
+        else:
+            found[job.name] = Outcome(job.name, FINISHED)
+    if not left:
+        return
+    with contextlib.closing(outcomes(left)) as made:
+        for outcome in made:
+            reporter.step(watch.progress())
+            if outcome is None:
+                continue
+            if outcome.ends_sweep:
+                raise InputError(f"{outcome.reason}; the same command with --resume continues")
+            found[outcome.name] = outcome
+            reporter.say(_line(next(job for job in left if job.name == outcome.name), outcome))
+    for job in left:  # a pool that was stopped names no outcome
+        found.setdefault(job.name, Outcome(job.name, FAILED, "not made"))
+
+
+def _line(job: Job, outcome: Outcome) -> str:
+    frames = job.config.sequence.frames.rsplit(":", 1)[0]
+    if outcome.status != FINISHED:
+        return f"window {job.name} (frames {frames}): {outcome.status}: {outcome.reason}"
+    trained = window_cost(Path(job.folder))
+    return f"window {job.name} (frames {frames}): {trained['iterations']} iterations in {trained['seconds']:.0f} s"
+
+
+def window_cost(folder: Path) -> dict[str, Any]:
+    """Iterations that a window was trained for, their seconds, and the peak of its memory in bytes (None: unknown)."""
+    record = open_run(folder).record()
+    first = (record.get("start") or {}).get("iteration", 0)
+    done = last_iteration(folder / "log.jsonl") - first
+    return {
+        "start": "warm" if record.get("start") else "cold",
+        "iterations": done,
+        "saved": first,
+        "seconds": float(record.get("seconds") or 0.0),
+        "peak_memory_bytes": record.get("peak_memory_bytes"),
+    }

@@ -1,0 +1,181 @@
+"""The held-out frames of a windowed run beside the baselines, and the flicker at its seams.
+
+In: the scene of the windows and their sequences, one after another. Out: the dictionary of metrics.json. Frames are
+those of the recording; each is measured in the window with the larger weight, whose training frames the baselines use.
+
+Flicker compares three successive pictures where the tissue is: both neighbours are moved to the middle frame along the
+optical flow of the *recorded* frames, and
+
+    d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
+
+The root mean square of d over the tissue is given for frames in an overlap (at a seam) and for all others (inside), of
+the model and of the recorded frames. It needs no resting camera, unlike `evaluation.flicker`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from endotsr.evaluation.baselines import BASELINES, unit_image
+from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model
+from endotsr.evaluation.lpips import LpipsWeights
+from endotsr.evaluation.metrics import mean_metrics
+from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.sequence import Sequence
+from endotsr.windows.make import window_cost
+from endotsr.windows.scene import WindowedScene, WindowFrames
+
+LEVELS = 255.0  # flicker is in grey levels of an 8-bit picture
+LEAST_PIXELS = 100  # of tissue that three frames show: with fewer, a frame does not count
+
+
+def measure_windows(
+    scene: WindowedScene, frames: WindowFrames, weights: LpipsWeights | None = None, *, seams: bool = True
+) -> dict[str, Any]:
+    """The metrics of a windowed run.
+
+    seams     also measure the flicker, for which every frame is rendered
+    returns   the keys of `evaluate_model`, joined over the windows; `windows`, what each of them cost: frames, start,
+              iterations, iterations saved by a warm start, seconds, peak memory, and the mean held-out PSNR of its
+              frames; `left_out`; `seams`: the flicker of `model` and `recorded`, each {"seams", "inside", "ratio"} in
+              grey levels, and the numbers of frames
+    """
+    found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
+    known = [entry for entry in found if entry is not None]
+    metrics = _joined(known) if known else {"format": FORMAT}
+    metrics["windows"] = [
+        {"name": window.name, "first": window.first, "end": window.end}
+        | window_cost(folder.path)
+        | {"psnr_tissue": entry and entry["held_out"]["mean"].get("psnr_tissue")}
+        for window, folder, entry in zip(scene.plan.windows, scene.folders, found)
+    ]
+    metrics["left_out"] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
+    metrics["seams"] = _seams(scene, frames) if seams else None
+    metrics["published"] = []
+    return metrics
+
+
+def _measured(
+    scene: WindowedScene, frames: WindowFrames, k: int, weights: LpipsWeights | None
+) -> dict[str, Any] | None:
+    """`evaluate_model` on the frames in which window k has the larger weight; None if none is held out."""
+    first, held_out = scene.plan.windows[k].first, {scene.frames[j] for j in scene.record["test_index"]}
+    sequence = frames.of_window(k)
+    own = [i for i in range(sequence.count) if scene.owner(first + i) == k]
+    test = [i for i in own if first + i in held_out]
+    if not test:
+        return None
+    sample = [i for i in own if i in set(sequence.train_index.tolist())][::EVERY_TRAINING_FRAME]
+    shown = replace(sequence, test_index=np.array(test, np.intp))
+
+    def colour(i: int) -> FloatArray:
+        return _rendered(scene, first + i)
+
+    metrics = evaluate_model(shown, colour, weights, sample)
+    for part in (metrics["held_out"], metrics["training"], *metrics["baselines"].values()):
+        for row in part["per_frame"]:
+            row["frame"] += first
+            row["time"] = row["frame"] / scene.plan.frames
+    metrics["frames"]["held_out"] = [i + first for i in metrics["frames"]["held_out"]]
+    metrics["frames"]["training_sample"] = [i + first for i in metrics["frames"]["training_sample"]]
+    return metrics
+
+
+def _rendered(scene: WindowedScene, g: int) -> FloatArray:
+    """The picture of frame g, from its own camera."""
+    camera = scene.window(scene.owner(g)).cameras[g - scene.plan.windows[scene.owner(g)].first]
+    return scene.render(g / scene.plan.frames, camera).colour
+
+
+def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """The metrics of all windows as those of one sequence: rows one after another, means over all of them."""
+    held_out, training = (_joined_rows([part[name] for part in parts]) for name in ("held_out", "training"))
+    baselines = {
+        name: {"label": label} | _joined_rows([part["baselines"][name] for part in parts])
+        for name, (label, _) in BASELINES.items()
+    }
+    gap = {
+        key: None if value is None or held_out["mean"].get(key) is None else value - held_out["mean"][key]
+        for key, value in training["mean"].items()
+    }
+    return {
+        "format": FORMAT,
+        "frames": {
+            "total": sum(part["frames"]["total"] for part in parts),
+            "training": sum(part["frames"]["training"] for part in parts),
+            "held_out": [i for part in parts for i in part["frames"]["held_out"]],
+            "training_sample": [i for part in parts for i in part["frames"]["training_sample"]],
+            "tissue_fraction": float(np.mean([part["frames"]["tissue_fraction"] for part in parts])),
+        },
+        "held_out": held_out,
+        "training": training,
+        "temporal_gap": gap,
+        "baselines": baselines,
+        "lpips_reason": parts[0]["lpips_reason"],
+        "not_finite": sum(part["not_finite"] for part in parts),
+    }
+
+
+def _joined_rows(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Evaluations as one: the keys of `Evaluation.as_dict`."""
+    rows = [row for part in parts for row in part["per_frame"]]
+    keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
+    summary = mean_metrics([{key: row[key] for key in keys} for row in rows]) if rows else {}
+    return {
+        "mean": {key: summary[key] for key in keys},
+        "per_frame": rows,
+        "excluded": {key: int(summary[f"{key}_excluded"]) for key in keys if summary[f"{key}_excluded"]},
+        "not_finite": sum(part["not_finite"] for part in parts),
+    }
+
+
+def _seams(scene: WindowedScene, frames: WindowFrames) -> dict[str, Any]:
+    """Flicker at seams and inside; a value is None where no frame counts."""
+    squares: dict[str, dict[bool, list[float]]] = {name: {True: [], False: []} for name in ("model", "recorded")}
+    for at_seam, model, recorded in _flickers(scene, frames):
+        squares["model"][at_seam].append(model)
+        squares["recorded"][at_seam].append(recorded)
+    counts = {"seam_frames": len(squares["model"][True]), "inside_frames": len(squares["model"][False])}
+    return counts | {name: _levels(found) for name, found in squares.items()}
+
+
+def _levels(found: dict[bool, list[float]]) -> dict[str, float | None]:
+    seams, inside = (float(np.sqrt(np.mean(v)) * LEVELS) if v else None for v in (found[True], found[False]))
+    return {"seams": seams, "inside": inside, "ratio": seams / inside if seams and inside else None}
+
+
+def _flickers(scene: WindowedScene, frames: WindowFrames) -> Iterator[tuple[bool, float, float]]:
+    """Each frame with two neighbours: whether an overlap is among the three, mean of d^2 of model and recording."""
+    for k, window in enumerate(scene.plan.windows):
+        last = window.end == scene.plan.frames or k + 1 == len(scene.plan.windows) or not scene.plan.shared(k + 1)
+        sequence = frames.of_window(k)
+        shown: dict[int, FloatArray] = {}
+        for i in range(1, sequence.count - 1):
+            g = window.first + i
+            if not last and g >= scene.plan.windows[k + 1].first + 1:
+                break  # the next window has this frame and both neighbours
+            for j in (i - 1, i, i + 1):
+                if j not in shown:
+                    shown[j] = np.clip(_rendered(scene, window.first + j), 0, 1)
+            shown.pop(i - 2, None)
+            seam = any(len(scene.parts(window.first + j)) > 1 for j in (i - 1, i, i + 1))
+            if (squares := _squares(sequence, i, shown)) is not None:
+                yield seam, *squares
+
+
+def _squares(sequence: Sequence, i: int, shown: dict[int, FloatArray]) -> tuple[float, float] | None:
+    """Means of d^2 at frame i over the tissue, of renders and recorded frames; None with too little tissue."""
+    from endotsr.opencv import dense_flow, warp_bilinear
+
+    seen, sums = sequence.masks[i].copy(), [-2.0 * shown[i].astype(np.float64), -2.0 * unit_image(sequence, i)]
+    for j in (i - 1, i + 1):
+        flow = dense_flow(sequence.images[i], sequence.images[j])
+        seen &= warp_bilinear(sequence.masks[j].astype(np.float32), flow) > 0.999
+        for k, picture in enumerate((shown[j], unit_image(sequence, j))):
+            sums[k] = sums[k] + warp_bilinear(picture, flow)
+    if np.count_nonzero(seen) < LEAST_PIXELS:
+        return None
+    model, recorded = (float(np.square(total[:, seen]).mean() / 6.0) for total in sums)
+    return model, recorded

@@ -1,0 +1,163 @@
+"""Windows from what the survey has found: stretches between faults and cuts, each divided into windows that overlap.
+
+In: the surveyed frames, the length that is asked for, and the split. Out: windows and what is left out, with reasons.
+
+A stretch of L frames becomes m windows. Its frames have the densities d_i: one over the frames of a window if these are
+given, otherwise the larger of 1 / 96 and motion_i / 0.1, so that a window holds about 96 frames, or a path of a tenth
+of the picture's width if that is less. m is the sum of the densities rounded up, and window k begins where their
+running sum reaches k / m of it: windows are shorter where the tissue moves more.
+
+Windows begin at multiples of the period of the split, counted from the stretch, so that a frame is held out in both of
+the windows that share it (ruling in the specification).
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.sequences.splits import LEAST_BLOCK_PERIOD, split_frames
+from endotsr.windows.record import LeftOut, Window
+from endotsr.windows.survey import SurveyedFrame
+
+LEAST_WINDOW = 16  # frames
+MOST_WINDOW = 96  # frames of a window whose length follows from the motion
+PATH = 0.1  # of the picture's width: summed median flow in such a window; 0.09 in the 63 frames of EndoNeRF pulling
+LEAST_TISSUE = 0.01  # fraction of a frame below which it shows no tissue
+EMPTY_RUN = 8  # frames without tissue in a row that are left out
+
+
+class Wanted(NamedTuple):
+    """What a user asks for."""
+
+    frames: int | None = None  # of a window; None = from the motion
+    overlap: int = 8  # frames that neighbours share at least
+    chain: int = 1  # windows in a row of which each but the first starts warm
+
+
+class Stretch(NamedTuple):
+    """Frames without a fault or cut between them."""
+
+    first: int
+    end: int
+    begins: str  # why it begins there, in words
+
+
+def check_wanted(wanted: Wanted, split: SequenceConfig) -> None:
+    """Raises InputError for a length, an overlap or a chain that is not allowed, and for a split without windows."""
+    least = wanted.overlap + _least_stride(wanted, split_period(split))
+    if wanted.chain < 1:
+        raise InputError(f"train: --chain {wanted.chain} is not allowed; allowed: an integer >= 1")
+    if wanted.overlap < 2:
+        raise InputError(f"train: --overlap {wanted.overlap} is not allowed; allowed: an integer >= 2")
+    if wanted.frames is not None and wanted.frames < least:
+        raise InputError(
+            f"train: --windows {wanted.frames} is not allowed; allowed: auto, or at least {least} frames with an"
+            f" overlap of {wanted.overlap}, so that no frame is in three windows"
+        )
+
+
+def _least_stride(wanted: Wanted, period: int) -> int:
+    """Frames between the starts of two windows: a window overlaps with its neighbours only, and is not all overlap."""
+    return max(LEAST_WINDOW, wanted.overlap + period)
+
+
+def split_period(split: SequenceConfig) -> int:
+    """Frames after which the held-out frames repeat. Raises InputError for the split `end`, which has no period."""
+    if split.split == "end":
+        raise InputError("train: --windows with the split end: every window would hold out its end; allowed: others")
+    periods = {"every_eighth": 8, "every_second": 2, "blocks": max(LEAST_BLOCK_PERIOD, 2 * split.block_length)}
+    return periods[split.split]
+
+
+def planned_windows(
+    frames: list[SurveyedFrame], wanted: Wanted, split: SequenceConfig
+) -> tuple[list[Window], list[LeftOut]]:
+    """Windows and left-out frames, both ascending; without a usable stretch there is no window.
+
+    Edges:  frames that no window covers are left out with their reason: a fault, no tissue in eight frames or more,
+            a stretch with too few frames for the split.
+    """
+    check_wanted(wanted, split)
+    stretches, left_out = stretches_of(frames)
+    windows: list[Window] = []
+    for stretch in stretches:
+        if reason := _too_short(stretch, split):
+            left_out.append(LeftOut(first=stretch.first, end=stretch.end, reason=reason))
+            continue
+        windows += _windows_of(stretch, frames, wanted, split_period(split), len(windows))
+    return windows, sorted(left_out, key=lambda gap: gap.first)
+
+
+def stretches_of(frames: list[SurveyedFrame]) -> tuple[list[Stretch], list[LeftOut]]:
+    """Stretches between faults, cuts and runs of frames without tissue, and the frames in none of them."""
+    reasons = _reasons(frames)
+    stretches, left_out, begins = [], [], "the recording begins"
+    bounds = [0, *(i for i in range(1, len(frames)) if frames[i].cut or reasons[i] != reasons[i - 1]), len(frames)]
+    for first, end in pairwise(bounds):
+        if reasons[first]:
+            left_out.append(LeftOut(first=first, end=end, reason=reasons[first]))
+            begins = f"behind frame {end - 1}, which is left out"
+            continue
+        stretches.append(Stretch(first, end, f"cut: {frames[first].cut}" if frames[first].cut else begins))
+    return stretches, left_out
+
+
+def _reasons(frames: list[SurveyedFrame]) -> list[str]:
+    """Why each frame is left out; "" for a frame that is not."""
+    reasons = [frame.fault for frame in frames]
+    empty = [not frame.fault and frame.tissue < LEAST_TISSUE for frame in frames]
+    first = 0
+    while first < len(frames):
+        end = first
+        while end < len(frames) and empty[end]:
+            end += 1
+        if end - first >= EMPTY_RUN:
+            reasons[first:end] = [f"tissue on less than {LEAST_TISSUE:.0%} of the pixels"] * (end - first)
+        first = end + 1
+    return reasons
+
+
+def _too_short(stretch: Stretch, split: SequenceConfig) -> str:
+    """Why a stretch holds no window, in words; "" if it does."""
+    count = stretch.end - stretch.first
+    if count < LEAST_WINDOW:
+        return f"{count} frames between cuts or faults; a window has at least {LEAST_WINDOW}"
+    try:
+        split_frames(count, split.split, split.block_length)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _windows_of(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted, period: int, named: int) -> list[Window]:
+    """The windows of a stretch; `named` windows come before them."""
+    length, least = stretch.end - stretch.first, _least_stride(wanted, period)
+    sums = np.concatenate([[0.0], np.cumsum(_densities(stretch, frames, wanted))])
+    count = max(1, int(np.ceil(sums[-1] - 1e-9)))
+    starts = [0]
+    for begin in np.searchsorted(sums, sums[-1] * np.arange(1, count) / count) // period * period:
+        if starts[-1] + least <= begin <= length - wanted.overlap - LEAST_WINDOW // 2:
+            starts.append(int(begin))
+    ends = [*(start + wanted.overlap for start in starts[1:]), length]
+    return [
+        Window(
+            name=f"{named + k:03d}",
+            first=stretch.first + start,
+            end=stretch.first + end,
+            start="warm" if k % wanted.chain else "cold",
+            begins=f"shares {ends[k - 1] - start} frames" if k and ends[k - 1] > start else "" if k else stretch.begins,
+        )
+        for k, (start, end) in enumerate(zip(starts, ends))
+    ]
+
+
+def _densities(stretch: Stretch, frames: list[SurveyedFrame], wanted: Wanted) -> list[float]:
+    """Windows per frame, for every frame of a stretch but those that the last window shares with nobody."""
+    count = stretch.end - stretch.first - wanted.overlap
+    if wanted.frames is not None:
+        return [1.0 / (wanted.frames - wanted.overlap)] * max(count, 1)
+    return [max(1.0 / (MOST_WINDOW - wanted.overlap), frame.motion / PATH) for frame in
+            frames[stretch.first : stretch.first + max(count, 1)]]  # fmt: skip

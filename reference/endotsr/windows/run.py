@@ -1,0 +1,80 @@
+"""A run of windows from Python: what `endotsr.open_run` returns for one."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from numbers import Integral
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.export.scene import COMPONENTS
+from endotsr.runs.folder import RunFolder
+from endotsr.runs.sources import nearest_frame
+from endotsr.splatting.camera import Camera
+from endotsr.splatting.render import RenderOut
+from endotsr.windows.scene import WindowedScene, WindowFrames, open_windows
+
+
+@dataclass(eq=False, repr=False)
+class WindowedRun:
+    """A recording that was trained in windows. It renders and is measured as one run."""
+
+    path: Path
+    _source: str | None = None  # where the sequence is; None = where the records say
+
+    def __repr__(self) -> str:
+        return f"WindowedRun({len(self.scene.plan.windows)} windows, {len(self.scene.frames)} frames)"
+
+    @cached_property
+    def scene(self) -> WindowedScene:
+        """The scene. Raises InputError if a window is not trained."""
+        return open_windows(self.path)
+
+    @property
+    def windows(self) -> list[RunFolder]:
+        """The run folders of the windows; `endotsr.open_run(folder.path)` opens one of them."""
+        return self.scene.folders
+
+    @property
+    def sequence_record(self) -> dict[str, Any]:
+        """Times, names, split and unit of the frames that windows cover."""
+        return self.scene.record
+
+    def render(self, time: float, camera: Camera | int | None = None, *, without: tuple[str, ...] = ()) -> RenderOut:
+        """Colour (3, H, W) in display units, depth (H, W) in scene units and opacity (H, W), as `Run.render`.
+
+        time      of the recording, in [0, 1]; frame g of G is at g / G
+        camera    a Camera, or the place of a frame in `sequence_record`; default: that of the frame nearest in time
+        without   spectral components to leave out: "appearance", "spectral_motion"
+
+        In an overlap the renders of both windows are blended, with weights linear in time.
+        Raises: InputError for a time that no window shows, and for a frame or component that does not exist.
+        """
+        if not 0.0 <= time <= 1.0:
+            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
+        for name in without:
+            if name not in COMPONENTS:
+                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
+        if not isinstance(camera, Camera):
+            place = nearest_frame(self.sequence_record["times"], time) if camera is None else camera
+            last = len(self.scene.frames) - 1
+            if not isinstance(place, Integral) or not 0 <= int(place) <= last:
+                raise InputError(
+                    f"render: camera = {camera!r} is not allowed; allowed: a Camera, or a frame from 0 to {last}"
+                )
+            camera = self.scene.cameras[int(place)]
+        return self.scene.render(float(time), camera, without)
+
+    def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
+        """Metrics of the held-out frames of all windows, what each window cost, and the flicker at seams.
+
+        lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
+        returns   the keys of `windows.measure.measure_windows`
+
+        Raises: InputError if the sequence or the weights cannot be used.
+        """
+        from endotsr.evaluation.lpips import load_lpips_weights
+        from endotsr.windows.measure import measure_windows
+
+        weights = load_lpips_weights(None if lpips is None else Path(lpips))
+        return measure_windows(self.scene, WindowFrames(self.scene, self._source), weights)

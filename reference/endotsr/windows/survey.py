@@ -1,0 +1,151 @@
+"""One pass over a recording, frame by frame: which frames are damaged, where it is cut, and how much the tissue moves.
+
+In: a folder that `train` reads, and the settings of its section `sequence`. Out: one `SurveyedFrame` for every selected
+frame. Two frames are held in memory, however long the recording is.
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.config import SequenceConfig
+from endotsr.effects.clip import WIDEST
+from endotsr.errors import InputError
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.sequences.endonerf import NO_MASKS
+from endotsr.sequences.layouts import open_recording, readable_layout
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Recording
+from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.splits import parse_frame_range
+
+LEAST_CORRELATION = 0.5  # of a frame with the one before, moved along the flow: below it another scene begins
+LARGEST_STEP = 0.1  # of the depth: a camera that moves farther between two frames has jumped
+LARGEST_TURN = 10.0  # degrees
+LEAST_PIXELS = 100  # of tissue that both frames show: with fewer, neither motion nor a cut is measured
+
+
+class SurveyedFrame(NamedTuple):
+    """What the pass has found in one frame."""
+
+    name: str
+    fault: str = ""  # why the frame cannot be read, one line
+    cut: str = ""  # why another scene begins with this frame, in words
+    tissue: float = 0.0  # fraction of the pixels
+    motion: float = 0.0  # median length of the flow of the tissue from the frame before, fraction of the width
+
+
+class _Shown(NamedTuple):
+    """One frame at the working size."""
+
+    grey: NDArray[np.uint8]  # (h, w)
+    mask: BoolArray  # (h, w) True = tissue
+    pose: CameraPose | None
+    depth: float | None  # median over the tissue, unit of the recording
+
+
+def survey(source: Path, config: SequenceConfig, on_frame: Callable[[], object] = lambda: None) -> list[SurveyedFrame]:
+    """Read every selected frame once.
+
+    Motion and cuts are measured between frames that follow one another and can both be read. A frame begins another
+    scene if its correlation with the frame before, moved along the flow, is below 0.5, or if the camera moves by more
+    than a tenth of the depth or turns by more than 10 degrees.
+
+    on_frame  called after each frame
+    Raises:   InputError for a folder that `train` does not read, and for one of arbitrary unit, whose windows would
+              each have a scale of their own. A frame that cannot be read raises nothing: its fault says why.
+    """
+    readable_layout(source)
+    recording = open_recording(source, SourceOptions(excluded_value=config.excluded_value))
+    if recording.unit == ARBITRARY:
+        raise InputError(f"{source}: its unit is arbitrary, and each window would have a scale of its own; allowed: mm")
+    try:
+        frames = parse_frame_range(config.frames, recording.count)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    return list(_surveyed(recording, frames, config.masks != NO_MASKS, on_frame))
+
+
+def _surveyed(
+    recording: Recording, frames: range, masked: bool, on_frame: Callable[[], object]
+) -> Iterator[SurveyedFrame]:
+    before: _Shown | None = None
+    for i in frames:
+        found, shown = SurveyedFrame(recording.names[i]), None
+        try:
+            shown = _shown(recording, i, masked)
+        except InputError as error:
+            found = found._replace(fault=str(error))
+        if shown is not None:
+            found = found._replace(tissue=float(shown.mask.mean()))
+            if before is not None:
+                found = found._replace(**_between(before, shown))
+        before = shown
+        on_frame()
+        yield found
+
+
+def _shown(recording: Recording, i: int, masked: bool) -> _Shown:
+    """Frame i. Raises InputError if a file of it cannot be read."""
+    picture = next(iter(recording.pictures([i]))).left
+    lens = recording.lens
+    if lens is not None and picture.shape[:2] != (lens.height, lens.width):
+        size = f"{picture.shape[1]}x{picture.shape[0]}"
+        raise InputError(f"{recording.names[i]}: {size} pixels, the recording has {lens.width}x{lens.height}")
+    mask = recording.masks(i) if masked and recording.masks is not None else None
+    tissue = np.ones(picture.shape[:2], bool) if mask is None else mask
+    depth = None if recording.depth is None else recording.depth(i)
+    known = np.empty(0) if depth is None else depth[tissue & (depth > 0)]
+    grey, small = _reduced(picture.mean(axis=2).round().astype(np.uint8), tissue)
+    pose = None if recording.poses is None else recording.poses[i]
+    return _Shown(grey, small, pose, float(np.median(known)) if known.size else None)
+
+
+def _reduced(grey: NDArray[np.uint8], tissue: BoolArray) -> tuple[NDArray[np.uint8], BoolArray]:
+    """The working size: at most `WIDEST` columns; a pixel is tissue where all that it covers are."""
+    from endotsr.opencv import area_resize
+
+    side = -(-grey.shape[1] // WIDEST)
+    width, height = grey.shape[1] // side, grey.shape[0] // side
+    return area_resize(grey, width, height), area_resize(tissue.astype(np.float32), width, height) > 0.999
+
+
+def _between(before: _Shown, shown: _Shown) -> dict[str, float | str]:
+    """Motion from one frame to the next, and why they do not belong to one scene."""
+    from endotsr.opencv import dense_flow, warp_bilinear
+
+    jump = _jump(before, shown)
+    if np.count_nonzero(before.mask & shown.mask) < LEAST_PIXELS:
+        return {"cut": jump}
+    flow = dense_flow(before.grey, shown.grey)
+    moved = warp_bilinear(shown.grey.astype(np.float32), flow)
+    seen = before.mask & (warp_bilinear(shown.mask.astype(np.float32), flow) > 0.999)
+    cut = jump
+    if np.count_nonzero(seen) >= LEAST_PIXELS:
+        alike = _correlation(before.grey[seen].astype(np.float64), moved[seen].astype(np.float64))
+        if alike < LEAST_CORRELATION:
+            cut = f"the picture changes (correlation {alike:.2f})"
+    motion = float(np.median(np.hypot(*flow)[before.mask])) / before.grey.shape[1]
+    return {"cut": cut, "motion": 0.0 if cut else motion}
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    """Of two lists of grey levels; 1 where one of them is constant, which says nothing."""
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0 else 1.0
+
+
+def _jump(before: _Shown, shown: _Shown) -> str:
+    """How far the camera has jumped, in words; "" if it has not."""
+    if before.pose is None or shown.pose is None:
+        return ""
+    centres = [-pose.rotation.T @ pose.translation for pose in (before.pose, shown.pose)]
+    step = float(np.linalg.norm(centres[1] - centres[0]))
+    trace = float(np.trace(shown.pose.rotation @ before.pose.rotation.T))
+    turn = float(np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))))
+    if before.depth is not None and step > LARGEST_STEP * before.depth:
+        return f"the camera jumps by {step:.3g} at a depth of {before.depth:.3g}"
+    return f"the camera turns by {turn:.1f} degrees" if turn > LARGEST_TURN else ""
