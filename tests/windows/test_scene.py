@@ -159,3 +159,30 @@ def test_commands_take_a_run_of_windows(cold_run, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "window 001: frames 24:56, cold" in said and "7 held-out frames" in said and "at seams" in said
     assert json.loads((cold_run / "metrics.json").read_text())["seams"]["seam_frames"] == 10
+
+
+def test_one_time_is_exported_and_what_holds_one_set_of_gaussians_is_refused(cold_run, tmp_path, capsys):
+    from endotsr.cli.main import main
+
+    assert main(["export", str(cold_run), "--out", str(tmp_path / "a.ply"), "--times", "0.9"]) == 0
+    assert (tmp_path / "a.ply").stat().st_size > 10_000
+    for name in ("model.npz", "page.html"):
+        assert main(["export", str(cold_run), "--out", str(tmp_path / name)]) == 2
+    assert str(cold_run / "windows" / "000") in capsys.readouterr().err
+    assert main(["export", str(cold_run / "windows" / "000"), "--out", str(tmp_path / "model.npz")]) == 0
+
+
+def test_a_film_shows_truth_and_error_from_the_frames_of_the_windows(cold_run, tmp_path):
+    from endotsr.cli.main import main
+
+    film = tmp_path / "film.gif"
+    assert main(["render", str(cold_run), "--film", str(film), "--frames", "test", "--panels", "truth", "error"]) == 0
+    assert film.stat().st_size > 0
+
+
+def test_frames_are_those_of_the_recording(scene, recording):
+    whole, frames = endotsr.load_sequence(recording), WindowFrames(scene)
+    for g in (0, 27, 29, 55):
+        found, expected = frames.frame(g), whole.frame(g)
+        np.testing.assert_array_equal(found.image, expected.image)
+        assert found.time == pytest.approx(expected.time)

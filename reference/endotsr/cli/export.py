@@ -14,9 +14,10 @@ from endotsr.errors import InputError
 class ExportOptions:
     """Write a scene for other programs, as a page that plays it, or as a slim model that `render` and `export` read.
 
-    SCENE is a run folder, a slim model, or a 3DGS .ply file. The ending of --out chooses what is written: `.npz` is a
-    slim model of the whole scene, `.html` is a page with the moving scene, `.ply` is one time of it, and a name without
-    an ending is a folder with one .ply file for every time.
+    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows gives .ply files, each of its windows the
+    rest. The ending of --out chooses what is written: `.npz` is a slim model of the whole scene, `.html` is a page with
+    the moving scene, `.ply` is one time of it, and a name without an ending is a folder with one .ply file for every
+    time.
 
     The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
     kept at key times, between which the page interpolates; the colours are those that the observed camera sees.
@@ -57,14 +58,15 @@ class ExportOptions:
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.export.files import GAUSSIANS, Content, export
-    from endotsr.export.scene import open_scene
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.files import refuse_unwritable
+    from endotsr.windows.scene import open_any, refuse_one_set
 
     options = parse(ExportOptions, words, "export")
     refuse_unwritable(options.json)
     use_threads(options.threads)
+    refuse_one_set(options.scene, options.out)
     times = Times(options.times, options.frames, options.count)
     content = Content(options.content, options.opacity, options.without, options.voxel)
     if options.out.suffix.lower() in (".html", ".htm"):
@@ -75,7 +77,7 @@ def run(words: list[str]) -> int:
     for name, given in (("keys", options.keys), ("title", options.title), ("sequence", options.sequence)):
         if given:
             raise InputError(f"export: --{name} belongs to a page; allowed: with --out PAGE.html")
-    said = export(open_scene(options.scene), options.out, times, content)
+    said = export(open_any(options.scene), options.out, times, content)
     print(said)
     files = sorted(options.out.iterdir()) if options.out.is_dir() else [options.out]
     sizes = {file.name: file.stat().st_size for file in files}

@@ -64,7 +64,7 @@ def run(words: list[str]) -> int:
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
     from endotsr.views.plan import ViewRequest
-    from endotsr.windows.scene import open_any
+    from endotsr.windows.scene import open_any, shown_frames
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
@@ -78,7 +78,7 @@ def run(words: list[str]) -> int:
             refuse_inside_data(path, scene.folder)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
     look = pictures.Look(options.depth, options.without, options.panels)
-    sequence = pictures.frames_of(scene, options.panels, views, options.sequence) if options.film else None
+    sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
 
     def film(shown) -> None:

@@ -6,7 +6,7 @@ In: a scene and its views. Out: colour/, depth/, opacity/ and render.json in a f
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_byt
 from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
 from endotsr.runs.folder import refuse_existing
 from endotsr.runs.sources import load_run_sequence
-from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
@@ -35,6 +35,14 @@ ABOUT_DEPTH = {
     "accumulated": "not normalised by opacity",
     "normalised": "normalised by opacity",
 }
+
+
+class ReadFrames(Protocol):
+    """What a film shows beside its renders: a `Sequence`, or frames that are read when they are asked for."""
+
+    def frame(self, index: int) -> Frame:
+        """Frame `index` of the record of the scene."""
+        ...
 
 
 class Look(NamedTuple):
@@ -166,7 +174,7 @@ def write_views_film(
     pictures: Iterator[tuple[PlannedView, RenderOut]],
     look: Look,
     rate: float,
-    sequence: Sequence | None = None,
+    sequence: ReadFrames | None = None,
 ) -> int:
     """Write a film of panels; returns the number of its pictures.
 
@@ -176,7 +184,7 @@ def write_views_film(
 
 
 def film_pictures(
-    pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: Sequence | None = None
+    pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: ReadFrames | None = None
 ) -> Iterator[ByteImage]:
     """The panels of every view; depth and error have the same colours in all of them."""
     scale = None

@@ -28,8 +28,11 @@ from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.splatting.render import Scene as DeformedScene
-from endotsr.windows.make import recording_settings, window_folder
-from endotsr.windows.record import WindowsRecord, is_windowed, read_record
+from endotsr.views.panels import NEEDS_TRUTH, Panel
+from endotsr.views.pictures import check_panels, frames_of
+from endotsr.views.plan import PlannedView
+from endotsr.windows.make import window_folder
+from endotsr.windows.record import FOLDER, WindowsRecord, is_windowed, read_record
 
 EMPTY = WindowsRecord(source="", frames=1, overlap=0, chain=1, windows=[])
 KEPT = 2  # windows whose models are held in memory
@@ -152,6 +155,15 @@ def open_any(path: Path) -> MovingScene:
     return open_windows(Path(path)) if is_windowed(path) else open_scene(path)
 
 
+def refuse_one_set(path: Path, out: Path) -> None:
+    """Raises InputError for a slim model or a page of a run of windows: each holds one set of Gaussians."""
+    if is_windowed(path) and out.suffix.lower() in (".npz", ".html", ".htm"):
+        raise InputError(
+            f"{out}: holds one set of Gaussians, and {path} has one in each window; allowed: .ply files, or the run of"
+            f" a window, {path / FOLDER / '000'}"
+        )
+
+
 def open_windows(run: Path) -> WindowedScene:
     """The scene of a run of windows. Raises InputError if a window has no usable record, or none is trained yet."""
     plan = read_record(run)
@@ -187,6 +199,16 @@ def _record(scene: WindowedScene) -> dict[str, Any]:
     }
 
 
+def shown_frames(
+    scene: MovingScene, panels: tuple[Panel, ...], views: list[PlannedView], source: str | None
+) -> "Sequence | WindowFrames | None":
+    """The frames that truth and error of a film are shown from, as `views.pictures.frames_of`."""
+    if not isinstance(scene, WindowedScene):
+        return frames_of(scene, panels, views, source)
+    check_panels(panels, views)
+    return WindowFrames(scene, source) if set(panels) & set(NEEDS_TRUTH) else None
+
+
 class WindowFrames:
     """The frames of a recording, read window by window as they are asked for in ascending order.
 
@@ -207,8 +229,3 @@ class WindowFrames:
         k = self._scene.owner(g)
         found = self.of_window(k).frame(g - self._scene.plan.windows[k].first)
         return found._replace(time=g / self._scene.plan.frames)
-
-
-def settings_of(scene: WindowedScene) -> Any:
-    """The settings that all windows have."""
-    return recording_settings(scene.run)

@@ -58,11 +58,8 @@ def _plan(asked: WindowsWanted) -> None:
         raise InputError("train: --windows cuts a sequence folder; allowed: a folder of `prepare` or `simulate`")
     frames = None if asked.windows == AUTO else _frames(asked.windows)
     refuse_inside(asked.out, Path(asked.source), "the sequence")
-    with StepBar("frames") as bar:
-        bar.begin(0)
-        plan_recording(
-            Path(asked.source), asked.config, Wanted(frames, asked.overlap, asked.chain), asked.out, bar.step
-        )
+    print(f"reading every frame of {asked.source} once", flush=True)
+    plan_recording(Path(asked.source), asked.config, Wanted(frames, asked.overlap, asked.chain), asked.out)
 
 
 def _frames(text: str) -> int:

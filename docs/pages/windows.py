@@ -1,0 +1,191 @@
+"""Measure recordings in windows: quality, minutes, memory and the flicker at seams.
+
+    python docs/pages/windows.py recording --frames 240 --size 160x128 --windows 48   raw recording -> film, by commands
+    python docs/pages/windows.py recording --frames 2000 --size 320x256 --windows auto --chain 4 --preset quick
+    python docs/pages/windows.py clip SEQUENCE --windows 64 36 27 --preset quick      one clip in 1, 2 and 3 windows
+    python docs/pages/windows.py warm RUN                                             iterations saved by warm starts
+    python docs/pages/windows.py table                                                write the tables again
+
+`recording` simulates breathing, pulsation, a moving camera, an instrument and a drift of the light as a StereoMIS
+recording, and makes the film with the commands of the guide. `warm` reads a run whose windows started warm: it trains
+every one of them again from a cold start, on the whole schedule, and finds the iteration at which the cold run reaches
+the training loss with which the warm one ends. Results are added to docs/results/windows.json; the tables stand in
+docs/guides/recording.md.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from marks import write_marked
+
+from endotsr.report.tables import markdown
+from endotsr.runs.files import write_json
+from endotsr.runs.machine import machine
+from endotsr.sweeps.execute import execute
+from endotsr.windows.make import recording_settings, window_job
+from endotsr.windows.record import read_record
+
+DOCS = Path(__file__).parents[1]
+FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"
+EFFECTS = "breathing,pulsation,camera_motion,exposure,instrument,highlights,noise"
+FRAMES_A_BREATH, FRAMES_A_BEAT, FRAMES_A_SWING = 80, 24, 160
+LAST = 0.1  # of the log of a run, whose mean loss is compared
+
+
+def command(*words: str) -> tuple[float, float]:
+    """Run a command of endotsr; seconds, and the largest peak memory of any process so far, bytes."""
+    begun = time.monotonic()
+    subprocess.run([sys.executable, "-m", "endotsr", *words], check=True)
+    return time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024.0
+
+
+def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
+    """What a trained and measured run of windows shows."""
+    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    means = {"model": metrics["held_out"]["mean"]} | {k: v["mean"] for k, v in metrics["baselines"].items()}
+    return {
+        "name": name,
+        "preset": preset,
+        "windows": len(metrics["windows"]),
+        "warm": sum(row["start"] == "warm" for row in metrics["windows"]),
+        "frames": read_record(run).frames,
+        "seconds": seconds,
+        "training_seconds": sum(row["seconds"] for row in metrics["windows"]),
+        "iterations": sum(row["iterations"] for row in metrics["windows"]),
+        "peak_memory_bytes": max(row["peak_memory_bytes"] or 0 for row in metrics["windows"]),
+        "psnr_tissue": {key: mean["psnr_tissue"] for key, mean in means.items()},
+        "psnr_full": {key: mean["psnr_full"] for key, mean in means.items()},
+        "lpips": means["model"]["lpips"],
+        "seams": metrics["seams"],
+        "date": date.today().isoformat(),
+        "machine": machine(),
+    }
+
+
+def trained(source: Path, run: Path, name: str, options: argparse.Namespace, windows: str) -> dict[str, Any]:
+    """One training in windows, with its evaluation."""
+    words = ["train", str(source), "--out", str(run), "--windows", windows, "--preset", options.preset]
+    words += ["--chain", str(options.chain), "--workers", str(options.workers)]
+    words += ["--iterations", str(options.iterations)] if options.iterations else []
+    words += ["--lpips", str(options.lpips)] if options.lpips else []
+    seconds, _ = command(*words)
+    return row_of(run, name, seconds, options.preset)
+
+
+def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Raw recording to film."""
+    raw, clip, run = (folder / name for name in ("raw", "clip", "run"))
+    width, height = options.size.split("x")
+    cycles = {"breathing": FRAMES_A_BREATH, "pulsation": FRAMES_A_BEAT, "camera-motion": FRAMES_A_SWING}
+    words = ["simulate", "--effects", EFFECTS, "--layout", "stereomis", "--out", str(raw), "--width", width]
+    words += ["--height", height, "--frames", str(options.frames)]
+    for effect, length in cycles.items():
+        words += [f"--{effect}.cycles", f"{options.frames / length:g}"]
+    command(*words)
+    steps = {"prepare": command("prepare", str(raw), "--out", str(clip))[0]}
+    steps["depth"] = command("depth", str(clip), "--nearest", "25", "--farthest", "120")[0]
+    name = f"simulated {options.frames} frames {options.size}"
+    found = trained(clip, run, name, options, options.windows[0])
+    steps["train"] = found["seconds"]
+    steps["film"] = command("render", str(run), "--film", str(folder / "film.mp4"))[0]
+    return found | {"steps": steps}
+
+
+def warm(run: Path) -> list[dict[str, Any]]:
+    """For every warm window: its iterations, and those of a cold run that reach the same loss."""
+    record, config, found = read_record(run), recording_settings(run), []
+    for k, window in enumerate(record.windows):
+        if window.start == "cold":
+            continue
+        job = window_job(run, record, k, config)
+        mine = losses(Path(job.folder))
+        other = job._replace(start=None, folder=str(run.absolute() / "again" / window.name))
+        outcome = execute(other, 1)
+        if outcome.status != "finished":
+            raise SystemExit(f"{window.name}: {outcome.reason}")
+        cold = losses(Path(other.folder))
+        count = max(1, round(LAST * len(mine)))
+        level, smooth = mine[-count:].mean(), np.convolve(cold, np.ones(count) / count, "valid")
+        reached = np.flatnonzero(smooth <= level)
+        equal = int(reached[0]) + count if reached.size else None
+        found.append({"window": window.name, "warm_iterations": len(mine), "warm_loss": float(level),
+                      "cold_iterations": len(cold), "cold_loss": float(cold[-count:].mean()),
+                      "cold_reaches_it_after": equal})  # fmt: skip
+    return found
+
+
+def losses(folder: Path) -> np.ndarray:
+    """The loss of every iteration of a run."""
+    lines = (folder / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    return np.array([json.loads(line)["loss"] for line in lines])
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """One run a row."""
+    headings = ["Recording", "Preset", "Windows (warm)", "Iterations", "Training, min", "Peak memory, GB",
+                "PSNR tissue, dB", "blend of neighbours", "flow", "LPIPS", "Flicker at seams / inside"]  # fmt: skip
+    cells = []
+    for row in rows:
+        psnr, ratio, lpips = row["psnr_tissue"], row["seams"]["model"]["ratio"], row["lpips"]
+        cells.append([
+            row["name"], f"`{row['preset']}`", f"{row['windows']} ({row['warm']})", f"{row['iterations']}",
+            f"{row['training_seconds'] / 60:.1f}", f"{row['peak_memory_bytes'] / 1e9:.2f}", f"{psnr['model']:.2f}",
+            f"{psnr['two_neighbours']:.2f}", f"{psnr['flow_interpolation']:.2f}",
+            "-" if lpips is None else f"{lpips:.4f}", "-" if ratio is None else f"{ratio:.2f}",
+        ])  # fmt: skip
+    return markdown(headings, cells)
+
+
+def warm_table(rows: list[dict[str, Any]]) -> str:
+    """One warm window a row."""
+    headings = ["Window", "Iterations, warm", "Loss at the end", "A cold start reaches it after", "Its loss at the end"]
+    return markdown(headings, [
+        [row["window"], f"{row['warm_iterations']}", f"{row['warm_loss']:.4f}",
+         f"{row['cold_reaches_it_after'] or 'never'} of {row['cold_iterations']}", f"{row['cold_loss']:.4f}"]
+        for row in rows
+    ])  # fmt: skip
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=["recording", "clip", "warm", "table"])
+    parser.add_argument("source", type=Path, nargs="?", help="a sequence (clip), or a run (warm)")
+    parser.add_argument("--frames", type=int, default=240)
+    parser.add_argument("--size", default="160x128")
+    parser.add_argument("--windows", nargs="+", default=["auto"])
+    parser.add_argument("--chain", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--iterations", type=int)
+    parser.add_argument("--preset", default="quick")
+    parser.add_argument("--lpips", type=Path)
+    parser.add_argument("--keep", type=Path, help="folder for what is made (default: a temporary one)")
+    options = parser.parse_args()
+    known = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {"rows": [], "warm": []}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.keep or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        if options.what == "recording":
+            known["rows"].append(recording(options, folder))
+        elif options.what == "clip":
+            for number in options.windows:
+                run = folder / f"windows{number}"
+                known["rows"].append(trained(options.source, run, options.source.name, options, number))
+        elif options.what == "warm":
+            known["warm"] = warm(options.source)
+    write_json(FILE, known)
+    if PAGE.exists():
+        write_marked(PAGE, {"runs": table(known["rows"]), "warm": warm_table(known["warm"])}, "windows")
+
+
+if __name__ == "__main__":
+    main()
