@@ -108,7 +108,9 @@ def warm(run: Path) -> list[dict[str, Any]]:
             continue
         job = window_job(run, record, k, config)
         mine = losses(Path(job.folder))
-        other = job._replace(start=None, folder=str(run.absolute() / "again" / window.name))
+        other = window_job(run, record, k, config, cold=True)._replace(
+            folder=str(run.absolute() / "again" / window.name)
+        )
         outcome = execute(other, 1)
         if outcome.status != "finished":
             raise SystemExit(f"{window.name}: {outcome.reason}")

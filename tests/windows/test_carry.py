@@ -9,15 +9,15 @@ from small_recording import settings, trained, write_recording
 
 from endotsr.errors import InputError
 from endotsr.fitting.model import render_at, spectral_from
-from endotsr.fitting.schedules import residuals_active
+from endotsr.fitting.schedules import active_degree, residuals_active
 from endotsr.runs.folder import open_run
 from endotsr.runs.model import load_model
 from endotsr.runs.sources import load_run_sequence
 from endotsr.windows.carry import COVERED, CarriedStart, Neighbour, carried_state
-from endotsr.windows.make import window_cost
+from endotsr.windows.make import warm_settings, window_cost
 from endotsr.windows.plan import Wanted
 
-SHIFT, SHARED, ITERATION = 24, 8, 12
+SHIFT, SHARED, SAVED = 24, 8, 12
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def both(cold_run):
     """The neighbour, and the sequence and settings of the window behind it."""
     first, second = (open_run(cold_run / "windows" / name) for name in ("000", "001"))
     neighbour = Neighbour(load_model(first), first.sequence_record()["times"], SHIFT, SHARED, 0.5)
-    return neighbour, load_run_sequence(second), second.config()
+    return neighbour, load_run_sequence(second), warm_settings(second.config())
 
 
 def picture(gaussians, model, config, sequence, i, time, frames=None):
@@ -39,7 +39,7 @@ def test_the_picture_at_the_join_is_the_neighbours(both, motion):
         config, initialisation=msgspec.structs.replace(config.initialisation, motion=motion)
     )
     assert neighbour.model.gaussians.appearance_coefficients.any(), "the colour residual is part of what is carried"
-    state = carried_state(neighbour, sequence, config, ITERATION)
+    state = carried_state(neighbour, sequence, config)
     i = int(sequence.train_index[neighbour.join(sequence)])
     model = neighbour.model
     there = picture(
@@ -61,26 +61,24 @@ def test_a_warm_state_is_nearer_to_the_frames_than_a_cold_one(both):
     neighbour, sequence, config = both
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     errors = []
-    for state in (carried_state(neighbour, sequence, config, ITERATION), new_training(sequence, config)):
+    for state in (carried_state(neighbour, sequence, config), new_training(sequence, config)):
         out = picture(state.gaussians, spectral, config, sequence, 20, float(sequence.times[20]))
         errors.append(np.square(out.colour - sequence.images[20] / 255)[:, sequence.masks[20]].mean())
     assert errors[0] < 0.5 * errors[1]
 
 
-def test_the_state_enters_the_schedule_with_what_is_active_there(both):
+def test_the_state_begins_with_residuals_and_without_moments(both):
     neighbour, sequence, config = both
-    state = carried_state(neighbour, sequence, config, ITERATION)
-    assert residuals_active(ITERATION + 1, config) and state.iteration == ITERATION
+    state = carried_state(neighbour, sequence, config)
+    assert residuals_active(1, config) and active_degree(3, config) == 3 and state.iteration == 0
     assert not state.gaussians.appearance_coefficients.any() and not state.gaussians.fdm_weight.any()
     assert state.gaussians.motion_coefficients.any()
     assert not any(moment.any() for moment in (*state.adam.first.values(), *state.adam.second.values()))
-    early = carried_state(neighbour, sequence, config, 4)
-    assert early.gaussians.appearance_coefficients is None
 
 
 def test_tissue_that_is_not_covered_gets_points(both):
     neighbour, sequence, config = both
-    count = carried_state(neighbour, sequence, config, ITERATION).gaussians.count
+    count = carried_state(neighbour, sequence, config).gaussians.count
     model = neighbour.model
     i = neighbour.times[int(sequence.train_index[neighbour.join(sequence)]) + SHIFT]
     left = model.gaussians.position[0] > 0
@@ -90,7 +88,7 @@ def test_tissue_that_is_not_covered_gets_points(both):
     half = opaque._replace(
         **{k: np.ascontiguousarray(a[..., left]) for k, a in opaque._asdict().items() if a is not None}
     )
-    state = carried_state(neighbour._replace(model=model._replace(gaussians=half)), sequence, config, ITERATION)
+    state = carried_state(neighbour._replace(model=model._replace(gaussians=half)), sequence, config)
     fresh = state.gaussians.count - half.count
     assert 20 < fresh and half.count < count and i > 0
     assert np.mean(state.gaussians.position[0, half.count :] < 1.0) > 0.9
@@ -105,11 +103,11 @@ def test_tissue_out_of_sight_is_dropped(both, monkeypatch):
     count = neighbour.model.gaussians.count
     aside = [camera._replace(cx=camera.cx - 30.0) for camera in sequence.cameras]
     moved = replace(sequence, cameras=aside)
-    state = carried_state(neighbour, moved, config, ITERATION)
+    state = carried_state(neighbour, moved, config)
     u = state.gaussians.position[0] / state.gaussians.position[2] * aside[0].fx + aside[0].cx
     assert u.min() > -0.2 * aside[0].width and state.gaussians.count < 0.7 * count
     plain = msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=100))
-    small = carried_state(neighbour, sequence, plain, ITERATION)
+    small = carried_state(neighbour, sequence, plain)
     faint = np.sort(neighbour.model.gaussians.opacity_logit)[count - 100]
     assert small.gaussians.count == 100 and small.gaussians.opacity_logit.min() >= faint
 
@@ -120,15 +118,15 @@ def test_a_chain_trains_a_part_of_the_schedule_and_says_so(recording, tmp_path):
     assert window_cost(warm) | {"seconds": 0, "peak_memory_bytes": 0} == {
         "start": "warm", "iterations": 8, "saved": 12, "seconds": 0, "peak_memory_bytes": 0,
     }  # fmt: skip
-    assert open_run(warm).record()["start"] == {"carried_from": "000", "shared_frames": 8, "iteration": 12}
-    assert load_model(open_run(warm)).iteration == 20
+    assert open_run(warm).record()["start"] == {"carried_from": "000", "shared_frames": 8, "iterations_saved": 12}
+    assert load_model(open_run(warm)).iteration == 8
 
 
 def test_a_neighbour_of_another_world_is_refused(both, cold_run, tmp_path):
     _, sequence, config = both
     elsewhere = [camera._replace(translation=camera.translation + 1.0) for camera in sequence.cameras]
-    start = CarriedStart(str(cold_run / "windows" / "000"), SHIFT, SHARED, ITERATION)
-    assert start.state(sequence, config).iteration == ITERATION
+    start = CarriedStart(str(cold_run / "windows" / "000"), SHIFT, SHARED, SAVED)
+    assert start.state(sequence, config).iteration == 0
     with pytest.raises(InputError, match="its origin is another one"):
         start.state(replace(sequence, cameras=elsewhere), config)
 
@@ -138,7 +136,7 @@ def test_exposures_of_shared_frames_are_carried(tmp_path):
     config = settings(20, model={"exposure": True})
     trained(source, tmp_path / "run", Wanted(32, 8, 2), config)
     first, second = (open_run(tmp_path / "run" / "windows" / name) for name in ("000", "001"))
-    start = CarriedStart(str(first.path), SHIFT, SHARED, ITERATION)
+    start = CarriedStart(str(first.path), SHIFT, SHARED, SAVED)
     state, known = start.state(load_run_sequence(second), second.config()), load_model(first).frames
     assert known.exposure_log_gain.any()
     at = np.interp(first.sequence_record()["times"][SHIFT], known.times, known.exposure_log_gain[0])

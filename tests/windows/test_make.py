@@ -64,6 +64,10 @@ def test_a_window_that_fails_is_named_and_a_warm_one_behind_it_starts_cold(recor
     assert any("window 000 (frames 0:32): failed: no luck" in line for line in heard.lines)
     assert any("window 001: window 000 is not finished; starting cold" in line for line in heard.lines)
     assert positions(run, 1) == positions(cold_run, 1)
+    made = []
+    outcomes = make_windows(run, lambda jobs: (made.extend(jobs), here(jobs))[1], heard)
+    assert [job.name for job in made] == ["000"], "the window that started cold is finished, and stays as it is"
+    assert [outcome.status for outcome in outcomes] == ["finished"] * 2
 
 
 def test_a_damaged_frame_does_not_end_the_run(tmp_path):

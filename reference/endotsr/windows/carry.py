@@ -8,7 +8,7 @@ window. The neighbour's Gaussians are deformed to t* and become canonical here:
 C is fitted to the tracks of the tissue that the Gaussians lie on, as in (B15), or is 0 where the settings start without
 motion. The weights of the FDM and A are 0. At the join the picture is that of the neighbour, to rounding.
 
-In: the run folder of the neighbour, and the sequence of this window. Out: a training state, within the schedule.
+In: the run folder of the neighbour, and the sequence of this window. Out: a training state.
 """
 
 from dataclasses import replace
@@ -23,7 +23,7 @@ from endotsr.equations.dictionary import dictionary_forward
 from endotsr.equations.motion import motion_forward
 from endotsr.errors import InputError
 from endotsr.fitting.model import Spectral, raster_settings, scene_at, spectral_from
-from endotsr.fitting.schedules import active_degree, residuals_active
+from endotsr.fitting.schedules import residuals_active
 from endotsr.fitting.state import fresh_state
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.gather import gather_columns
@@ -51,11 +51,11 @@ class CarriedStart(NamedTuple):
     folder: str  # run folder of the neighbour
     shift: int  # frame i of this window is frame i + shift of the neighbour
     shared: int  # frames that both have, the first ones of this window
-    iteration: int  # of the schedule at which the window begins
+    saved: int  # iterations that a cold start would take more
 
     def about(self) -> dict[str, Any]:
         """`start` of run.json."""
-        return {"carried_from": Path(self.folder).name, "shared_frames": self.shared, "iteration": self.iteration}
+        return {"carried_from": Path(self.folder).name, "shared_frames": self.shared, "iterations_saved": self.saved}
 
     def state(self, sequence: Sequence, config: Config) -> "TrainingState":
         """The state. Raises InputError for a neighbour without a usable checkpoint, or of another world."""
@@ -68,7 +68,7 @@ class CarriedStart(NamedTuple):
         _refuse_other_world(sequence, remembered_cameras(record)[self.shift], self.folder)
         weight = folder.record().get("lambda_lap")
         neighbour = Neighbour(load_model(folder), record["times"], self.shift, self.shared, weight)
-        return carried_state(neighbour, sequence, config, self.iteration)
+        return carried_state(neighbour, sequence, config)
 
 
 class Neighbour(NamedTuple):
@@ -88,8 +88,8 @@ class Neighbour(NamedTuple):
         return int(np.abs(shared - (self.shared - 1) / 2).argmin())
 
 
-def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config, iteration: int) -> "TrainingState":
-    """The state with which a window begins after `iteration` iterations of its schedule.
+def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "TrainingState":
+    """The state with which a window begins, before its first iteration.
 
     Gaussians that lie outside of every training frame are dropped; if more than `density.maximum` are left, so are the
     faintest. Where the others cover less than half of a pixel of tissue, points are drawn as at a cold start, as many
@@ -103,16 +103,16 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config, iter
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     if config.initialisation.motion != "none" and config.model.spectral_motion:
         gaussians = _with_motion(gaussians, sequence, place, spectral)
-    fresh = _new_tissue(gaussians, sequence, spectral, config, iteration, rng, dtype)
+    fresh = _new_tissue(gaussians, sequence, spectral, config, rng, dtype)
     if fresh is not None:
         gaussians = _joined(gaussians, fresh)
-    if residuals_active(iteration + 1, config):
+    if residuals_active(1, config):
         model = config.model
         gaussians = activate_residuals(gaussians, model.frequencies, model.appearance, model.spectral_motion)
     frames = _frame_parameters(neighbour, sequence, config, dtype)
     weight = config.loss.lambda_lap
     weight = neighbour.lambda_lap if weight == "auto" else float(weight)
-    return fresh_state(gaussians, frames, rng, iteration=iteration, lambda_lap=weight)
+    return fresh_state(gaussians, frames, rng, lambda_lap=weight)
 
 
 def _refuse_other_world(sequence: Sequence, camera: Camera, folder: str) -> None:
@@ -191,16 +191,14 @@ def _new_tissue(
     sequence: Sequence,
     spectral: Spectral,
     config: Config,
-    iteration: int,
     rng: np.random.Generator,
     dtype: Any,
 ) -> Gaussians | None:
     """Gaussians where the carried ones cover no tissue; None if they cover all of it."""
-    degree = active_degree(iteration, config)
     missing = np.zeros_like(sequence.masks)
     for i in sequence.train_index:
         scene, _ = scene_at(gaussians, spectral, config.model, float(sequence.times[i]))
-        rendered, _ = render_forward(scene, sequence.cameras[i], raster_settings(config), degree=degree)
+        rendered, _ = render_forward(scene, sequence.cameras[i], raster_settings(config), degree=0)
         missing[i] = sequence.masks[i] & (rendered.opacity < COVERED)
     fraction = missing[sequence.train_index].mean()
     if not fraction:

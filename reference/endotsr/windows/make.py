@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from endotsr.config import Config, config_to_toml, lengthened, load_config
+from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.errors import InputError
 from endotsr.runs.files import replacing_folder, write_json
 from endotsr.runs.folder import open_run, refuse_existing
@@ -31,7 +31,7 @@ from endotsr.windows.survey import survey
 
 LOCK = "windows.lock"
 SETTINGS = "config.toml"
-WARM = 0.4  # of the schedule: its last part, which a warm window is trained for
+WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
 Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
 
 
@@ -86,7 +86,10 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         reporter.begin(watch.total)
         try:
             for wave in waves(record):
-                todo = [_startable(jobs[k], found, reporter) for k in wave]
+                todo = [
+                    window_job(run, record, k, config, cold=True) if _lonely(jobs[k], found, reporter) else jobs[k]
+                    for k in wave
+                ]
                 _made(todo, outcomes, reporter, watch, found)
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
@@ -107,22 +110,34 @@ def waves(record: WindowsRecord) -> list[list[int]]:
     return found
 
 
-def window_job(run: Path, record: WindowsRecord, k: int, config: Config) -> Job:
-    """Window k as a run on its part of the sequence."""
-    window = record.windows[k]
+def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold: bool = False) -> Job:
+    """Window k as a run on its part of the sequence.
+
+    cold   also where the plan says warm; a window that was begun cold stays so
+    """
+    window, folder = record.windows[k], window_folder(run, record.windows[k])
     sequence = msgspec.structs.replace(config.sequence, frames=frame_range(config.sequence.frames, window))
     train, _ = split_frames(window.count, sequence.split, sequence.block_length)
-    own = lengthened(msgspec.structs.replace(config, sequence=sequence), len(train))
-    start = None
-    if window.start == "warm":
-        neighbour = record.windows[k - 1]
-        first = own.training.iterations - max(1, round(WARM * own.training.iterations))
-        folder = window_folder(run, neighbour)
-        start = CarriedStart(str(folder), window.first - neighbour.first, record.shared(k), first)
+    own, start = lengthened(msgspec.structs.replace(config, sequence=sequence), len(train)), None
+    begun_cold = (folder / "run.json").exists() and "start" not in open_run(folder).record()
+    if window.start == "warm" and not cold and not begun_cold:
+        neighbour, shorter = record.windows[k - 1], warm_settings(own)
+        saved = own.training.iterations - shorter.training.iterations
+        shift = window.first - neighbour.first
+        start, own = CarriedStart(str(window_folder(run, neighbour)), shift, record.shared(k), saved), shorter
     return Job(
         window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
-        str(window_folder(run, window)), start, measured=False,
+        str(folder), start, measured=False,
     )  # fmt: skip
+
+
+def warm_settings(cold: Config) -> Config:
+    """The settings of a warm window: the schedule in fewer iterations, residuals and all degrees from the start."""
+    shorter = with_iterations(cold, max(1, round(WARM * cold.training.iterations)))
+    training = msgspec.structs.replace(
+        shorter.training, residual_activation=0, harmonics_interval=1, coarse_start=False
+    )
+    return msgspec.structs.replace(shorter, training=training)
 
 
 def size_of(job: Job) -> tuple[int, int, int]:
@@ -149,16 +164,15 @@ def frame_range(selected: str, window: Window) -> str:
     return f"{first + window.first * step}:{first + (window.end - 1) * step + 1}:{step}"
 
 
-def _startable(job: Job, found: dict[str, Outcome], reporter: Reporter) -> Job:
-    """The job, cold if its neighbour is not finished."""
-    start = job.start
-    if not isinstance(start, CarriedStart) or Path(job.folder).exists():
-        return job
-    neighbour = Path(start.folder).name
+def _lonely(job: Job, found: dict[str, Outcome], reporter: Reporter) -> bool:
+    """Whether a warm window that is not begun has no finished neighbour to start from."""
+    if not isinstance(job.start, CarriedStart) or Path(job.folder).exists():
+        return False
+    neighbour = Path(job.start.folder).name
     if found[neighbour].status == FINISHED:
-        return job
+        return False
     reporter.say(f"window {job.name}: window {neighbour} is not finished; starting cold")
-    return job._replace(start=None)
+    return True
 
 
 def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch, found: dict[str, Outcome]) -> None:
@@ -195,12 +209,11 @@ def _line(job: Job, outcome: Outcome) -> str:
 def window_cost(folder: Path) -> dict[str, Any]:
     """Iterations that a window was trained for, their seconds, and the peak of its memory in bytes (None: unknown)."""
     record = open_run(folder).record()
-    first = (record.get("start") or {}).get("iteration", 0)
-    done = last_iteration(folder / "log.jsonl") - first
+    start = record.get("start") or {}
     return {
-        "start": "warm" if record.get("start") else "cold",
-        "iterations": done,
-        "saved": first,
+        "start": "warm" if start else "cold",
+        "iterations": last_iteration(folder / "log.jsonl"),
+        "saved": int(start.get("iterations_saved", 0)),
         "seconds": float(record.get("seconds") or 0.0),
         "peak_memory_bytes": record.get("peak_memory_bytes"),
     }
