@@ -44,7 +44,7 @@ def measure_windows(
     """
     found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
     known = [entry for entry in found if entry is not None]
-    metrics = _joined(known) if known else {"format": FORMAT}
+    metrics: dict[str, Any] = _joined(known) if known else {"format": FORMAT}
     metrics["windows"] = [
         {"name": window.name, "first": window.first, "end": window.end}
         | window_cost(folder.path)
@@ -126,7 +126,7 @@ def _joined_rows(parts: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "mean": {key: summary[key] for key in keys},
         "per_frame": rows,
-        "excluded": {key: int(summary[f"{key}_excluded"]) for key in keys if summary[f"{key}_excluded"]},
+        "excluded": {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])},
         "not_finite": sum(part["not_finite"] for part in parts),
     }
 

@@ -139,8 +139,10 @@ def blended(renders: list[RenderOut], weights: list[float]) -> RenderOut:
         return renders[0]
 
     def summed(name: str) -> FloatArray:
-        arrays = [getattr(render, name) for render in renders]
-        return sum((array.dtype.type(weight) * array for array, weight in zip(arrays, weights)), 0 * arrays[0])
+        total: FloatArray = np.zeros_like(getattr(renders[0], name))
+        for render, weight in zip(renders, weights):
+            total += total.dtype.type(weight) * getattr(render, name)
+        return total
 
     return renders[0]._replace(**{name: summed(name) for name in ("colour", "depth", "opacity")})
 
