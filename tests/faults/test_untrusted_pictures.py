@@ -8,7 +8,8 @@ import pytest
 
 from endotsr.errors import InputError
 from endotsr.opencv import decode_png, read_png, write_png
-from endotsr.untrusted.png import MOST_PIXELS, pixels_only
+from endotsr.untrusted.files import MOST_PIXELS
+from endotsr.untrusted.png import pixels_only
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 

@@ -26,7 +26,7 @@ def test_a_window_is_a_run_on_its_frames(recording, cold_run):
     alone = endotsr.train(sequence, settings(), on_message=lambda line: None)
     assert alone.model.gaussians.position.tobytes() == positions(cold_run, 1)
     record = open_run(cold_run / "windows" / "001").sequence_record()
-    assert record["names"][0] == "000024" and record["times"][0] == 0.0
+    assert record.names[0] == "000024" and record.times[0] == 0.0
 
 
 def test_finished_windows_are_kept_and_the_rest_goes_on_from_its_checkpoint(recording, cold_run, tmp_path):

@@ -29,10 +29,10 @@ def windows(cold_run):
 
 def test_the_record_is_that_of_the_recording(scene):
     record = scene.record
-    assert record["names"] == [f"{i:06d}" for i in range(FRAMES)]
-    np.testing.assert_allclose(record["times"], np.arange(FRAMES) / FRAMES)
-    assert record["test_index"] == list(range(1, FRAMES, 8))
-    assert sorted(record["test_index"] + record["train_index"]) == list(range(FRAMES))
+    assert record.names == [f"{i:06d}" for i in range(FRAMES)]
+    np.testing.assert_allclose(record.times, np.arange(FRAMES) / FRAMES)
+    assert record.test_index == list(range(1, FRAMES, 8))
+    assert sorted(record.test_index + record.train_index) == list(range(FRAMES))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_python_opens_a_run_of_windows_as_a_run(cold_run, scene):
     run = endotsr.open_run(cold_run)
     np.testing.assert_array_equal(run.render(28 / FRAMES).colour, scene.render(28 / FRAMES, scene.cameras[28]).colour)
     assert len(run.windows) == 2 and endotsr.open_run(run.windows[1].path).iteration == 20
-    assert run.sequence_record["names"][-1] == "000055" and "2 windows, 56 frames" in repr(run)
+    assert run.sequence_record.names[-1] == "000055" and "2 windows, 56 frames" in repr(run)
     with pytest.raises(InputError, match="a number in"):
         run.render(1.5)
     with pytest.raises(InputError, match="from 0 to 55"):
@@ -133,7 +133,7 @@ def test_a_time_that_no_window_shows_is_refused_with_the_reason(tmp_path):
         (source / "depth" / f"{i:06d}.png").write_bytes(b"")
     trained(source, tmp_path / "run", Wanted(), settings(4))
     scene = open_windows(tmp_path / "run")
-    assert len(scene.record["names"]) == FRAMES - 3
+    assert len(scene.record.names) == FRAMES - 3
     scene.render(28 / FRAMES, scene.cameras[0])  # one frame behind the last of a window is its end
     with pytest.raises(InputError, match=r"no window shows.*29:30 are left out.*000029\.png"):
         scene.render(29.5 / FRAMES, scene.cameras[0])

@@ -4,7 +4,7 @@ import os
 from functools import cache
 from typing import Any
 
-from endotsr.untrusted.png import MOST_PIXELS
+from endotsr.untrusted.files import MOST_PIXELS
 
 SILENT = 0  # LOG_LEVEL_SILENT, which the Python module of OpenCV 4 does not name
 

@@ -13,9 +13,9 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
 from endotsr.opencv import decoded, read_png
 from endotsr.opencv.library import cv2_library
-from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.files import MOST_PIXELS, read_bytes
 from endotsr.untrusted.names import plain_line
-from endotsr.untrusted.png import LARGEST_FILE, MOST_PIXELS
+from endotsr.untrusted.png import LARGEST_FILE
 
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")

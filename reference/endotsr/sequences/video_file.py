@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.untrusted.files import open_regular
+from endotsr.untrusted.files import MOST_PIXELS, open_regular
 from endotsr.untrusted.names import plain_line
-from endotsr.untrusted.png import MOST_PIXELS
 
 LARGEST_FILE = 1 << 40  # bytes: a video is decoded picture by picture
 # First bytes of the containers: the ending of a name says nothing of what a decoder would do with a play list.

@@ -61,13 +61,12 @@ class CarriedStart(NamedTuple):
         """The state. Raises InputError for a neighbour without a usable checkpoint, or of another world."""
         from endotsr.runs.folder import open_run
         from endotsr.runs.model import load_model
-        from endotsr.runs.sources import remembered_cameras
 
         folder = open_run(Path(self.folder))
-        record = folder.sequence_record("times", "cameras", "static_camera", "names")
-        _refuse_other_world(sequence, remembered_cameras(record)[self.shift], self.folder)
+        record = folder.sequence_record()
+        _refuse_other_world(sequence, record.frame_cameras[self.shift], self.folder)
         weight = folder.record().get("lambda_lap")
-        neighbour = Neighbour(load_model(folder), record["times"], self.shift, self.shared, weight)
+        neighbour = Neighbour(load_model(folder), record.times, self.shift, self.shared, weight)
         return carried_state(neighbour, sequence, config)
 
 

@@ -61,7 +61,7 @@ def _measured(
     scene: WindowedScene, frames: WindowFrames, k: int, weights: LpipsWeights | None
 ) -> dict[str, Any] | None:
     """`evaluate_model` on the frames in which window k has the larger weight; None if none is held out."""
-    first, held_out = scene.plan.windows[k].first, {scene.frames[j] for j in scene.record["test_index"]}
+    first, held_out = scene.plan.windows[k].first, {scene.frames[j] for j in scene.record.test_index}
     sequence = frames.of_window(k)
     own = [i for i in range(sequence.count) if scene.owner(first + i) == k]
     test = [i for i in own if first + i in held_out]

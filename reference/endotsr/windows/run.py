@@ -9,7 +9,7 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.export.scene import COMPONENTS
 from endotsr.runs.folder import RunFolder
-from endotsr.runs.sources import nearest_frame
+from endotsr.sequences.record import SequenceRecord, nearest_frame
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.windows.scene import WindowedScene, WindowFrames, open_windows
@@ -36,7 +36,7 @@ class WindowedRun:
         return self.scene.folders
 
     @property
-    def sequence_record(self) -> dict[str, Any]:
+    def sequence_record(self) -> SequenceRecord:
         """Times, names, split and unit of the frames that windows cover."""
         return self.scene.record
 
@@ -56,7 +56,7 @@ class WindowedRun:
             if name not in COMPONENTS:
                 raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
         if not isinstance(camera, Camera):
-            place = nearest_frame(self.sequence_record["times"], time) if camera is None else camera
+            place = nearest_frame(self.sequence_record.times, time) if camera is None else camera
             last = len(self.scene.frames) - 1
             if not isinstance(place, Integral) or not 0 <= int(place) <= last:
                 raise InputError(

@@ -19,11 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.export.scene import RECORD, MovingScene, open_scene
+from endotsr.export.scene import MovingScene, open_scene
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.runs.model import Model
 from endotsr.runs.sources import load_run_sequence
+from endotsr.sequences.record import SequenceRecord
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
@@ -114,7 +115,7 @@ class WindowedScene(MovingScene):
 
     @cached_property
     def _times(self) -> list[list[float]]:
-        return [folder.sequence_record("times")["times"] for folder in self.folders]
+        return [folder.sequence_record().times for folder in self.folders]
 
     @cached_property
     def folders(self) -> list[RunFolder]:
@@ -169,36 +170,35 @@ def refuse_one_set(path: Path, out: Path) -> None:
 def open_windows(run: Path) -> WindowedScene:
     """The scene of a run of windows. Raises InputError if a window has no usable record, or none is trained yet."""
     plan = read_record(run)
-    bare = WindowedScene({}, run=Path(run), plan=plan)
-    for folder in bare.folders:
+    folders = [open_run(window_folder(run, window)) for window in plan.windows]
+    for folder in folders:
         if not folder.has_checkpoint:
             raise InputError(f"{folder.path}: not trained yet; continue with `endotsr train --out {run} --resume`")
-    return WindowedScene(_record(bare), run=Path(run), plan=plan)
+    return WindowedScene(_record(plan, [folder.sequence_record() for folder in folders]), run=Path(run), plan=plan)
 
 
-def _record(scene: WindowedScene) -> dict[str, Any]:
+def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecord:
     """The record of the sequence as one window of the covered frames would have it.
 
     A frame is held out if every window that has it holds it out. `cameras` are those of the first window where the
     camera rests; a moving one has them in `WindowedScene.cameras`.
     """
-    records = [folder.sequence_record(*RECORD, "largest_depth") for folder in scene.folders]
     names: dict[int, str] = {}
     trained: set[int] = set()
-    for window, record in zip(scene.plan.windows, records):
-        names |= {window.first + i: name for i, name in enumerate(record["names"])}
-        trained |= {window.first + i for i in record["train_index"]}
+    for window, record in zip(plan.windows, records):
+        names |= {window.first + i: name for i, name in enumerate(record.names)}
+        trained |= {window.first + i for i in record.train_index}
     frames = sorted(names)
-    return {
-        "unit": records[0]["unit"],
-        "largest_depth": max(record["largest_depth"] for record in records),
-        "static_camera": all(record["static_camera"] for record in records),
-        "names": [names[g] for g in frames],
-        "times": [g / scene.plan.frames for g in frames],
-        "train_index": [j for j, g in enumerate(frames) if g in trained],
-        "test_index": [j for j, g in enumerate(frames) if g not in trained],
-        "cameras": records[0]["cameras"],
-    }
+    return SequenceRecord(
+        unit=records[0].unit,
+        largest_depth=max(record.largest_depth for record in records),
+        static_camera=all(record.static_camera for record in records),
+        names=[names[g] for g in frames],
+        times=[g / plan.frames for g in frames],
+        train_index=[j for j, g in enumerate(frames) if g in trained],
+        test_index=[j for j, g in enumerate(frames) if g not in trained],
+        cameras=records[0].cameras,
+    )
 
 
 def shown_frames(
@@ -225,9 +225,9 @@ class WindowFrames:
         """The sequence of window k."""
         return self._sequence(k)
 
-    def frame(self, j: int) -> Frame:
-        """Frame j of those that `record` of the scene lists, with its time in the recording."""
-        g = self._scene.frames[j]
+    def frame(self, index: int) -> Frame:
+        """Frame `index` of those that `record` of the scene lists, with its time in the recording."""
+        g = self._scene.frames[index]
         k = self._scene.owner(g)
         found = self.of_window(k).frame(g - self._scene.plan.windows[k].first)
         return found._replace(time=g / self._scene.plan.frames)
