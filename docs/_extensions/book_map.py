@@ -68,6 +68,27 @@ UNDIFFERENTIATED = {
         "tests/fitting/test_coarse_start.py",
         "none: it is an option of training that is not part of the paper",
     ),
+    "b18": Undifferentiated(
+        ("endotsr.windows.plan.planned_windows",),
+        "windows are chosen before training",
+        "tests/windows/test_windows_plan.py",
+        "none: windows are an option of training that is not part of the paper",
+        "none: the guide to recordings shows one",
+    ),
+    "b18b": Undifferentiated(
+        ("endotsr.windows.carry.carried_state",),
+        "it comes before training",
+        "tests/windows/test_carry.py",
+        "none: windows are an option of training that is not part of the paper",
+        "none: the guide to recordings shows one",
+    ),
+    "b18c": Undifferentiated(
+        ("endotsr.windows.scene.blended",),
+        "it comes after training",
+        "tests/windows/test_scene.py",
+        "none: windows are an option of training that is not part of the paper",
+        "none: the guide to recordings shows one",
+    ),
     "m1": Undifferentiated(
         ("endotsr.evaluation.metrics.psnr", "endotsr.evaluation.metrics.psnr_tissue"),
         "a metric is only reported",

@@ -149,6 +149,8 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def warm_table(rows: list[dict[str, Any]]) -> str:
     """One warm window a row."""
+    if not rows:
+        return "Not measured yet."
     headings = ["Window", "Iterations, warm", "Loss at the end", "A cold start reaches it after", "Its loss at the end"]
     return markdown(headings, [
         [row["window"], f"{row['warm_iterations']}", f"{row['warm_loss']:.4f}",

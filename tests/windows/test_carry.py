@@ -24,7 +24,7 @@ SHIFT, SHARED, SAVED = 24, 8, 12
 def both(cold_run):
     """The neighbour, and the sequence and settings of the window behind it."""
     first, second = (open_run(cold_run / "windows" / name) for name in ("000", "001"))
-    neighbour = Neighbour(load_model(first), first.sequence_record()["times"], SHIFT, SHARED, 0.5)
+    neighbour = Neighbour(load_model(first), first.sequence_record().times, SHIFT, SHARED, 0.5)
     return neighbour, load_run_sequence(second), warm_settings(second.config())
 
 
@@ -139,6 +139,6 @@ def test_exposures_of_shared_frames_are_carried(tmp_path):
     start = CarriedStart(str(first.path), SHIFT, SHARED, SAVED)
     state, known = start.state(load_run_sequence(second), second.config()), load_model(first).frames
     assert known.exposure_log_gain.any()
-    at = np.interp(first.sequence_record()["times"][SHIFT], known.times, known.exposure_log_gain[0])
+    at = np.interp(first.sequence_record().times[SHIFT], known.times, known.exposure_log_gain[0])
     assert state.frames.exposure_log_gain[0, 0] == pytest.approx(at, abs=1e-6)
     assert state.frames.exposure_log_gain[0, -1] == pytest.approx(known.exposure_log_gain[0, -1], abs=1e-6)

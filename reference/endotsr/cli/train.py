@@ -213,7 +213,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
 def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:
     """The settings for the minutes asked for, from a few timed iterations, and the line on them."""
     from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.pace import paced_for, seconds_of_unit
+    from endotsr.runs.pace import paced_for, seconds_of_unit
 
     assert options.minutes is not None
     compile_ahead(config, print)

@@ -2,8 +2,8 @@
 
 `training.html` is written beside the log from time to time and tells the browser to read it again: files alone, no
 server and no script. It computes a render of one frame with the parameters of the moment and changes none of them.
-It takes at most `LARGEST_SHARE` of the time, unless it would then be older than `MOST_SECONDS`, and a page that cannot
-be written stops no training. Once the run is evaluated, the page leads to the report.
+It takes at most `LARGEST_FRACTION` of the time, unless it would then be older than `MOST_SECONDS`, and a page that
+cannot be written stops no training. Once the run is evaluated, the page leads to the report.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LIVE_PAGE, REPORT = "training.html", "report.html"  # in a run folder
 FEWEST_SECONDS, MOST_SECONDS = 5.0, 60.0  # between two pages
-LARGEST_SHARE = 0.01  # of the time, which pages may take
+LARGEST_FRACTION = 0.01  # of the time, which pages may take
 KEPT = ("iteration", "loss", "psnr")  # keys of the log that the page shows
 
 
@@ -69,7 +69,7 @@ class LivePage:
         with contextlib.suppress(OSError):  # a disk without space: the training itself says so
             _replace(self._folder.path, self._html(status, left, picture))
         done = time.monotonic()
-        self._due = done + min(max(FEWEST_SECONDS, (done - began) / LARGEST_SHARE), MOST_SECONDS)
+        self._due = done + min(max(FEWEST_SECONDS, (done - began) / LARGEST_FRACTION), MOST_SECONDS)
 
     def _html(self, status: str, left: str | None, picture: bool) -> str:
         done, planned = self._state.iteration, self._config.training.iterations

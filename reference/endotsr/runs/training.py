@@ -6,7 +6,7 @@ continue the run. This module prints nothing itself.
 
 A checkpoint is written after `training.checkpoint_every` iterations at the latest, and after a time: a kill costs at
 most a tenth of the training so far. That tenth has bounds (`FEWEST_SECONDS`, `MOST_SECONDS`), and where one checkpoint
-takes long, they are as rare as `LARGEST_SHARE` demands. No result depends on when they are written.
+takes long, they are as rare as `LARGEST_FRACTION` demands. No result depends on when they are written.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 FEWEST_SECONDS, MOST_SECONDS = 10.0, 300.0  # of training between two checkpoints
 LARGEST_LOSS = 0.1  # of the training so far, which a kill may cost
-LARGEST_SHARE = 0.02  # of the time, which checkpoints may take
+LARGEST_FRACTION = 0.02  # of the time, which checkpoints may take
 
 
 class RunStopped(InputError):
@@ -169,7 +169,7 @@ def seconds_between(trained: float, saving: float) -> float:
     trained   seconds since the training was started or resumed
     saving    seconds that the last checkpoint took
     """
-    return max(min(max(LARGEST_LOSS * trained, FEWEST_SECONDS), MOST_SECONDS), saving / LARGEST_SHARE)
+    return max(min(max(LARGEST_LOSS * trained, FEWEST_SECONDS), MOST_SECONDS), saving / LARGEST_FRACTION)
 
 
 class _Recorder:

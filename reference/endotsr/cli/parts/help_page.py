@@ -32,6 +32,7 @@ OFTEN_SET = (
     "loss.lambda_lap",
     "training.precision",
 )
+PART_OF = "of windows: "
 UNBROKEN = "\u00a0"  # a space at which textwrap does not break
 
 
@@ -41,11 +42,15 @@ def terminal_width() -> int:
 
 
 def short_fields(fields: list[Field]) -> list[Field]:
-    """The options that people set: all of a command with few settings, else those outside of sections and OFTEN_SET."""
+    """The options that people set: all of a command with few settings, else those outside of sections and OFTEN_SET.
+
+    Options that only mean something beside another one, whose help begins with PART_OF, are left to the whole help.
+    """
     settings = [field for field in fields if field.in_section]
     if len(settings) <= FEW_SETTINGS:
         return fields
-    return [field for field in fields if not field.in_section or field.key in OFTEN_SET]
+    alone = [field for field in fields if not field.help.startswith(PART_OF)]
+    return [field for field in alone if not field.in_section or field.key in OFTEN_SET]
 
 
 def help_page(options: type, fields: list[Field], command: str, width: int, hidden: int = 0) -> str:

@@ -5,7 +5,7 @@ import pytest
 
 from endotsr.config import PRESETS, lengthened
 from endotsr.errors import InputError
-from endotsr.fitting.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
+from endotsr.runs.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
 from endotsr.sequences.checks.cost import at_start, work_left
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
