@@ -60,7 +60,8 @@ def schedule(i, s, k):
         decay = lambda tau: 1 + (o["final_factor"] - 1) * np.clip(tau, 0, 1)
     moving = decay((it - k("decay from", 0)) / total)
     late = decay((it - act) / max(total - act, 1)) if o["restart_residual_schedule"] != k("restart", False) else moving
-    late = np.where(it > act + k("residual shift", 0), late, 0)
+    any_residual = c["model"]["appearance"] or c["model"]["spectral_motion"]
+    late = np.where((it > act + k("residual shift", 0)) & any_residual, late, 0)
     fade = np.clip((it - o["annealing_from"]) / max(total - o["annealing_from"], 1), 0, 1)
     hold = o["annealed_factor"] ** fade
     a, b = loss["laplacian_from"], loss["laplacian_full"]
