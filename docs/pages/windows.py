@@ -133,13 +133,13 @@ def losses(folder: Path) -> np.ndarray:
 
 def table(rows: list[dict[str, Any]]) -> str:
     """One run a row."""
-    headings = ["Recording", "Preset", "Windows (warm)", "Iterations", "Training, min", "Peak memory, GB",
-                "PSNR tissue, dB", "blend of neighbours", "flow", "LPIPS", "Flicker at seams / inside"]  # fmt: skip
+    headings = ["Recording, preset", "Windows (warm)", "Steps", "Time, min", "Memory, GB",
+                "PSNR, dB", "blend", "flow", "LPIPS", "Flicker"]  # fmt: skip
     cells = []
     for row in rows:
         psnr, ratio, lpips = row["psnr_tissue"], row["seams"]["model"]["ratio"], row["lpips"]
         cells.append([
-            row["name"], f"`{row['preset']}`", f"{row['windows']} ({row['warm']})", f"{row['iterations']}",
+            f"{row['name']}, `{row['preset']}`", f"{row['windows']} ({row['warm']})", f"{row['iterations']}",
             f"{row['training_seconds'] / 60:.1f}", f"{row['peak_memory_bytes'] / 1e9:.2f}", f"{psnr['model']:.2f}",
             f"{psnr['two_neighbours']:.2f}", f"{psnr['flow_interpolation']:.2f}",
             "-" if lpips is None else f"{lpips:.4f}", "-" if ratio is None else f"{ratio:.2f}",
