@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from endotsr.cli.parts.options import base_settings
 from endotsr.config import PRESETS, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
@@ -49,3 +50,10 @@ def test_too_few_minutes_are_refused_with_the_least(still):
 
 def test_the_machine_is_timed_without_a_trace(still):
     assert 0 < seconds_of_unit(still, SHARP) < 60
+
+
+@pytest.mark.parametrize("words", [["--minutes", "5"], ["--minutes=5"]])
+def test_a_wish_in_minutes_begins_from_sharp_however_it_is_written(words):
+    assert base_settings(words)[0].preset == "sharp"
+    assert base_settings([*words, "--preset", "quick"])[0].preset == "quick"
+    assert base_settings([])[0].preset == "paper"

@@ -86,7 +86,7 @@ class TrainOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    base, schedule_note = base_settings(words, unnamed="sharp" if "--minutes" in words else "paper")
+    base, schedule_note = base_settings(words)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
         raise InputError("train: --out RUN is missing: the run folder to create")

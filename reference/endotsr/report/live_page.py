@@ -8,6 +8,7 @@ cannot be written stops no training. Once the run is evaluated, the page leads t
 
 import contextlib
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,11 +54,11 @@ class LivePage:
         self._write("running", None, picture=False)
         self._due = 0.0
 
-    def update(self, entry: dict[str, Any], left: str | None) -> None:
-        """An iteration has ended. entry: its line of the log; left: the time left; None = not known yet."""
+    def update(self, entry: dict[str, Any], left: Callable[[], str | None]) -> None:
+        """An iteration has ended. entry: its line of the log; left: tells the time left, None = not known yet."""
         self._log.append(_kept(entry))
         if time.monotonic() >= self._due:
-            self._write("running", left)
+            self._write("running", left())
 
     def close(self) -> None:
         """The training has ended, in the way that run.json says."""

@@ -15,7 +15,7 @@ import msgspec
 
 from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.errors import InputError
-from endotsr.runs.files import replacing_folder, write_json
+from endotsr.runs.files import replacing_folder
 from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_iteration
 from endotsr.sequences.splits import split_frames
@@ -26,7 +26,7 @@ from endotsr.sweeps.locks import file_lock
 from endotsr.sweeps.sweep import Reporter, Watch
 from endotsr.windows.carry import CarriedStart
 from endotsr.windows.plan import Wanted, check_wanted, planned_windows
-from endotsr.windows.record import FILE, FOLDER, Window, WindowsRecord, read_record
+from endotsr.windows.record import FOLDER, Window, WindowsRecord, read_record, write_record
 from endotsr.windows.survey import survey
 
 LOCK = "windows.lock"
@@ -55,7 +55,7 @@ def plan_recording(
     out.absolute().parent.mkdir(parents=True, exist_ok=True)
     with replacing_folder(out, replace=False) as folder:
         (folder / SETTINGS).write_text(config_to_toml(config), encoding="utf-8", newline="\n")
-        write_json(folder / FILE, msgspec.to_builtins(record))
+        write_record(folder, record)
     return record
 
 

@@ -14,6 +14,7 @@ import msgspec
 
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json, write_json
+from endotsr.untrusted.json import typed
 from endotsr.untrusted.names import plain_line
 
 FILE, FOLDER, FORMAT = "windows.json", "windows", "endotsr-windows-1"
@@ -79,12 +80,7 @@ def read_record(run: Path) -> WindowsRecord:
             out of order, or shares frames with more than its neighbours; a first or lonely window that starts warm.
     """
     path = Path(run) / FILE
-    try:
-        record = msgspec.convert(read_json(path), WindowsRecord, strict=True)
-    except msgspec.ValidationError as error:
-        reason, _, place = str(error).partition(" - at `$")
-        key = place.strip("`.") or "its content"
-        raise InputError(f"{path}: {plain_line(key)}: {plain_line(reason[:1].lower() + reason[1:])}") from None
+    record = typed(read_json(path), WindowsRecord, path)
     if not record.windows:
         raise InputError(f"{path}: windows: there is none; allowed: at least one")
     for k, window in enumerate(record.windows):

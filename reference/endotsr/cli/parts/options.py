@@ -39,16 +39,18 @@ class Sources:
     preset: Preset | None = None
     config: Path | None = None
     iterations: int | None = None
+    minutes: float | None = None
     schedule: Literal["stretched", "absolute"] | None = None  # None = stretched
 
 
-def base_settings(words: list[str], unnamed: str = "paper") -> tuple[Config, str]:
+def base_settings(words: list[str]) -> tuple[Config, str]:
     """Preset, TOML file and `--iterations` of the command line; with one line on the schedule ("" = as it is).
 
-    unnamed   the preset where neither names one
+    Where neither names a preset it is `paper`, and `sharp` with `--minutes`.
     """
     sources = parse_known(Sources, words)
-    data = {"preset": unnamed} | (read_toml(sources.config) if sources.config else {})
+    data: dict[str, object] = {"preset": "paper" if sources.minutes is None else "sharp"}
+    data = data | (read_toml(sources.config) if sources.config else {})
     if sources.preset:
         data = data | {"preset": sources.preset}
     config = config_from_dict(data, str(sources.config or "configuration"))

@@ -70,21 +70,19 @@ class Progress:
         seen = self._pixels / 4 if standing.coarse else self._pixels
         self._seconds.append((now - self._ended) / float(iteration_work(standing.gaussians, seen)))
         self._ended, self._done = now, self._done + 1
-        left = self._left(standing)
         if self._page is not None:
-            self._page.update(entry, left)
-        if self._done == FORECAST_AFTER and left is not None:
-            self.say(
-                f"forecast: {left} of training from here, about {gaussians_at_end(self._config)} Gaussians at its end"
-            )
+            self._page.update(entry, lambda: self._left(standing))
+        if self._done == FORECAST_AFTER and (left := self._left(standing)) is not None:
+            count = gaussians_at_end(self._config)
+            self.say(f"forecast: {left} of training from here, about {count} Gaussians at its end")
         if self._bar is not None:
             self._bar.update(1)
             if self._bar.n % 10 == 0 or self._bar.n == self._total:
-                self._bar.set_postfix_str(self._state(entry, left), refresh=False)
+                self._bar.set_postfix_str(self._state(entry, self._left(standing)), refresh=False)
         elif now - self._said > QUIET_SECONDS:
             self._said = now
             print(
-                f"iteration {entry['iteration']} of {self._total}: {self._state(entry, left)}",
+                f"iteration {entry['iteration']} of {self._total}: {self._state(entry, self._left(standing))}",
                 file=sys.stderr,
                 flush=True,
             )
