@@ -42,7 +42,7 @@ def coarse_start(sequence: Sequence, config: Config) -> CoarseStart:
 
 
 def coarse_config(config: Config) -> Config:
-    """The settings for half the size, with half the smoothness: a step between two pixels is twice as long there."""
+    """The settings for half the size: half the smoothness keeps the total variation of a slope, not its squares."""
     loss = msgspec.structs.replace(config.loss, smoothness_weight=config.loss.smoothness_weight / 2)  # (20.7)
     return msgspec.structs.replace(config, loss=loss)
 

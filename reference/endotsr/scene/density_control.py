@@ -8,7 +8,7 @@ Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that su
 gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
 `dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
 removed. With `growth = "budget"` the Gaussians with the largest gradients are taken in place of those above the
-threshold: as many as lead to `maximum` in equal steps over the densifications that remain. Scales are canonical, not
+threshold: the room below `maximum`, after pruning, divided by the densifications that remain. Scales are canonical, not
 deformed. Children inherit every other array. Optimiser moments start at zero for clones and children (`GatherPlan`).
 Clones are not split in the same call.
 """
