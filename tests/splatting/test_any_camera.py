@@ -1,8 +1,10 @@
-"""Two focal lengths: the projection is exact."""
+"""Two focal lengths, for which the projection is exact, and the angle between two poses."""
 
 import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
 
-from endotsr.splatting.camera import Camera
+from endotsr.splatting.camera import Camera, degrees_between
 from endotsr.splatting.covariance import covariance_forward
 from endotsr.splatting.projection import projection_forward
 from endotsr.splatting.settings import EXACT
@@ -19,3 +21,11 @@ def test_focal_lengths_that_differ_stretch_the_picture_exactly():
     a, b = (projection_forward(position, shape, camera, rules)[0] for camera in (square, tall))
     np.testing.assert_allclose(b.mean2d, a.mean2d * [[1.0], [2.0]], rtol=1e-13)
     np.testing.assert_allclose(b.covariance2d, a.covariance2d * [[1.0], [2.0], [4.0]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 0.5, 90.0, 179.5, 180.0])
+def test_the_angle_between_two_rotations_is_the_one_they_were_made_with(degrees):
+    one = Rotation.random(rng=3)
+    other = Rotation.from_rotvec(np.radians(degrees) * np.array([0.6, 0.0, 0.8])) * one
+    found = degrees_between(one.as_matrix(), other.as_matrix())
+    np.testing.assert_allclose(found, degrees, rtol=1e-9, atol=3e-6)  # an arc cosine has half the digits at its ends

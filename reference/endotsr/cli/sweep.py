@@ -95,10 +95,11 @@ def run_spec(spec: "Spec", out: Path, place: Place, retry: bool, on_rows=lambda 
 
 
 def _local(jobs: list["Job"], inputs: "Inputs", place: Place) -> Generator["Outcome | None", None, None]:
-    from endotsr.sweeps.capacity import capacity
+    from endotsr.sweeps.capacity import capacity, run_bytes
     from endotsr.sweeps.local import local_outcomes
 
-    found = capacity([inputs.size(job) for job in jobs], workers=place.workers, threads=place.threads)
+    memory = [run_bytes(inputs.size(job), job.config) for job in jobs]
+    found = capacity(memory, workers=place.workers, threads=place.threads)
     print(f"{len(jobs)} runs, {found.workers} at a time, threads of each: {found.threads} ({found.reason})", flush=True)
     return local_outcomes(jobs, found.workers, found.threads)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from endotsr.sequences.sequence import Sequence
-from endotsr.splatting.camera import Camera, backproject, camera_centre, project
+from endotsr.splatting.camera import Camera, backproject, camera_centre, degrees_between, project
 
 POINTS = 8  # along each side of the picture
 
@@ -30,10 +30,9 @@ def pose_change(given: Sequence, seen: Sequence) -> dict[str, Any] | None:
 def _change(sequence: Sequence, index: int, seen: Camera) -> tuple[float, float, float]:
     """Angle in degrees, distance in scene units, and mean displacement in pixels of one frame."""
     camera, depth = sequence.cameras[index], sequence.tissue_depth(index) or 1.0
-    cosine = (np.trace(seen.rotation @ camera.rotation.T) - 1) / 2
     moved = float(np.linalg.norm(camera_centre(seen) - camera_centre(camera)))
     ends = (np.linspace(0, size - 1, POINTS) for size in (camera.height, camera.width))
     row, column = (a.ravel() for a in np.meshgrid(*ends, indexing="ij"))
     points = backproject(camera, column, row, np.full(row.size, depth))
     apart = np.subtract(project(seen, points)[:2], project(camera, points)[:2])
-    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), moved, float(np.hypot(*apart).mean())
+    return degrees_between(seen.rotation, camera.rotation), moved, float(np.hypot(*apart).mean())

@@ -15,6 +15,7 @@ from endotsr.opencv import area_resize
 from endotsr.opencv.stereo import Maps, rectification_maps, remapped, undistortion_maps
 from endotsr.sequences.depth_files import CLIPPED, clip_depth, reduced_depth
 from endotsr.sequences.recording import CameraPose, Lens, Picture, PicturePair, Recording, lens_of_matrix, opencv_matrix
+from endotsr.splatting.camera import degrees_between
 
 SKEWED = 0.5  # of the baseline: a pair whose cameras stand higher than wide apart by more is not side by side
 
@@ -122,6 +123,6 @@ def _rectified(recording: Recording, new_size: tuple[int, int]) -> Straightener:
             " sections of the calibration, swapped?"
         )
     lens = lens_of_matrix(maps.left.matrix, width, height, where=recording.where).scaled(*new_size)
-    angle = np.degrees(np.arccos(np.clip((np.trace(maps.left.rotation) - 1) / 2, -1, 1)))
+    angle = degrees_between(maps.left.rotation, np.eye(3))
     note = f"rectified: baseline {maps.baseline:.6g} mm, left camera turned by {angle:.3g} degrees"
     return Straightener(lens, maps.left, maps.right, maps.left.rotation, maps.baseline, [note])

@@ -36,6 +36,12 @@ def camera_centre(camera: Camera) -> FloatArray:
     return -camera.rotation.T @ camera.translation
 
 
+def degrees_between(rotation: FloatArray, other: FloatArray) -> float:
+    """Angle in [0, 180] degrees by which two rotations (3, 3) differ: cos = (trace(R_1 R_2^T) - 1) / 2."""
+    cosine = (np.trace(rotation @ other.T) - 1) / 2
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
 def scale_camera(camera: Camera, width: int, height: int) -> Camera:
     """The same camera for an image resized to width x height (pixel edges stay aligned)."""
     sx, sy = width / camera.width, height / camera.height

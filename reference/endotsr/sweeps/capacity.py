@@ -3,18 +3,20 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from endotsr.config import PAPER
+import msgspec
+
+from endotsr.config import Config
 from endotsr.kernels.machine import memory_available, memory_of_machine, usable_cores
 from endotsr.kernels.memory import ASSUMED
 from endotsr.sequences.checks.cost import estimated_cost
 
-MARGIN = 1.4  # measured peaks of a training over the estimate, both presets
+MARGIN = 1.4  # over the estimate; peaks of 1.14 (`paper`) and 1.10 (`sharp`) times the estimate were measured
 USABLE = 0.9  # of the memory that is free
 CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
 class Size(NamedTuple):
-    """The size of a sequence, as far as memory depends on it."""
+    """The size of a sequence at the scale of its training, as far as memory depends on it."""
 
     frames: int
     width: int
@@ -29,20 +31,21 @@ class Capacity(NamedTuple):
     reason: str
 
 
-def run_bytes(size: Size) -> float:
-    """Estimated memory of one run."""
-    return MARGIN * estimated_cost(size.frames, size.width, size.height, PAPER).total_bytes
+def run_bytes(size: Size, config: Config) -> float:
+    """Estimated memory of one run with these settings."""
+    read = msgspec.structs.replace(config, sequence=msgspec.structs.replace(config.sequence, scale=1.0))
+    return MARGIN * estimated_cost(size.frames, size.width, size.height, read).total_bytes
 
 
 def capacity(
-    sizes: list[Size],
+    memory: list[float],
     *,
     cores: int | None = None,
     free: float | None = None,
     workers: int | None = None,
     threads: int | None = None,
 ) -> Capacity:
-    """Workers and threads for runs of these sizes, the largest of which sets the memory of each worker.
+    """Workers and threads for runs of this memory each, `run_bytes`; the largest sets that of every worker.
 
     cores, free       of the machine; default: those that this process may use
     workers, threads  asked for; default: as many runs as fit, with all cores divided among them
@@ -53,14 +56,12 @@ def capacity(
     cores = cores or usable_cores()
     known = free_memory() if free is None else free
     free = ASSUMED if known is None else known
-    needed = max(map(run_bytes, sizes), default=0.0)
+    needed = max(memory, default=0.0)
     by_memory = max(1, int(USABLE * free / needed)) if needed else cores
     by_cores = max(1, cores // threads) if threads else cores
-    chosen = workers or max(1, min(len(sizes), by_memory, by_cores))
-    memory = f"{free / 1e9:.1f} GB " + (
-        "free" if known is not None else "assumed: the system does not say what is free"
-    )
-    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run, {memory}"
+    chosen = workers or max(1, min(len(memory), by_memory, by_cores))
+    found = f"{free / 1e9:.1f} GB " + ("free" if known is not None else "assumed: the system does not say what is free")
+    reason = f"{cores} cores, {needed / 1e9:.1f} GB a run, {found}"
     return Capacity(chosen, threads or max(1, cores // chosen), reason)
 
 

@@ -20,6 +20,7 @@ from endotsr.sequences.layouts import open_recording, readable_layout
 from endotsr.sequences.recording import ARBITRARY, CameraPose, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.splits import parse_frame_range
+from endotsr.splatting.camera import degrees_between
 
 LEAST_CORRELATION = 0.5  # of a frame with the one before, moved along the flow: below it another scene begins
 LARGEST_STEP = 0.1  # of the depth: a camera that moves farther between two frames has jumped
@@ -144,8 +145,7 @@ def _jump(before: _Shown, shown: _Shown) -> str:
         return ""
     centres = [-pose.rotation.T @ pose.translation for pose in (before.pose, shown.pose)]
     step = float(np.linalg.norm(centres[1] - centres[0]))
-    trace = float(np.trace(shown.pose.rotation @ before.pose.rotation.T))
-    turn = float(np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))))
+    turn = degrees_between(shown.pose.rotation, before.pose.rotation)
     if before.depth is not None and step > LARGEST_STEP * before.depth:
         return f"the camera jumps by {step:.3g} at a depth of {before.depth:.3g}"
     return f"the camera turns by {turn:.1f} degrees" if turn > LARGEST_TURN else ""

@@ -70,7 +70,7 @@ def _frames(text: str) -> int:
 
 def _outcomes(jobs: list["Job"], asked: WindowsWanted) -> Generator["Outcome | None", None, None]:
     """Make the runs of one wave, here or on a cluster, whose workers read the recording themselves."""
-    from endotsr.sweeps.capacity import Size, capacity
+    from endotsr.sweeps.capacity import Size, capacity, run_bytes
     from endotsr.sweeps.local import local_outcomes
 
     place = asked.place
@@ -80,8 +80,8 @@ def _outcomes(jobs: list["Job"], asked: WindowsWanted) -> Generator["Outcome | N
         return cluster_outcomes(place.scheduler, jobs, None, asked.out, place.threads)
     from endotsr.windows.make import size_of
 
-    sizes = [Size(*size_of(job)) for job in jobs]
-    found = capacity(sizes, workers=place.workers, threads=place.threads)
+    memory = [run_bytes(Size(*size_of(job)), job.config) for job in jobs]
+    found = capacity(memory, workers=place.workers, threads=place.threads)
     print(
         f"{len(jobs)} windows, {found.workers} at a time, threads of each: {found.threads} ({found.reason})", flush=True
     )

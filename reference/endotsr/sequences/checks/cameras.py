@@ -5,7 +5,7 @@ import numpy as np
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.checks.findings import Finding, finding
 from endotsr.sequences.world import FAR_FROM_ORIGIN
-from endotsr.splatting.camera import Camera, camera_centre
+from endotsr.splatting.camera import Camera, camera_centre, degrees_between
 
 JUMP = 20.0  # times the median step
 TURN = 20.0  # degrees between neighbouring frames
@@ -35,8 +35,7 @@ def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> li
     for i in np.flatnonzero(steps > JUMP * usual):
         found.append(finding("pose-jump", where, f"the camera moves {steps[i]:.4g}, usually {usual:.4g}", int(i) + 1))
     for i in range(1, len(cameras)):
-        cosine = (np.trace(cameras[i].rotation @ cameras[i - 1].rotation.T) - 1) / 2
-        angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+        angle = degrees_between(cameras[i].rotation, cameras[i - 1].rotation)
         if angle > TURN:
             found.append(finding("pose-turn", where, f"the camera turns by {angle:.0f} degrees", i))
     return found
