@@ -216,7 +216,7 @@ class TrainingConfig(Section, frozen=True, kw_only=True):
     iterations: PositiveCount = 6000
     """number of iterations, each of which renders one view; the milestones are written for it"""
     visits_per_frame: Count = 0
-    """least iterations per training frame: more than `iterations` stretch the run; 0 = exactly `iterations`"""
+    """least iterations a training frame, up to 64 of them: more than `iterations` stretch the run; 0 = exactly those"""
     residual_activation: Count = 3000
     """K_s: last iteration without the residuals of A and S"""
     harmonics_interval: PositiveCount = 500
@@ -270,6 +270,8 @@ FORMER = {
     "training": {"time_jitter": (0,), "bridge_target": ("flow",), "bridge_flow": ("dis",)},
 }
 
+FRAMES_OF_FULL_VISITS = 64  # training frames from which the length of a run grows with the root of their number
+
 # Milestones of the schedule, by section: they stretch with the length of the run.
 MILESTONES = {
     "loss": ("smoothness_from", "laplacian_from", "laplacian_full"),
@@ -301,11 +303,14 @@ def with_fixed_length(config: Config) -> Config:
 
 
 def lengthened(config: Config, training_frames: int) -> Config:
-    """The settings of a run on so many training frames: its length is max(iterations, visits_per_frame x frames).
+    """The settings of a run on so many training frames: its length is max(iterations, visits_per_frame x m).
 
-    The schedule is stretched to that length and the length is then fixed, so that a second call changes nothing.
+    m is the number of frames n up to 64, and sqrt(64 n), rounded, beyond: a frame of a longer clip shares more of its
+    tissue with its neighbours. The schedule is stretched to that length and the length is then fixed, so that a second
+    call changes nothing.
     """
-    wanted = config.training.visits_per_frame * training_frames
+    counted = min(training_frames, round(math.sqrt(FRAMES_OF_FULL_VISITS * training_frames)))
+    wanted = config.training.visits_per_frame * counted
     return with_iterations(config, wanted) if wanted > config.training.iterations else with_fixed_length(config)
 
 

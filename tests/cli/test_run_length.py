@@ -76,7 +76,9 @@ def ablated(folder, frames: int, *words: str) -> set[int]:
     return {job.config.training.iterations for job in jobs_of(spec, folder, lambda job: frames)}
 
 
-@pytest.mark.parametrize("frames, length", [(20, 6000), (47, 6016), (55, 7040), (100, 12800)])
+@pytest.mark.parametrize(
+    "frames, length", [(20, 6000), (47, 6016), (55, 7040), (64, 8192), (65, 8192), (100, 10240), (400, 20480)]
+)
 def test_a_length_that_nobody_gives_follows_the_number_of_frames(frames, length, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('preset = "sharp"\n[training]\nseed = 4\n')
@@ -89,7 +91,7 @@ def test_a_length_that_nobody_gives_follows_the_number_of_frames(frames, length,
     assert trained(["--preset", "demo"], frames).training.iterations == 1500
 
 
-@pytest.mark.parametrize("frames, length", [(20, 4000), (47, 4700), (55, 5500), (100, 10000)])
+@pytest.mark.parametrize("frames, length", [(20, 4000), (47, 4700), (55, 5500), (100, 8000)])
 def test_where_both_are_given_the_longer_of_the_two_holds(frames, length, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[training]\niterations = 4000\nvisits_per_frame = 100\n")
@@ -110,11 +112,11 @@ def test_where_both_are_given_the_longer_of_the_two_holds(frames, length, tmp_pa
 def test_a_later_source_ends_the_visits_of_an_earlier_one(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[training]\nvisits_per_frame = 100\n")
-    assert trained(["--config", str(file)], 100).training.iterations == 10_000
-    assert trained(["--config", str(file), "--iterations", "300"], 100).training.iterations == 300
-    assert lengthened(endotsr.make_config(file=file, iterations=300), 100).training.iterations == 300
+    assert trained(["--config", str(file)], 64).training.iterations == 6400
+    assert trained(["--config", str(file), "--iterations", "300"], 64).training.iterations == 300
+    assert lengthened(endotsr.make_config(file=file, iterations=300), 64).training.iterations == 300
     file.write_text("[training]\niterations = 300\n")
-    assert trained(["--config", str(file), "--training.visits-per-frame", "4"], 100).training.iterations == 400
+    assert trained(["--config", str(file), "--training.visits-per-frame", "5"], 64).training.iterations == 320
 
 
 def test_the_stored_settings_of_a_run_are_of_one_length_and_repeat_it(tmp_path, capsys):

@@ -265,10 +265,10 @@ def _progress(folder: RunFolder, sequence: "Sequence", config: Config) -> Progre
 
 def of_length(config: Config, frames: int, note: str) -> tuple[Config, str]:
     """The settings with the length of a run on so many training frames, and the line on its schedule."""
-    found, (before, visits) = lengthened(config, frames), (config.training.iterations, config.training.visits_per_frame)
-    if found.training.iterations > before:
+    found, before = lengthened(config, frames), config.training.iterations
+    if (after := found.training.iterations) > before:
         note = (
-            f"schedule: stretched from {before} to {found.training.iterations} iterations, {visits} for each of "
+            f"schedule: stretched from {before} to {after} iterations, {after / frames:.0f} for each of "
             f"{frames} training frames (--iterations N trains exactly N)"
         )
     return found, note
