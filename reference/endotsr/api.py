@@ -203,7 +203,7 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
     """What a clip shows and which components it calls for, as `endotsr inspect --json` writes it.
 
     config       settings that the plan is relative to; default: preset `paper`
-    frame_rate   frames a second; rates are then also given a minute
+    frame_rate   frames a second; default: those of the sequence. Where known, rates are also given a minute
 
     returns      "noise", "verdicts" by effect (present, kind, statistic, threshold, reason, ...), "rates", and "plan"
                  with its changes, their reasons and the expected savings
@@ -302,12 +302,21 @@ class Run:
             spectral_motion="spectral_motion" not in without,
         )
 
-    def film(self, path: str | Path, *, count: int | None = None, camera: str = "observed", rate: float = 15.0) -> Path:
+    def film(
+        self,
+        path: str | Path,
+        *,
+        count: int | None = None,
+        camera: str = "observed",
+        rate: float | None = None,
+        slow: float | None = None,
+    ) -> Path:
         """Write a film, as `endotsr render --film`; returns its path. .mp4 holds H.264, .webm VP9; or .gif.
 
         count    number of pictures, evenly spaced over the clip; default: the frames
         camera   "observed", "orbit", "sway", the number of a frame, or a file of cameras
-        rate     pictures a second
+        rate     pictures a second; default: so many that the film is as fast as the recording, 15 where that is unknown
+        slow     in place of `rate`: how many times as long as the recording the film takes
 
         Raises: InputError for a name, rate, count or camera that is not allowed.
         """
@@ -316,9 +325,10 @@ class Run:
         from endotsr.views.plan import ViewRequest
 
         path, look, scene = Path(path), pictures.Look(), self._scene()
-        pictures.check_outputs(None, path, rate)
+        pictures.check_outputs(None, path, rate, slow)
         views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
-        pictures.write_views_film(path, pictures.rendered(scene, views, look), look, rate)
+        chosen = pictures.rate_of(path, scene, views, rate, slow)
+        pictures.write_views_film(path, pictures.rendered(scene, views, look), look, chosen)
         return path
 
     def view(self, path: str | Path) -> Path:

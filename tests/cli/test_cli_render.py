@@ -1,6 +1,7 @@
 """`render`: cameras, sizes, depth and films of a trained run, and what is refused."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -79,6 +80,21 @@ def test_a_film_of_panels_beside_its_pictures(finished_run, tmp_path, capsys):
 def test_a_film_alone_shows_all_frames(finished_run, tmp_path):
     assert main(["render", str(finished_run), "--film", str(tmp_path / "film.gif")]) == 0
     assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
+
+
+def test_a_film_in_slow_motion(finished_run, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(finished_run, run)
+    record = json.loads((run / "sequence.json").read_text(encoding="utf-8"))
+    (run / "sequence.json").write_text(json.dumps(record | {"duration": 0.9}), encoding="utf-8")
+    for words, said in (
+        ([], "9 pictures, 0.9 s, 1 times the speed"),
+        (["--slow", "2"], "9 pictures, 1.8 s, 0.5 times"),
+    ):
+        assert main(["render", str(run), "--film", str(tmp_path / "a.mp4"), *words]) == 0
+        assert said in capsys.readouterr().out
+    assert len(read_video(tmp_path / "a.mp4")) == 9
+    assert_refused(capsys, ["render", str(run), "--film", str(tmp_path / "a.mp4"), "--slow", "2", "--rate", "9"], "one")
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,8 @@
 
 Run after the build: python tests/docs/check_layout.py docs/_build/html [PAGE ...]
 At 1400 and 1000 px every column of every table is visible. On a telephone (390 px) a wide table may scroll inside its
-box. At every width a page shows at most one search box. Without a browser the check says so and ends with exit code 0.
+box. No word is broken over two lines, and no text is cut at the edge of its box.
+At every width a page shows at most one search box. Without a browser the check says so and ends with exit code 0.
 """
 
 import json
@@ -29,8 +30,28 @@ function measure(page, width) {
     const by = table.getBoundingClientRect().right - box(table).getBoundingClientRect().right;
     if (shown(table) && width >= ALL_COLUMNS_FROM && by > 1) say("table", name(table), by);
   }
+  for (const word of brokenWords(root)) say("word", word, 0);
+  for (const e of root.querySelectorAll("*")) {
+    const flow = frame.contentWindow.getComputedStyle(e).overflowX, hides = ["hidden", "clip"].includes(flow);
+    const by = e.scrollWidth - e.clientWidth;
+    if (hides && by > 1 && shown(e) && e.textContent.trim()) say("cut", e.textContent.trim().slice(0, 40), by);
+  }
   const boxes = [...frame.contentDocument.querySelectorAll("input[type=search], .search-button-field")].filter(shown);
   if (boxes.length > 1) say("search", boxes.length + " search boxes", 0);
+}
+function brokenWords(root) {  // words of letters that stand on two lines; names of files and settings may break
+  const page = frame.contentDocument, walker = page.createTreeWalker(page.body, 4), range = page.createRange();
+  const broken = new Set(), apart = "script,style,code,pre,svg,mjx-container";
+  for (let node; (node = walker.nextNode());) {
+    if (!node.parentElement.checkVisibility() || node.parentElement.closest(apart)) continue;
+    for (const word of node.data.matchAll(/(?<![^\\s(\u201c"])\\p{L}{2,}(?![^\\s.,;:)!?\u201d"])/gu)) {
+      range.setStart(node, word.index);
+      range.setEnd(node, word.index + word[0].length);
+      const tops = [...range.getClientRects()].map((r) => r.top);
+      if (tops.length > 1 && Math.max(...tops) - Math.min(...tops) > 4) broken.add(word[0]);
+    }
+  }
+  return broken;
 }
 function widest(root, width) {
   const wide = [...root.querySelectorAll("article *, main > *")].filter((e) =>

@@ -46,6 +46,14 @@ def test_the_interval_covers_the_true_mean_about_as_often_as_it_says():
     assert interval(np.array([0.7])) == (0.7, 0.7)
 
 
+def test_one_clip_in_two_layouts_is_compared():
+    """The frames have other names there; frames and masks are the same, bit by bit."""
+    other = method("b", [1.0, 2.0, 4.0])
+    renamed = other._replace(per_frame=[row | {"name": f"frame-{row['frame']:06d}.color"} for row in other.per_frame])
+    rows = compare([method("a", [1.0, 2.0, 3.0]), renamed], ("psnr_tissue",))
+    assert rows[1].difference.mean == pytest.approx(1 / 3)
+
+
 @pytest.mark.parametrize(
     ("other", "said"),
     [

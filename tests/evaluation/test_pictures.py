@@ -10,6 +10,7 @@ from endotsr.evaluation.baselines import BASELINES, flow_interpolation
 from endotsr.evaluation.metrics import round_8bit
 from endotsr.evaluation.pictures import find_pictures, measure_pictures, read_picture
 from endotsr.opencv import write_png
+from endotsr.sequences.film_file import write_video
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 
@@ -57,6 +58,30 @@ def test_8bit_pictures_of_the_flow_equal_the_8bit_columns_of_its_row(sequence, t
         for key in ("psnr_full_8bit", "psnr_tissue_8bit", "ssim_full_8bit", "ssim_tissue_8bit"):
             assert ours[key] == row[key]
         assert ours["psnr_full"] == pytest.approx(row["psnr_full_8bit"], abs=1e-4)
+
+
+@pytest.mark.parametrize("frames", [HELD_OUT, list(range(12))])
+def test_a_video_of_renders_is_measured(frames, sequence, tmp_path):
+    """Without loss in the file, the numbers are those of the same pictures as PNG."""
+    shown = {i: bytes_of(flow_interpolation(sequence, i) if i in HELD_OUT else sequence.frame(i).image) for i in frames}
+    write_video(tmp_path / "a.mp4", shown.values(), 25.0, lossless=True)
+    (tmp_path / "png").mkdir()
+    for i, picture in shown.items():
+        write_png(tmp_path / "png" / f"{sequence.names[i]}.png", picture)
+    video, folder = (measure_pictures(find_pictures(tmp_path / name, sequence), sequence) for name in ("a.mp4", "png"))
+    assert video["held_out"] == folder["held_out"] and video["training"] == folder["training"]
+    assert "as many pictures as " + ("frames" if len(frames) == 12 else "held-out") in video["pictures"]["pairing"]
+
+
+def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
+    write_video(tmp_path / "a.mp4", [np.zeros((32, 48, 3), np.uint8)] * 3, 25.0, lossless=True)
+    with pytest.raises(
+        InputError, match=r"a video of 3 pictures; allowed: one for each of the 12 frames or of the 2 held"
+    ):
+        find_pictures(tmp_path / "a.mp4", sequence)
+    write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
+    with pytest.raises(InputError, match=r"an array of 16x48x3; allowed: a picture of 48x32"):
+        measure_pictures(find_pictures(tmp_path / "b.mp4", sequence), sequence)
 
 
 @pytest.mark.parametrize(

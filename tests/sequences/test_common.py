@@ -4,6 +4,7 @@ import contextlib
 import re
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from common_folder import FRAMES, HEIGHT, WIDTH, moving, written
@@ -17,6 +18,7 @@ from endotsr.opencv.pictures import write_jpeg
 from endotsr.runs.sources import input_record, load_sequence
 from endotsr.sequences.common import open_common, read_common
 from endotsr.sequences.layouts import layout_of, layouts
+from endotsr.sequences.record import checked_record, record_of
 from endotsr.sequences.sequence_file import FILE_NAME, PoseEntry, read_sequence_file, write_sequence_file
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import camera_centre
@@ -53,6 +55,30 @@ def test_the_commands_detect_it_and_record_its_files(tmp_path):
 def test_layouts_have_names_of_their_own_and_the_most_general_is_last():
     names = [layout.name for layout in layouts()]
     assert len(set(names)) == len(names) and names[0] == "common"
+
+
+@pytest.mark.parametrize(
+    ("stated", "frames", "seconds"),
+    [({"frame_rate": 25.0}, "", 0.2), ({"frame_rate": 25.0}, "1:", 0.16), ({"frame_rate": 25.0}, "::2", 0.24),
+     ({}, "", 0), ({"frame_rate": 3.0, "times": [7.0, 7.2, 7.3, 7.8, 8.2]}, "", 1.5),
+     ({"times": [0.0, 1.0, 2.0, 5.0, 6.0]}, "", 0)],
+)  # fmt: skip
+def test_the_seconds_of_a_recording_are_kept(stated, frames, seconds, tmp_path):
+    """From time 0 to time 1: frame i shows the second `duration` times its time."""
+    written(tmp_path, **stated)
+    config = msgspec.structs.replace(WHOLE, frames=frames)
+    record = record_of(read_common(tmp_path, config, 0.2))
+    assert record.duration == pytest.approx(seconds)
+    assert checked_record(msgspec.to_builtins(record), "a") == record
+    if "times" in stated and seconds:
+        np.testing.assert_allclose(np.multiply(record.times, seconds), np.subtract(stated["times"], 7.0), atol=1e-12)
+
+
+def test_a_record_from_before_seconds_were_kept_is_read(tmp_path):
+    written(tmp_path, frame_rate=25.0)
+    data = msgspec.to_builtins(record_of(read_common(tmp_path, WHOLE, 0.2)))
+    del data["duration"]
+    assert checked_record(data, "a").duration == 0
 
 
 def test_without_masks_every_pixel_is_tissue(tmp_path):

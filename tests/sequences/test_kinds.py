@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -42,3 +43,9 @@ def test_the_guide_lists_every_kind():
     text = GUIDE.read_text(encoding="utf-8")
     for code, kind in KINDS.items():
         assert f"| `{code}` | {kind.level} | {kind.why} | {kind.remedy} |" in text, code
+
+
+def test_the_guide_states_how_many_findings_there_are():
+    levels = Counter(kind.level for kind in KINDS.values())
+    numbers = f"{levels['refusal']} refusals, {levels['warning']} warnings and {levels['note']} notes"
+    assert f"It knows {len(KINDS)} findings: {numbers}." in " ".join(GUIDE.read_text(encoding="utf-8").split())

@@ -1,5 +1,7 @@
 """Films and panels: what is written is what was shown."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from browser import seen
@@ -12,7 +14,7 @@ from endotsr.sequences import film_file
 from endotsr.sequences.sequence import Frame
 from endotsr.sequences.video_file import video_facts
 from endotsr.splatting.render import RenderOut
-from endotsr.views.film import check_film, write_film
+from endotsr.views.film import check_film, film_rate, speed_in_words, write_film
 from endotsr.views.panels import Scale, panel, side_by_side
 from film_reader import read_video
 
@@ -69,6 +71,35 @@ def test_a_film_without_a_picture_is_refused_and_leaves_nothing(ending, tmp_path
 def test_names_and_rates_that_no_film_has_are_refused(name, rate, said, tmp_path):
     with pytest.raises(InputError) as refused:
         check_film(tmp_path / name, rate)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "duration", "slow", "rate"),
+    [("a.mp4", 50, 2.0, None, 25.0), ("a.mp4", 50, 2.0, 2.5, 10.0), ("a.mp4", 50, 2.0, 0.25, 100.0),
+     ("a.mp4", 50, 0.0, None, 15.0), ("a.mp4", 1, 2.0, None, 15.0),
+     ("a.mp4", 500, 2.0, None, 60.0), ("a.gif", 500, 2.0, None, 50.0), ("a.mp4", 4, 8.0, None, 1.0)],
+)  # fmt: skip
+def test_a_film_is_as_fast_as_the_recording_or_slower(name, count, duration, slow, rate):
+    """`count` frames of a recording of `duration` seconds."""
+    times = [k / count for k in range(count)]
+    assert film_rate(Path(name), times, duration, slow) == pytest.approx(rate)
+
+
+def test_the_speed_of_a_film_is_said():
+    times = [k / 50 for k in range(50)]
+    assert speed_in_words(times, 2.0, 10.0) == ", 0.4 times the speed of the recording"
+    assert speed_in_words(times, 0.0, 10.0) == "" and speed_in_words([0.5], 2.0, 10.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("times", "duration", "slow", "said"),
+    [([0, 0.5], 0.0, 2.0, "rate is unknown; allowed: --rate"), ([0.5, 0], 2.0, 2.0, "not in the order of time"),
+     ([0, 0.5], 2.0, 100.0, "--slow 100 is 0.01 pictures a second; allowed: --slow from 0.00833 to 10 with 2")],
+)  # fmt: skip
+def test_a_speed_that_no_film_can_have_is_refused(times, duration, slow, said):
+    with pytest.raises(InputError) as refused:
+        film_rate(Path("a.mp4"), times, duration, slow)
     assert said in str(refused.value)
 
 

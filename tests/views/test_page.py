@@ -6,8 +6,10 @@ import json
 import re
 import sys
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from browser import browser, dom, drawn
@@ -215,6 +217,13 @@ def test_the_view_that_is_asked_for_is_drawn_and_a_distance_is_that_of_the_rende
 def test_the_page_names_the_frame(opened):
     content = dom(opened[1], "t=0.5")
     assert re.search(r'id="time">frame \d+ of 64, t = 0.500<', content)
+
+
+def test_the_page_names_the_second_of_a_recording_whose_rate_is_known(tmp_path):
+    scene = moving_scene()
+    timed = replace(scene, record=msgspec.structs.replace(scene.record, duration=2.5))
+    write_page(tmp_path / "a.html", timed, "a", 8)
+    assert "t = 0.500, 1.25 s<" in dom(tmp_path / "a.html", "t=0.5")
 
 
 def test_the_error_layer_stays_when_time_moves(tmp_path):

@@ -25,18 +25,19 @@ class EvaluateOptions:
     """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
 
     Several METHODs are compared on the same held-out frames: means, and differences to the first one frame by frame.
-    Each is a run folder that was evaluated, a JSON file of --json, or a folder of pictures; NAME=PATH gives it another
+    Each is a run folder that was evaluated, a JSON file of --json, or pictures; NAME=PATH gives it another
     name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
 
     With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
     of the run or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display
-    units), paired by the names of the frames, by their numbers, or in order. The run, if one is named, is not changed.
+    units) in a folder, paired by the names of the frames, by their numbers, or in order; or a video of all frames or of
+    the held-out ones. The run, if one is named, is not changed.
     """
 
     methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
     """run folder, or several methods to compare; with --pictures it may be left out"""
-    pictures: Annotated[Path | None, Option("FOLDER")] = None
-    """measure the pictures of this folder, not the run"""
+    pictures: Annotated[Path | None, Option("FOLDER|VIDEO")] = None
+    """measure the pictures of this folder or video, not the run"""
     label: Annotated[str, Option("TEXT")] = ""
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None

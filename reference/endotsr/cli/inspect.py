@@ -27,7 +27,7 @@ class InspectOptions:
     json: Annotated[Path | None, Option("FILE")] = None
     """write verdicts and plan as JSON"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
-    """frames a second; rates are then also given a minute"""
+    """frames a second (default: those of the recording, where known); rates are then also given a minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
     scale: float | None = None

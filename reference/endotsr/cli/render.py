@@ -42,8 +42,10 @@ class RenderOptions:
     """depth as composited, or divided by the opacity"""
     panels: tuple[Literal["render", "truth", "error", "depth", "opacity"], ...] = ("render",)
     """pictures of a film, side by side; truth and error are those of frames"""
-    rate: float = 15.0
-    """pictures of a film in a second"""
+    rate: float | None = None
+    """pictures of a film in a second (default: the speed of the recording; 15 where it is unknown)"""
+    slow: Annotated[float | None, Option("N")] = None
+    """a film that takes N times as long as the recording, instead of --rate"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
@@ -63,13 +65,14 @@ def run(words: list[str]) -> int:
     from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
+    from endotsr.views.film import speed_in_words
     from endotsr.views.plan import ViewRequest
     from endotsr.windows.scene import open_any, shown_frames
 
     options = parse(RenderOptions, words, "render")
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
-    pictures.check_outputs(options.out, options.film, options.rate)
+    pictures.check_outputs(options.out, options.film, options.rate, options.slow)
     refuse_unwritable(options.json)
     use_threads(options.threads)
     scene = open_any(options.scene)
@@ -77,14 +80,16 @@ def run(words: list[str]) -> int:
         if scene.folder is not None:
             refuse_inside_data(path, scene.folder)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
+    rate = pictures.rate_of(options.film, scene, views, options.rate, options.slow) if options.film else None
     look = pictures.Look(options.depth, options.without, options.panels)
     sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
 
     def film(shown) -> None:
-        if options.film:
-            count = pictures.write_views_film(options.film, shown, look, options.rate, sequence)
-            print(f"{options.film}: {count} pictures, {count / options.rate:.1f} s")
+        if options.film and rate:
+            count = pictures.write_views_film(options.film, shown, look, rate, sequence)
+            speed = speed_in_words([view.time for view in views], scene.record.duration, rate)
+            print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed}")
         else:
             list(shown)
 
@@ -93,7 +98,5 @@ def run(words: list[str]) -> int:
         print(f"{count} pictures in {options.out}: colour/, depth/, opacity/, render.json")
     else:
         film(made)
-    write_result(
-        options.json, folder=options.out, film=options.film, rate=options.rate, times=[view.time for view in views]
-    )
+    write_result(options.json, folder=options.out, film=options.film, rate=rate, times=[view.time for view in views])
     return 0

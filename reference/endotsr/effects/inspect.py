@@ -44,13 +44,14 @@ class Inspection(NamedTuple):
 def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Inspection:
     """Test the training frames of a sequence for every effect.
 
-    frame_rate   frames a second; with it, rates are also given a minute
+    frame_rate   frames a second; default: those of the sequence. Where known, rates are also given a minute
 
     Raises: InputError for a frame rate that is not positive and finite.
     Equal sequences give equal verdicts: the simulated null has a fixed seed.
     """
     if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
         raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames a second")
+    frame_rate = sequence.frame_rate if frame_rate is None else frame_rate
     clip = training_clip(sequence)
     noise = estimate_noise(sequence, clip)
     smoke, blur = clarity_verdicts(sequence, clip, noise)

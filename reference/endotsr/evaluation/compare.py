@@ -58,8 +58,8 @@ def methods_of(metrics: dict[str, Any], label: str, where: object, baselines: bo
             rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
         methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
         for method in methods:
-            _frames(method)
-    except (KeyError, TypeError, AttributeError) as error:
+            _frames(method), _about(method)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
     return methods
 
@@ -99,8 +99,9 @@ def _refuse_other_frames(methods: list[Method]) -> None:
                 raise InputError(f"{other.label} and {first.label}: measured on different {name}; allowed: the same")
 
 
-def _frames(method: Method) -> list[tuple[int, str]]:
-    return [(row["frame"], row["name"]) for row in method.per_frame]
+def _frames(method: Method) -> list[int]:
+    """Numbers of the frames. Their names may differ: one clip has others in another layout, and equal digests."""
+    return [int(row["frame"]) for row in method.per_frame]
 
 
 def _about(method: Method) -> str:

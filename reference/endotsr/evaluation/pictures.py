@@ -1,8 +1,9 @@
-"""A folder of pictures in the place of a model: the renders of any method, measured by the same code.
+"""A folder of pictures or a video in the place of a model: the renders of any method, measured by the same code.
 
-In: a folder with one picture a frame, `.png` (8 or 16 bit) or `.npy` (float), and the sequence that it shows. Out: the
-file of every frame, and the dictionary of metrics.json for these pictures. A float array keeps what an 8-bit file
-rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of that baseline to the last digit.
+In: a folder with one picture a frame, `.png` (8 or 16 bit) or `.npy` (float), or a video of the frames; and the
+sequence that it shows. Out: the file of every frame, and the dictionary of metrics.json for these pictures. A float
+array keeps what an 8-bit file rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of
+that baseline to the last digit. What the compression of a video loses counts as an error of its method.
 """
 
 import hashlib
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.evaluation.evaluate import FORMAT, baseline_table, evaluate_frames
@@ -18,6 +20,7 @@ from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.opencv import read_png
 from endotsr.sequences.files import frame_numbers, shortened
 from endotsr.sequences.sequence import Sequence
+from endotsr.sequences.video_file import VIDEO_ENDINGS, video_facts, video_pictures
 from endotsr.untrusted.arrays import read_npy
 
 KINDS = (".npy", ".png")  # the first kind of which a folder holds a file is read
@@ -27,23 +30,33 @@ LARGEST = 16.0  # display units: a larger number is a level from 0 to 255 or 655
 
 
 class Pictures(NamedTuple):
-    """The files of a folder by frame number, and how they were paired with the frames."""
+    """The pictures of a folder or a video by frame number, and how they were paired with the frames."""
 
-    folder: Path
-    files: dict[int, Path]  # frame number -> file, held-out frames at least
+    folder: Path  # or the video
+    files: dict[int, Path]  # frame number -> file, held-out frames at least; of a video the name and the number in it
     pairing: str  # in words
+    decoded: dict[int, NDArray[np.uint8]] | None = None  # of a video: frame number -> (H, W, 3)
+
+    def read(self, index: int, shape: tuple[int, ...]) -> FloatArray:
+        """The picture of a frame in display units, (3, H, W). Raises InputError as `read_picture`."""
+        if self.decoded is None:
+            return read_picture(self.files[index], shape)
+        levels = self.decoded[index]
+        return _of_shape(levels.astype(np.float32) / np.float32(255), shape, self.files[index])
 
 
 def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
-    """The picture of every held-out frame.
+    """The picture of every held-out frame, in a folder or in a video.
 
     The files are paired by the first of these rules that gives every held-out frame one file:
     the name of the frame (the stem, or the stem up to its first dot); the number of the frame in the name; the order of
-    the numbers, where there are as many files as held-out frames, or as many as frames.
+    the numbers, where there are as many files as held-out frames, or as many as frames. A video has the last rule.
 
-    Raises: InputError for a folder without pictures, or one in which no rule applies.
+    Raises: InputError for a folder without pictures, one in which no rule applies, or a video that cannot be read.
     """
     folder = Path(folder)
+    if is_video(folder):
+        return _of_video(folder, sequence)
     files = _listed(folder)
     held_out = [int(i) for i in sequence.test_index]
     numbers = frame_numbers(files)
@@ -62,10 +75,31 @@ def find_pictures(folder: Path, sequence: Sequence) -> Pictures:
     )
 
 
+def is_video(path: Path) -> bool:
+    """Whether a path is a file with the ending of a video."""
+    return path.is_file() and path.suffix.lower() in VIDEO_ENDINGS
+
+
+def _of_video(path: Path, sequence: Sequence) -> Pictures:
+    facts, held_out = video_facts(path), [int(i) for i in sequence.test_index]
+    for frames, pairing in (
+        (list(range(sequence.count)), "in order: as many pictures as frames"),
+        (held_out, "in order: as many pictures as held-out frames"),
+    ):
+        if facts.count == len(frames):
+            pictures = video_pictures(path, list(range(facts.count)))
+            decoded = {i: np.rot90(picture, facts.turn // 90) for i, picture in zip(frames, pictures, strict=True)}
+            return Pictures(path, {i: path / str(k) for k, i in enumerate(frames)}, pairing, decoded)
+    raise InputError(
+        f"{path}: a video of {facts.count} pictures; allowed: one for each of the {sequence.count} frames or of the"
+        f" {len(held_out)} held-out ones, in order"
+    )
+
+
 def _listed(folder: Path) -> list[Path]:
     """The pictures of a folder by name, all of one kind."""
     if not folder.is_dir():
-        raise InputError(f"{folder}: folder of pictures not found")
+        raise InputError(f"{folder}: folder of pictures, or video, not found")
     for kind in KINDS:
         files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
         if files:
@@ -113,7 +147,11 @@ def read_picture(file: Path, shape: tuple[int, ...]) -> FloatArray:
 
     Raises: InputError naming the file: unreadable, of another shape or type, with values that are no display units.
     """
-    picture = _read_array(file) if file.suffix.lower() == ".npy" else _read_levels(file)
+    return _of_shape(_read_array(file) if file.suffix.lower() == ".npy" else _read_levels(file), shape, file)
+
+
+def _of_shape(picture: Array, shape: tuple[int, ...], file: Path) -> FloatArray:
+    """The picture as (3, H, W). Raises InputError for another size."""
     if picture.ndim == len(shape) and picture.shape != shape and picture.shape[2:] == (CHANNELS,):
         picture = picture.transpose(2, 0, 1)
     if picture.shape != shape:
@@ -154,7 +192,7 @@ def measure_pictures(
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
 
     def render(index: int) -> FloatArray:
-        return read_picture(pictures.files[index], shape)
+        return pictures.read(index, shape)
 
     held_out = evaluate_frames(sequence, sequence.test_index, render, weights)
     inside = evaluate_frames(sequence, training, render)

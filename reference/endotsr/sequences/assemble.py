@@ -78,6 +78,7 @@ def assemble(
         train_index=train,
         test_index=test,
         notes=notes,
+        duration=files.duration,
     )
 
 

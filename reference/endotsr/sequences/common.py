@@ -147,8 +147,18 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         arbitrary=contents.file.arbitrary,
         assumed=entry.assumed,
         seconds=None if times is None else np.array([times[i] for i in frames_read], np.float64),
+        duration=_duration(contents.file, frames_read),
     )
     return assemble(files, cameras_of(contents), config, near, Path(folder), notes)
+
+
+def _duration(file: SequenceFile, frames: list[int]) -> float:
+    """Seconds from time 0 to time 1 of these frames, n / (n - 1) (s_{n-1} - s_0); 0 where the rate is unknown."""
+    if not file.frame_rate or len(frames) < 2:
+        return 0.0
+    first, last = frames[0], frames[-1]
+    elapsed = (last - first) / file.frame_rate if file.times is None else file.times[last] - file.times[first]
+    return elapsed * len(frames) / (len(frames) - 1)
 
 
 def polarity(file: SequenceFile, folder: Path, config: SequenceConfig) -> tuple[str, str]:

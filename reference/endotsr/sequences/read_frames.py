@@ -39,6 +39,7 @@ class FrameFiles(NamedTuple):
     arbitrary: bool = False  # the unit is unknown: the scale of the world is free
     seconds: NDArray[np.float64] | None = None  # (n,) of the frames, ascending; None: evenly spaced
     assumed: str = ""  # what is not measured of the depth
+    duration: float = 0.0  # seconds from time 0 to time 1; 0 = unknown
 
 
 class Frames(NamedTuple):

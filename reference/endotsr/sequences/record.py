@@ -49,6 +49,7 @@ class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
     train_index: list[Count]
     test_index: list[Count]
     cameras: list[RecordedCamera]  # n of them, or one that does not move
+    duration: Annotated[float, msgspec.Meta(ge=0, le=1e12)] = 0.0  # seconds from time 0 to time 1; 0 = unknown
 
     @property
     def count(self) -> int:
@@ -88,6 +89,7 @@ def record_of(sequence: "Sequence") -> SequenceRecord:
         train_index=sequence.train_index.tolist(),
         test_index=sequence.test_index.tolist(),
         cameras=recorded(cameras),
+        duration=sequence.duration,
     )
 
 
@@ -121,9 +123,9 @@ def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
              distinct, frame numbers exist, no frame is both training and held out, and cameras have a rotation and at
              most 2^26 pixels.
     """
-    for name in SequenceRecord.__struct_fields__:
-        if not isinstance(data, dict) or name not in data:
-            raise InputError(f"{where}: {prefix}{name} is missing; allowed: the record as a run wrote it")
+    for field in msgspec.structs.fields(SequenceRecord):
+        if field.required and (not isinstance(data, dict) or field.name not in data):
+            raise InputError(f"{where}: {prefix}{field.name} is missing; allowed: the record as a run wrote it")
     found = typed(data, SequenceRecord, where)
     names = [file_name(name, f"{where}: names") for name in found.names]
     if len(set(names)) < len(names):

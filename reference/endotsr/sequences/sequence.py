@@ -42,6 +42,7 @@ class Sequence:
     train_index: NDArray[np.intp]  # ascending
     test_index: NDArray[np.intp]  # ascending, disjoint from train_index
     notes: list[str] = field(default_factory=list)
+    duration: float = 0.0  # seconds from time 0 to time 1, n / frame rate; 0 = unknown
 
     def __post_init__(self) -> None:
         n, _, height, width = self.images.shape
@@ -65,6 +66,11 @@ class Sequence:
     def count(self) -> int:
         """Number of frames n."""
         return len(self.images)
+
+    @property
+    def frame_rate(self) -> float | None:
+        """Frames a second, on average; None where it is unknown."""
+        return self.count / self.duration if self.duration else None
 
     @property
     def height(self) -> int:

@@ -17,20 +17,64 @@ from endotsr.runs.files import replace_file
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256
 PALETTE_FRAMES = 8  # pictures that the colours of a gif are chosen from
+LOWEST, UNKNOWN_RATE, USUAL = 0.1, 15.0, (1.0, 60.0)  # pictures a second
 HUNDREDTHS = 100  # of a second: the unit of time in a gif
 
 
-def check_film(file: Path, rate: float) -> None:
+def check_film(file: Path, rate: float | None = None, slow: float | None = None) -> None:
     """Raises InputError if this is no name of a film, no rate that a film can have, or nothing can encode it."""
     if file.suffix.lower() not in KINDS:
         raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
-    highest = 50 if file.suffix.lower() == ".gif" else 120
-    if not 0.1 <= rate <= highest:
-        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: 0.1 to {highest} pictures a second")
+    if rate is not None and slow is not None:
+        raise InputError("render: --rate beside --slow: each of them decides how fast the film is; allowed: one")
+    highest = _highest(file)
+    if rate is not None and not LOWEST <= rate <= highest:
+        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: {LOWEST:g} to {highest} pictures a second")
+    if slow is not None and not 0 < slow < float("inf"):
+        raise InputError(f"render: --slow {slow:g} is not allowed; allowed: a number > 0")
     if file.suffix.lower() != ".gif":
         from endotsr.sequences.film_file import encoder_of
 
         encoder_of(file)
+
+
+def film_rate(file: Path, times: list[float], duration: float, slow: float | None = None) -> float:
+    """Pictures a second with which a film takes `slow` times as long as the recording.
+
+    times      of the pictures, normalised
+    duration   seconds from time 0 to time 1; 0 = unknown
+    slow       default: 1, within USUAL pictures a second; 15 a second where times or duration give no speed
+
+    Raises: InputError for a speed that is asked for and unknown, or that the film cannot have.
+    """
+    seconds = (times[-1] - times[0]) * duration
+    if seconds <= 0:
+        if slow is not None:
+            unknown = (
+                "its pictures are not in the order of time" if duration else "the recording's frame rate is unknown"
+            )
+            raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures a second")
+        return UNKNOWN_RATE
+    own = (len(times) - 1) / seconds
+    if slow is None:
+        return min(max(own, USUAL[0]), min(USUAL[1], _highest(file)))
+    if not LOWEST <= own / slow <= _highest(file):
+        raise InputError(
+            f"render: --slow {slow:g} is {own / slow:.3g} pictures a second; allowed: --slow from"
+            f" {own / _highest(file):.3g} to {own / LOWEST:.3g} with {len(times)} pictures (--count), or --rate"
+        )
+    return own / slow
+
+
+def speed_in_words(times: list[float], duration: float, rate: float) -> str:
+    """How fast a film is beside the recording, as the end of a sentence; empty where that is unknown."""
+    seconds = (times[-1] - times[0]) * duration
+    return f", {rate * seconds / (len(times) - 1):.3g} times the speed of the recording" if seconds > 0 else ""
+
+
+def _highest(file: Path) -> int:
+    """The highest rate of a film, pictures a second."""
+    return 50 if file.suffix.lower() == ".gif" else 120
 
 
 def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:

@@ -83,6 +83,7 @@ def _about(scene: MovingScene) -> dict[str, Any]:
     shown = cameras[:1] if record.static_camera else cameras
     return {
         "unit": record.unit,
+        "duration": record.duration,
         "frames": {"names": record.names, "times": record.times},
         "cameras": [
             [*np.ravel(c.rotation).tolist(), *np.ravel(c.translation).tolist(), c.fx, c.fy, c.cx, c.cy] for c in shown

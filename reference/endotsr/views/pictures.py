@@ -26,7 +26,7 @@ from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.views.cameras import TURNING, pivot_depth_of
-from endotsr.views.film import check_film, write_film
+from endotsr.views.film import check_film, film_rate, write_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
 from endotsr.views.plan import PlannedView, ViewRequest, check_request, views_of
 
@@ -81,7 +81,7 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     return views_of(request, scene.record, scene.cameras, pivot_depth, default, scene.placement)
 
 
-def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
+def check_outputs(out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None) -> None:
     """Raises InputError if there is nothing to write to, or if a folder or a film cannot be written."""
     if out is None and film is None:
         raise InputError("render: --out DIR or --film FILE is missing: where the pictures are written")
@@ -89,8 +89,13 @@ def check_outputs(out: Path | None, film: Path | None, rate: float) -> None:
         check_folder_name(out, "pictures", film="--film FILE writes a film")
         refuse_existing(out)
     if film is not None:
-        check_film(film, rate)
+        check_film(film, rate, slow)
         refuse_unwritable(film)
+
+
+def rate_of(film: Path, scene: MovingScene, views: list[PlannedView], rate: float | None, slow: float | None) -> float:
+    """Pictures a second of a film of these views, see `film_rate`. Raises InputError."""
+    return rate or film_rate(film, [view.time for view in views], scene.record.duration, slow)
 
 
 def frames_of(

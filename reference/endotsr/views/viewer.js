@@ -334,7 +334,8 @@ const short = (number) => Number(number.toPrecision(4)).toString();
 function describe() {
   element("slider").value = state.time;
   const i = nearestFrame(state.time), frame = about.frames.names[i];
-  element("time").textContent = "frame " + (i + 1) + " of " + about.frames.names.length + ", t = " + state.time.toFixed(3);
+  element("time").textContent = "frame " + (i + 1) + " of " + about.frames.names.length + ", t = " + state.time.toFixed(3)
+    + (about.duration ? ", " + (state.time * about.duration).toFixed(2) + " s" : "");
   element("shown").textContent = (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame;
   clearTimeout(addressed);
   addressed = setTimeout(address, 200);
@@ -430,7 +431,7 @@ function tick(now) {
   const seconds = Math.min((now - before) / 1000, 0.1);
   before = now;
   if (state.playing) {
-    state.clock = ((state.layer === 3 ? state.clock : state.time) + state.speed * seconds / 4) % 1;
+    state.clock = ((state.layer === 3 ? state.clock : state.time) + state.speed * seconds / (about.duration || 4)) % 1;
     go(state.clock);
   }
   if (state.orbiting) {

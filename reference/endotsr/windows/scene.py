@@ -198,6 +198,7 @@ def _record(plan: WindowsRecord, records: list[SequenceRecord]) -> SequenceRecor
         train_index=[j for j, g in enumerate(frames) if g in trained],
         test_index=[j for j, g in enumerate(frames) if g not in trained],
         cameras=records[0].cameras,
+        duration=sum(record.duration for record in records) * plan.frames / sum(record.count for record in records),
     )
 
 

@@ -1,4 +1,4 @@
-"""`endotsr evaluate` with several methods: runs and folders of pictures in one table, with paired differences."""
+"""`endotsr evaluate` with several methods: runs and pictures in one table, with paired differences."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class Comparison(NamedTuple):
     """What is compared, and where the table goes."""
 
-    methods: tuple[str, ...]  # run folders, JSON files and folders of pictures, each PATH or NAME=PATH
+    methods: tuple[str, ...]  # run folders, JSON files, folders of pictures and videos, each PATH or NAME=PATH
     baselines: bool  # of the first method
     seed: int  # of the resampling
     sequence: str | None  # that folders of pictures show; None = that of the first run
@@ -64,10 +64,11 @@ def _metrics(
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
         return read_json(path / "metrics.json"), sequence
-    if not path.is_dir():
-        return read_json(path), sequence
     from endotsr.evaluation.lpips import load_lpips_weights
-    from endotsr.evaluation.pictures import find_pictures, measure_pictures
+    from endotsr.evaluation.pictures import find_pictures, is_video, measure_pictures
+
+    if not path.is_dir() and not is_video(path):
+        return read_json(path), sequence
 
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None
