@@ -44,10 +44,25 @@ def test_html_escapes_heads_and_keeps_cells():
 
 def test_units_and_sentences_in_html():
     text = html_table(["name", "PSNR, dB", "why"], [["x", "1", "<b>a sentence</b> that is too long for one line"]])
-    assert "PSNR,\u00a0dB" in text and '<td class="words"><b>' in text and "<td>1</td>" in text
+    assert (
+        "PSNR,\u00a0dB" in text
+        and '<td class="words" data-head="why"><b>' in text
+        and '<td data-head="PSNR, dB">1</td>' in text
+    )
     assert '<th scope="col" class=words>why</th>' in text and '<th scope="col">name</th>' in text
 
 
 def test_few_columns_stand_below_the_name_of_their_row_on_a_telephone():
     few, many = (html_table([str(k) for k in range(n)], [["x"] * n]) for n in (7, 8))
-    assert 'class="scroll few" style="--cells:6"' in few and 'class="scroll"' in many
+    assert f'class="scroll few" style="--columns:{" ".join(["minmax(0,18fr)"] * 6)}"' in few
+    assert 'class="scroll"' in many
+
+
+def test_columns_whose_words_do_not_fit_side_by_side_stand_one_below_the_other_on_a_telephone():
+    rows = [["x", "0.123456", "a threshold"], ["y", "1", ""]]
+    assert "scroll few" in html_table(["a", "b", "c"], rows)
+    assert 'class="scroll listed"' in html_table(["a", "b", "c"], [["x", "1", "a" * 44]])
+    assert 'class="scroll listed"' in html_table(
+        ["a", "b", "c"], [["x", "1", "a sentence of more words than a line has"]]
+    )
+    assert 'class="scroll listed"' in html_table(["a", "b" * 46, "c"], rows)

@@ -9,7 +9,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 LONGEST_VALUE = 32  # characters of a cell that stands on one line
-FEW = 6  # columns of numbers that stand side by side on a telephone
+FEW = 6  # columns after the first of a table that does not scroll on a telephone
+# Pixels of such a row, of the edges of a cell, of a letter of a cell and of a head (`report.parts.STYLE`, at 390 px).
+ROW, EDGES, LETTER, HEAD_LETTER = 355, 10, 7.9, 7.4
 
 
 def plain(columns: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = (0,), rule: bool = False) -> str:
@@ -40,9 +42,26 @@ def _is_sentence(content: str) -> bool:
     return len(re.sub("<[^>]*>", "", content)) > LONGEST_VALUE
 
 
-def _cell(content: str) -> str:
-    """A cell; one with a sentence in it breaks its lines and begins at the left."""
-    return f'<td class="words">{content}</td>' if _is_sentence(content) else f"<td>{content}</td>"
+def _cell(content: str, column: str) -> str:
+    """A cell, which names its column; one with a sentence in it breaks its lines and begins at the left."""
+    words = ' class="words"' if _is_sentence(content) else ""
+    return f'<td{words} data-head="{html.escape(column)}">{content}</td>'
+
+
+def _narrow(heads: list[str], rows: list[list[str]]) -> str:
+    """The class of a table of few columns, and the widths of its columns on a telephone."""
+    widths = [
+        max(HEAD_LETTER * _longest(head), *(LETTER * _longest(row[k]) for row in rows), 0) + EDGES
+        for k, head in enumerate(heads)
+    ]
+    if sum(widths) > ROW or any(_is_sentence(cell) for row in rows for cell in row):
+        return " listed"
+    return f' few" style="--columns:{" ".join(f"minmax(0,{width:.0f}fr)" for width in widths)}'
+
+
+def _longest(content: str) -> int:
+    """Letters of the longest word of a cell or a head."""
+    return max(map(len, html.unescape(re.sub("<[^>]*>", " ", content)).split()), default=0)
 
 
 def unbroken(name: str) -> str:
@@ -55,7 +74,8 @@ def html_table(
 ) -> str:
     """A table whose every column is visible on a narrow page (see `report.parts.STYLE`).
 
-    Up to FEW columns after the first stand below the name of their row there. A table with more of them scrolls
+    Up to FEW columns after the first stand there below the name of their row: side by side where none holds a sentence
+    and the longest words fit, and otherwise one below the other with their heads. A table with more of them scrolls
     sideways, and its first column stays visible.
 
     columns, caption   text, which is escaped
@@ -73,8 +93,9 @@ def html_table(
     body = []
     for position, (first, *rest) in enumerate(lines):
         kind = f' class="{kinds[position]}"' if position < len(kinds) and kinds[position] else ""
-        body.append(f'<tr{kind}><th scope="row">{first}</th>{"".join(map(_cell, rest))}</tr>')
+        cells = "".join(_cell(content, column) for content, column in zip(rest, names[1:], strict=True))
+        body.append(f'<tr{kind}><th scope="row">{first}</th>{cells}</tr>')
     title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
-    few = f' few" style="--cells:{len(names) - 1}' if 2 <= len(names) <= FEW + 1 else ""
+    few = _narrow(names[1:], [line[1:] for line in lines]) if 2 <= len(names) <= FEW + 1 else ""
     table = f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
     return f'<div class="scroll{few}">{table}</div>'
