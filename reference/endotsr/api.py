@@ -346,7 +346,7 @@ class Run:
     def export(self, path: str | Path, *, times: tuple[float, ...] = ()) -> str:
         """Write Gaussians for other programs, as `endotsr export`; returns a line on what was written.
 
-        path    .ply of one time, .npz of the whole scene, or a folder to create
+        path    .ply of one time, .glb with points that move, .npz of the whole scene, or a folder to create
         times   normalised, in [0, 1]
 
         Raises: InputError for a name or a time that is not allowed.

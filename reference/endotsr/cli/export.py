@@ -16,8 +16,8 @@ class ExportOptions:
 
     SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows gives .ply files, each of its windows the
     rest. The ending of --out chooses what is written: `.npz` is a slim model of the whole scene, `.html` is a page with
-    the moving scene, `.ply` is one time of it, and a name without an ending is a folder with one .ply file for every
-    time.
+    the moving scene, `.glb` holds points that move, `.ply` is one time of the scene, and a name without an ending is a
+    folder with one .ply file for every time.
 
     The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
     kept at key times, between which the page interpolates; the colours are those that the observed camera sees.
@@ -26,7 +26,7 @@ class ExportOptions:
     scene: Annotated[Path, Option("SCENE", positional=True)]
     """run folder, slim model (.npz) or 3DGS file (.ply)"""
     out: Annotated[Path, Option("FILE|DIR")]
-    """FILE.ply, FILE.npz, PAGE.html, or a folder to create"""
+    """FILE.ply, FILE.glb, FILE.npz, PAGE.html, or a folder to create"""
     content: Literal["gaussians", "points", "mesh"] = "gaussians"
     """content of a .ply file: Gaussians as 3DGS viewers read them, centres with colours, or the visible surface"""
     times: Annotated[tuple[float, ...], Option("T [T ...]")] = ()

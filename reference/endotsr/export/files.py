@@ -1,10 +1,11 @@
-"""What `endotsr export` writes: a slim model, one ply file, or a folder of them, chosen by the name of the output."""
+"""What `endotsr export` writes: a slim model, one ply file, animated points, or a folder of ply files, by its name."""
 
 import re
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.export.gltf import write_animated_points
 from endotsr.export.mesh import surface
 from endotsr.export.model import save_slim_model
 from endotsr.export.placement import placed_points, placed_scene
@@ -17,8 +18,8 @@ from endotsr.runs.folder import refuse_existing
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
 ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # of a file; `run.2` and `scale_0.5` are names of folders
 WRITTEN = (
-    "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.npz (a slim model), or a name without an ending"
-    " (a folder of .ply files)"
+    "allowed: FILE.ply (Gaussians, points or a mesh at one time), FILE.glb (animated points), FILE.npz (a slim"
+    " model), or a name without an ending (a folder of .ply files)"
 )
 
 
@@ -52,6 +53,7 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
     """Write a scene to `out`, as the ending of its name says; returns one line on what was written.
 
     .npz    slim model; a choice of times or content is refused
+    .glb    points that move, at all frames if no times are chosen
     .ply    one time, the first frame of the sequence if none is chosen
     none    a folder with one ply file for each time; all frames if none is chosen
     Raises: InputError for another ending, for times that do not exist, and for a place that cannot be written.
@@ -63,6 +65,8 @@ def export(scene: MovingScene, out: Path, times: Times = ALL_TIMES, content: Con
     ending = out.suffix.lower()
     if ending == ".npz":
         return _slim(scene, out, times, content)
+    if ending == ".glb":
+        return _animated(scene, out, times, content)
     if ending == ".ply":
         return _one_time(scene, out, times, content)
     check_folder_name(out, "ply files", written=WRITTEN)
@@ -83,6 +87,15 @@ def _slim(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
     whole = scene.folder.checkpoint.stat().st_size if scene.folder else None
     compared = f", {size / whole:.1%} of the checkpoint" if whole else ""
     return f"{out}: {model.gaussians.count} Gaussians, {size / 1e6:.2f} MB{compared}"
+
+
+def _animated(scene: MovingScene, out: Path, times: Times, content: Content) -> str:
+    if content.kind == "mesh":
+        raise InputError(f"{out}: a .glb holds points, and a mesh has other triangles at each time; allowed: a folder")
+    wanted = [time for time, _, _, _ in chosen_times("export", times, scene.record, default="all")]
+    refuse_unwritable(out)
+    count = write_animated_points(out, scene, wanted, content.least_opacity, content.taken_out)
+    return f"{out}: {count} points at {len(wanted)} times, {out.stat().st_size / 1e6:.2f} MB"
 
 
 def _one_time(scene: MovingScene, out: Path, times: Times, content: Content) -> str:

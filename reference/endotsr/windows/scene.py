@@ -160,7 +160,7 @@ def open_any(path: Path) -> MovingScene:
 
 def refuse_one_set(path: Path, out: Path) -> None:
     """Raises InputError for a slim model or a page of a run of windows: each holds one set of Gaussians."""
-    if is_windowed(path) and out.suffix.lower() in (".npz", ".html", ".htm"):
+    if is_windowed(path) and out.suffix.lower() in (".npz", ".glb", ".html", ".htm"):
         raise InputError(
             f"{out}: holds one set of Gaussians, and {path} has one in each window; allowed: .ply files, or the run of"
             f" a window, {path / FOLDER / '000'}"
