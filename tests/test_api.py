@@ -175,6 +175,26 @@ def test_the_callback_stops_and_the_run_resumes_to_the_same_bits(sequence, run, 
         assert without_seconds(half.log) == without_seconds(run.log)
 
 
+def test_a_callback_reaches_the_model_of_each_iteration(sequence, run):
+    """What it renders is the scene of that moment and changes no bit of the training."""
+    seen = []
+
+    def watch(now):
+        view = now.render(0.3)
+        seen.append(
+            (now.iteration, now.log[-1]["iteration"], now.log[-1]["gaussians"], now.model.gaussians.count, view)
+        )
+        if now.iteration == 8:
+            raise endotsr.StopTraining
+
+    watched = tiny(sequence, on_run=watch)
+    assert [entry[:2] for entry in seen] == [(k, k) for k in range(1, 9)]
+    assert [entry[2] for entry in seen] == [entry[3] for entry in seen]
+    assert arrays(watched) == arrays(run) and without_seconds(watched.log) == without_seconds(run.log)
+    assert np.array_equal(seen[-1][4].colour, run.render(0.3).colour)
+    assert len({entry[4].colour.tobytes() for entry in seen}) == 8
+
+
 def test_an_error_of_the_callback_is_raised(sequence):
     with pytest.raises(ZeroDivisionError):
         tiny(sequence, on_iteration=lambda entry: 1 / 0)

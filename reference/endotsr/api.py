@@ -61,11 +61,12 @@ if TYPE_CHECKING:
 Component = Literal["appearance", "spectral_motion"]
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
 OnIteration = Callable[[dict[str, Any]], object]
+OnRun = Callable[["Run"], object]
 OnMessage = Callable[[str], object]
 
 
 class StopTraining(Exception):
-    """Raised by an `on_iteration` callback: the training ends after this iteration, and the run is returned."""
+    """Raised by a callback, `on_iteration` or `on_run`: the training ends after this iteration; the run is returned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +137,7 @@ def train(
     preset: str | None = None,
     iterations: int | None = None,
     on_iteration: OnIteration | None = None,
+    on_run: OnRun | None = None,
     on_message: OnMessage = print,
     effects: Literal["everything", "auto"] = "everything",
     **sections: Mapping[str, Any],
@@ -148,6 +150,8 @@ def train(
     on_iteration   called after every iteration with its log entry: iteration, frame, loss, the terms of the loss,
                    gaussians, seconds, and every tenth time psnr. `raise StopTraining` in it ends the training. What it
                    returns is ignored
+    on_run         called after it with the run, whose `model` and `render` are those of this iteration. Its arrays
+                   change with the next one: copy what is kept, and write to none of them
     on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
     effects        "auto" trains only what the clip calls for, as `train --effects auto`; keys in `sections` stay
 
@@ -179,7 +183,7 @@ def train(
     record = new_record(["endotsr.train"], config, threads, about) | found
     seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
-    return run.resume(on_iteration, on_message)
+    return run.resume(on_iteration, on_message, on_run)
 
 
 def _called_for(
@@ -374,7 +378,9 @@ class Run:
         truth = sources.true_positions_of(self._source or str(about["source"]), simulator, self.config, sequence)
         return measure_model(self.model, sequence, weights, truth)[0]
 
-    def resume(self, on_iteration: OnIteration | None = None, on_message: OnMessage = print) -> "Run":
+    def resume(
+        self, on_iteration: OnIteration | None = None, on_message: OnMessage = print, on_run: OnRun | None = None
+    ) -> "Run":
         """Train on to the planned number of iterations; returns this run. A finished run stays as it is.
 
         The result is that of an uninterrupted training, bit for bit. Callbacks and errors are those of `train`.
@@ -398,6 +404,11 @@ class Run:
             last = tick
             if on_iteration is not None:
                 on_iteration(self.log[-1])
+            if on_run is not None:
+                self.model = self.model._replace(
+                    gaussians=state.gaussians, iteration=state.iteration, frames=state.frames
+                )
+                on_run(self)
 
         try:
             compile_ahead(self.config, on_message)
