@@ -26,6 +26,7 @@ from marks import read_json, write_marked
 
 from endotsr.config import DEMO, PAPER
 from endotsr.errors import InputError
+from endotsr.report.style import save
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import dated, now
 
@@ -201,7 +202,10 @@ def main(words: list[str], page: Path = PAGE) -> None:
             write_json(file, dated(COMMANDS[what](rest)))
             kept.finished(file)
         else:
-            write_marked(page, fragments(read()), "effects")
+            found = read()
+            write_marked(page, fragments(found), "effects")
+            if "train" in found:
+                save(effects_parts.answer_figure(found["train"]), RESULTS / "effects.svg")
     except InputError as error:
         sys.exit(f"error: {error}")
 

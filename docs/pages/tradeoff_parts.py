@@ -31,6 +31,7 @@ def fragments(
     """
     omitted = result["omitted"] | OMITTED  # reasons are facts of the present program, not of the measurement
     return {
+        "promise": promise(result, others),
         "advice": _numbered(advice(result)),
         "made": made(result),
         "front": markdown(COLUMNS, front_rows(result)),
@@ -40,6 +41,46 @@ def fragments(
         "scenes": scenes(result, others),
         "training": "\n\n".join(training(name, t) for name, t in trainings.items()) or "Not measured yet.",
     }
+
+
+def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """What a smaller error costs, in one sentence, and the setting that is right to 8 bits on every scene."""
+    by_name, chosen = {p["name"]: p for p in result["points"]}, eight_bit_setting(result)
+    if chosen is None:
+        return "No setting of float32 is right to the last of 8 bits."
+    paper, exact = (by_name[result["presets"][name]] for name in ("paper", "exact"))
+    smaller = paper["error"]["max"] / chosen["error"]["max"]
+    more = 100 * (_seconds(result, chosen) / _seconds(result, paper) - 1)
+    return (
+        f"**An error {smaller:.0f} times smaller than that of `paper` costs {more:.0f} % more time for a frame; the "
+        f"exact picture takes {_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
+        f"{_everywhere(result, others)}"
+    )
+
+
+def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
+    """The float32 setting with the fewest visits that is right to half a step of 8 bit on every measured scene."""
+    every = {"simulated": result} | others
+    found: dict[str, list[tuple[float, float]]] = {}  # setting -> (time, visits) over those of `paper`, by scene
+    for scene in every.values():
+        by_name = {p["name"]: p for p in scene["points"]}
+        paper = by_name[scene["presets"]["paper"]]
+        for point in (by_name[name] for name in scene["joint"]):
+            if point["setting"]["precision"] == "float32" and point["error"]["max"] <= scene["lines"]["eight_bit"]:
+                ratios = _seconds(scene, point) / _seconds(scene, paper), point["visits"] / paper["visits"]
+                found.setdefault(point["name"], []).append(ratios)
+    kept = {name: ratios for name, ratios in found.items() if len(ratios) == len(every)}
+    if len(every) < 2 or not kept:
+        return ""
+    best = min(kept, key=lambda name: (sum(visits for _, visits in kept[name]), name))
+    listed = ", ".join(f"{scene} {100 * (r - 1):+.0f} %" for scene, (r, _) in zip(every, kept[best], strict=True))
+    return f" On all {len(every)} scenes of this page, {best} is right to the last of 8 bits; more time: {listed}."
+
+
+def _seconds(scene: dict[str, Any], point: dict[str, Any]) -> float:
+    """Shortest time of a frame among the settings of the sweep with the same largest error."""
+    same = [p for p in scene["points"] if p["name"] in scene["joint"] and p["error"]["max"] == point["error"]["max"]]
+    return min(p["forward"]["median"] for p in (point, *same))
 
 
 def preset_lines(result: dict[str, Any]) -> list[str]:

@@ -5,13 +5,15 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
 RESULTS, PAGE = ROOT / "docs" / "results", ROOT / "docs" / "hard_cases.md"
 sys.path.insert(0, str(RESULTS))
 from gallery import CASES, DTYPES  # noqa: E402
-from hard_cases import END, START, gallery, measure, plain  # noqa: E402
+from hard_cases import END, FIRST, LAST, START, gallery, measure, plain, promise  # noqa: E402
+from hard_cases_pictures import measured  # noqa: E402
 
 UNITS = {"float64": 2.0**-53, "float32": 2.0**-24}
 IDS = [case.run.__name__ for case in CASES]
@@ -48,3 +50,18 @@ def test_every_case_of_the_gallery_is_in_the_catalogue():
     catalogue = PAGE.read_text(encoding="utf-8")
     for case in CASES:
         assert f"\n| {case.name} |" in catalogue, case.name
+
+
+def test_the_first_sentence_of_the_page_is_what_the_gallery_says(rows):
+    shown = PAGE.read_text(encoding="utf-8").partition(FIRST)[2].partition(LAST)[0]
+    whole = lambda text: re.sub(r"[\d.]+e-\d+", "#", text.strip())  # the last digit may differ between machines
+    assert whole(shown) == whole(promise(list(rows.values())))
+
+
+def test_the_three_pictures_fail_above_and_not_below():
+    found = measured()
+    assert all(np.isfinite(ours).all() for _, ours in found.values())
+    usual = {name: pair[0] for name, pair in found.items()}
+    assert np.isnan(usual["Opaque Gaussian"]).sum() > 300 and np.isnan(usual["NaN under the instrument"]).sum() > 300
+    textbook, ours = found["Needle"]
+    assert np.abs(textbook - ours).max() > 0.5
