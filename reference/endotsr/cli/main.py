@@ -41,14 +41,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _main(words: list[str]) -> int:
-    if not words or words[0] in ("-h", "--help"):
-        print(_overview())
+    if _answered(words):
         return 0
-    if words[0] == "--version":
-        print(f"endotsr {__version__}")
-        return 0
-    if words[0].partition("=")[0] == "--completion":
-        return _completion(words)
     try:
         with signals_stop():
             code = _command(words[0])(words[1:])
@@ -79,6 +73,23 @@ def _main(words: list[str]) -> int:
         return _fail(f"not enough memory; {LESS_MEMORY.get(words[0], OTHER_PROGRAMS)}")
 
 
+def _answered(words: list[str]) -> bool:
+    """Whether the words ask for something beside a command, which is then printed. Raises InputError."""
+    if not words or words[0] in ("-h", "--help"):
+        print(_overview())
+    elif words[0] == "--version":
+        print(f"endotsr {__version__}")
+    elif words[0].partition("=")[0] == "--completion":
+        print(_completion(words), end="")
+    elif words[0] == "--cache":
+        from endotsr.cli.parts.kept import kept
+
+        print(*kept(words[1:]), sep="\n")
+    else:
+        return False
+    return True
+
+
 def _is_closed_pipe(error: OSError) -> bool:
     """On Windows a write to a pipe that was closed is an invalid argument, without the name of a file."""
     invalid = os.name == "nt" and error.errno == errno.EINVAL and error.filename is None
@@ -96,15 +107,14 @@ def _command(name: str):
     return importlib.import_module(f"endotsr.cli.{name}").run
 
 
-def _completion(words: list[str]) -> int:
-    """Print the script that completes commands and options in a shell."""
+def _completion(words: list[str]) -> str:
+    """The script that completes commands and options in a shell."""
     from endotsr.cli.parts.completion import SCRIPTS
 
     shell = "".join([words[0].partition("=")[2], *words[1:]])
     if shell not in SCRIPTS:
         raise InputError(f"--completion {shell!r} is not allowed; allowed: {', '.join(SCRIPTS)}")
-    print(SCRIPTS[shell](), end="")
-    return 0
+    return SCRIPTS[shell]()
 
 
 def _fail(message: str) -> int:
@@ -127,6 +137,7 @@ def _overview() -> str:
             "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
             "  --version    the version",
             "  --completion {bash,zsh,fish}   a script that completes commands and options in this shell",
+            "  --cache [clear]   where compiled kernels are kept, and how large they are; `clear` removes them",
             "  -q, --quiet; --log-file FILE   print nothing but errors; also write what is printed (any command)",
         ]
     )

@@ -20,8 +20,8 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 import tempfile
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -96,10 +96,10 @@ def _passing_folder(wanted: Path) -> Path:
     folder = tempfile.mkdtemp(prefix="endotsr-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     os.environ["NUMBA_CACHE_DIR"] = folder
-    warnings.warn(
-        f"{wanted} cannot be written: kernels are compiled anew at every start; "
-        "set NUMBA_CACHE_DIR to a folder that can be written",
-        stacklevel=1,
+    print(
+        f"endotsr: warning: {wanted} cannot be written: kernels are compiled anew at every start;"
+        " set NUMBA_CACHE_DIR to a folder that can be written",
+        file=sys.stderr,
     )
     return Path(folder)
 
