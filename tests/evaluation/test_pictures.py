@@ -80,7 +80,7 @@ def test_a_video_of_other_frames_is_refused(sequence, tmp_path):
     ):
         find_pictures(tmp_path / "a.mp4", sequence)
     write_video(tmp_path / "b.mp4", [np.zeros((16, 48, 3), np.uint8)] * 2, 25.0, lossless=True)
-    with pytest.raises(InputError, match=r"an array of 16x48x3; allowed: a picture of 48x32"):
+    with pytest.raises(InputError, match=r"an array of 3x16x48; allowed: a picture of 48x32"):
         measure_pictures(find_pictures(tmp_path / "b.mp4", sequence), sequence)
 
 
@@ -120,7 +120,7 @@ def test_folders_that_cannot_be_paired_are_refused(names, said, sequence, tmp_pa
 
 
 def test_a_missing_folder_is_refused(sequence, tmp_path):
-    with pytest.raises(InputError, match="folder of pictures not found"):
+    with pytest.raises(InputError, match="folder of pictures, or video, not found"):
         find_pictures(tmp_path / "none", sequence)
 
 

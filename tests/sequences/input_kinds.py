@@ -117,9 +117,12 @@ def folder_of(frames, *words: str, ending="png", change=lambda folder: None):
     return make
 
 
-def masked(frames, *words: str, count=12):
+def masked(frames, *words: str, count=12, change=lambda folder: None):
+    changed = change
+
     def change(folder: Path) -> None:
         files(folder, "m", frames[:count])
+        changed(folder / "m")
 
     def make(folder: Path) -> list[str]:
         return [*folder_of(pictures(), change=change)(folder), "--masks", str(folder / "m"), *words]
@@ -145,6 +148,106 @@ def united_masks(folder: Path) -> list[str]:
 
 def half_excluded(folder: Path) -> bool:
     return abs((read_png(folder / "o/masks/000003.png") > 0).mean() - 40 / WIDTH) < 0.01
+
+
+def rewritten(folder: Path, change, ending="png", **how) -> None:
+    """Every picture of a folder again, changed by Pillow."""
+    from PIL import Image
+
+    for k, file in enumerate(sorted(folder.iterdir())):
+        with Image.open(file) as opened:
+            made = change(opened.copy(), k)
+        file.unlink()
+        made.save(file.with_suffix(f".{ending}"), **how)
+
+
+def transparent(columns: int):
+    """The first columns of the pictures are transparent."""
+
+    def changed(opened, _):
+        from PIL import Image
+
+        alpha = np.full(opened.size[::-1], 255, np.uint8)
+        alpha[:, :columns] = 0
+        opened.putalpha(Image.fromarray(alpha))
+        return opened
+
+    return lambda folder: rewritten(folder / "clip", changed)
+
+
+def as_transparency(folder: Path) -> None:
+    """Masks as drawing programs write them: black, and transparent where nothing is marked."""
+    from PIL import Image
+
+    def changed(opened, _):
+        black = Image.new("RGB", opened.size)
+        black.putalpha(opened)
+        return black
+
+    rewritten(folder, changed)
+
+
+def palette(folder: Path) -> None:
+    rewritten(folder / "clip", lambda opened, _: opened.quantize(256))
+
+
+def cmyk(folder: Path) -> None:
+    rewritten(folder / "clip", lambda opened, _: opened.convert("CMYK"), "jpg", quality=95)
+
+
+def converted(ending: str):
+    return lambda folder: rewritten(folder / "clip", lambda opened, _: opened, ending)
+
+
+def every_second_jpg(folder: Path) -> None:
+    for file in sorted((folder / "clip").iterdir())[::2]:
+        pixels = read_png(file)
+        file.unlink()
+        write_jpeg(file.with_suffix(".jpg"), pixels)
+
+
+def without_zeros(folder: Path) -> None:
+    for file in sorted((folder / "clip").iterdir()):
+        file.rename(file.with_name(f"{int(file.stem)}.png"))
+
+
+def two_streams(folder: Path) -> list[str]:
+    """Two views as two streams of one file."""
+    import av
+
+    with av.open(str(folder / "a.mkv"), "w") as container:
+        streams = [container.add_stream("libx264", rate=25) for _ in range(2)]
+        for stream in streams:
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for shown in pictures():
+            for k, stream in enumerate(streams):
+                moved = np.roll(shown, -20 * k, axis=1)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(moved, format="rgb24")))
+        for stream in streams:
+            container.mux(stream.encode())
+    return prepare("a.mkv")(folder)
+
+
+def high_definition(tagged: bool):
+    """Pictures of 1280x720 with the matrix of BT.709, which the file states or not."""
+
+    def make(folder: Path) -> list[str]:
+        import av
+
+        with av.open(str(folder / "a.mp4"), "w") as container:
+            stream = container.add_stream("libx264", rate=25, options={"qp": "4"})
+            stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
+            if tagged:
+                stream.codec_context.colorspace = 1
+            for i in range(3):
+                frame = av.VideoFrame.from_ndarray(picture(i, 1280, 720), format="rgb24")
+                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
+                frame.pts = i
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+        return prepare("a.mp4")(folder)
+
+    return make
 
 
 def exif(folder: Path) -> None:

@@ -61,15 +61,13 @@ def write_animated_points(
     """
     if any(b <= a for a, b in itertools.pairwise(times)):
         raise InputError(f"{file}: an animation needs ascending times; allowed: each after the one before")
-    moments = [point_vertices(placed_scene(scene.at(t, taken_out), scene.placement), least_opacity) for t in times]
-    if not moments[0].size:
+    shown = [point_vertices(placed_scene(scene.at(t, taken_out), scene.placement), least_opacity) for t in times]
+    if not shown[0].size:
         raise InputError(f"{file}: no Gaussian has an opacity of {least_opacity:g}; allowed: a smaller --opacity")
-    if 12 * moments[0].size * (len(times) + 1) >= LARGEST:
-        raise InputError(
-            f"{file}: {moments[0].size} points at {len(times)} times need more than 4 GB; allowed: --count"
-        )
-    points = [np.stack([moment[axis] for axis in "xyz"], axis=1) for moment in moments]
-    levels = np.stack([moments[0][name] for name in ("red", "green", "blue")], axis=1)
+    if 12 * shown[0].size * (len(times) + 1) >= LARGEST:
+        raise InputError(f"{file}: {shown[0].size} points at {len(times)} times need more than 4 GB; allowed: --count")
+    points = [np.stack([each[axis] for axis in "xyz"], axis=1) for each in shown]
+    levels = np.stack([shown[0][name] for name in ("red", "green", "blue")], axis=1)
     record = scene.record
     seconds = np.multiply(times, record.duration or record.count / USUAL_RATE)
     content = _glb(points, levels, (seconds - seconds[0]).astype("<f4"), times, record.unit)

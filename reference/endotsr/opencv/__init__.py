@@ -73,16 +73,22 @@ def decoded(data: bytes, name: object, failure: str) -> Array:
     if pixels.ndim == 3 and pixels.shape[2] == 1:
         pixels = pixels[:, :, 0]
     if pixels.ndim == 3:
-        pixels = pixels[:, :, 2::-1]  # BGR(A) to RGB; a fourth channel is transparency and is dropped
+        if pixels.shape[2] == 4 and pixels.dtype.kind == "u" and pixels[:, :, 3].min() < np.iinfo(pixels.dtype).max:
+            raise InputError(
+                f"{name}: has transparent pixels, and what they hide is not shown; allowed: pictures without"
+                " transparency (a mask that is stored as transparency is stored as black and white)"
+            )
+        pixels = pixels[:, :, 2::-1]  # BGR(A) to RGB
     return np.ascontiguousarray(pixels)
 
 
 def read_png(path: Path) -> Array:
     """Pixels of a PNG file.
 
-    returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored; transparency is dropped
+    returns  (H, W) grey or (H, W, 3) RGB, uint8 or uint16 as stored
 
-    Raises:  InputError naming the file if it is missing, no regular file, not a PNG, truncated, damaged or too large.
+    Raises:  InputError naming the file if it is missing, no regular file, not a PNG, truncated, damaged, too large, or
+             not opaque.
              OpenCV decodes a truncated file into a half-grey picture without an error, so the chunks and the number
              of compressed pixels are checked first.
     """

@@ -29,6 +29,7 @@ STARTS = {
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
 HIDDEN = ("vp8",)  # codecs with packets that hold no picture of their own: their pictures are counted by decoding
 WIDE_RANGE = {16: "PQ", 18: "HLG"}  # transfer functions of high dynamic range
+UNSTATED, HIGH_DEFINITION = 2, 576  # matrix of colour that a file does not state; rows, above which players take BT.709
 PROBED = 3  # pictures that are decoded to learn what the header does not say
 
 
@@ -44,6 +45,7 @@ class VideoFacts(NamedTuple):
     interlaced: bool
     codec: str
     pixel_shape: float  # width / height of a pixel
+    remarks: tuple[str, ...] = ()  # what a reader of the file has to know beside this, in words
 
 
 def video_facts(path: Path) -> VideoFacts:
@@ -63,6 +65,7 @@ def video_facts(path: Path) -> VideoFacts:
         _refuse_wide_range(first[0], path)
         width, height, turn = first[0].width, first[0].height, round(first[0].rotation) % 360
         interlaced = any(frame.interlaced_frame for frame in first)
+        remarks = _remarks(first[0], len(container.streams.video))
     times = _times(path, by_decoding=interlaced or codec in HIDDEN)
     if len(times) < stated:
         raise InputError(
@@ -76,7 +79,19 @@ def video_facts(path: Path) -> VideoFacts:
         rate = (len(times) - 1) / float(times[-1] - times[0])
     found = times - times[0] if known else None
     usable = rate if np.isfinite(rate) and rate > 0 else None
-    return VideoFacts(width, height, len(times), usable, found, turn, interlaced, codec, shape)
+    return VideoFacts(width, height, len(times), usable, found, turn, interlaced, codec, shape, remarks)
+
+
+def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
+    """Choices that the file leaves open."""
+    found = []
+    if streams > 1:
+        found.append(f"{streams} streams of pictures: one is read; for a stereo pair, export each as a file of its own")
+    if any(part.is_alpha for part in frame.format.components):
+        found.append("its transparency is left out")
+    if int(frame.colorspace) == UNSTATED and not frame.format.is_rgb and frame.height > HIGH_DEFINITION:
+        found.append("states no matrix of colour: that of BT.601 is taken, players take BT.709 at this size")
+    return tuple(found)
 
 
 def _refuse_wide_range(frame: Any, path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.scenes import cut_findings, halves_finding
 from endotsr.sequences.files import frame_numbers, shortened
 
 SMALL = 8  # pixels between the sampled rows and columns
@@ -64,6 +65,8 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
         if readable[i - 1] and readable[i] and facts[i].small.shape == facts[i - 1].small.shape:
             found += _of_neighbours(facts[i - 1], facts[i], float(means[i] / means[i - 1]), where, i)
     found += _of_clip(facts, means, where)
+    grey = [fact.small.mean(axis=2) for fact in facts]
+    found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
     comb = float(np.median([fact.comb for fact in facts])) if facts else 0.0
     if comb > WOVEN:
         what = f"neighbouring rows differ {comb:.2f} times as much as rows two apart"

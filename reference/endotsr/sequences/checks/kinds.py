@@ -51,6 +51,10 @@ KINDS: dict[str, Kind] = {
                              " time stands still there", LEAVE_OUT),
     "exposure-jump": Kind("warning", "the colour of the tissue follows the camera there",
                           "fit exposures (model.exposure = true), or cut the clip with --frames"),
+    "another-scene": Kind("warning", "a training fits one scene, and nothing connects what lies before and after a cut",
+                          "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
+    "two-views": Kind("warning", "a stereo pair in one picture is no scene",
+                      "name it: endotsr prepare --stereo side_by_side or stacked"),
     "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
     # masks
     "no-masks": Kind("note", "instruments count as tissue",

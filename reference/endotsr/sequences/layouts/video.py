@@ -78,6 +78,7 @@ def _notes(facts: VideoFacts, rate: float | None, path: Path) -> list[str]:
     found = [
         f"{path.name}: {facts.count} pictures of {facts.width}x{facts.height}, {facts.codec}, {rate or 0:g} a second"
     ]
+    found += [f"{path.name}: {remark}" for remark in facts.remarks]
     if facts.interlaced:
         found.append(f"{path.name} is interlaced: deinterlaced, one picture for the two fields (bwdif)")
     if facts.pixel_shape != 1:

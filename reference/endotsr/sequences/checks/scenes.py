@@ -1,0 +1,74 @@
+"""Checks of what the pictures show: one scene, and one view of it.
+
+In: small grey pictures of the frames. Out: findings. A clip that was joined of two takes, and a stereo pair that is
+taken for one picture, are each trained without an error and give a scene that means nothing.
+"""
+
+import numpy as np
+
+from endotsr.kernels.arrays import BoolArray, FloatArray
+from endotsr.sequences.checks.findings import Finding, finding
+
+ALIKE = 0.6  # correlation of the halves of the pictures: two views; published clips of one view stay within 0.3
+OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # of neighbouring frames: below the one, where the others are above the other
+FARTHEST = 6  # parts of the width of a half: one of them is the largest shift between two views
+
+
+def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, where: str) -> list[Finding]:
+    """Frames with which another scene begins, in a clip whose neighbouring frames are alike elsewhere.
+
+    grey       (h, w) of every frame, reduced
+    readable   frames that are neither black nor white
+    """
+    pairs = [i for i in range(1, len(grey)) if readable[i - 1] and readable[i] and grey[i].shape == grey[i - 1].shape]
+    alike = {i: _correlation(grey[i - 1], grey[i]) for i in pairs}
+    usual = float(np.median(list(alike.values()) or [0.0]))
+    if usual < SAME_SCENE:
+        return []
+    found = []
+    for i, value in alike.items():
+        if value < OTHER_SCENE:
+            what = f"{names[i]} does not resemble {names[i - 1]} (correlation {value:.2f}, usually {usual:.2f})"
+            found.append(finding("another-scene", where, what, i))
+    return found
+
+
+def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:
+    """Pictures that seem to hold two views of one moment.
+
+    grey   (h, w) of every frame, reduced
+    """
+    large = [picture for picture in grey if min(picture.shape) >= 2 * FARTHEST]
+    for layout, halves in (("side by side", _beside), ("stacked", _stacked)):
+        alike = float(np.median([_shifted_correlation(*halves(picture)) for picture in large] or [0.0]))
+        if alike > ALIKE:
+            what = f"the halves of the pictures, {layout}, resemble each other (correlation {alike:.2f})"
+            return [finding("two-views", where, what)]
+    return []
+
+
+def _beside(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
+    width = picture.shape[1] // 2
+    return picture[:, :width], picture[:, -width:]
+
+
+def _stacked(picture: FloatArray) -> tuple[FloatArray, FloatArray]:
+    height = picture.shape[0] // 2
+    return picture[:height], picture[-height:]
+
+
+def _shifted_correlation(one: FloatArray, other: FloatArray) -> float:
+    """The largest correlation of two pictures over shifts to the side by up to a sixth of the width."""
+    width = one.shape[1]
+    most = width // FARTHEST
+    return max(
+        _correlation(one[:, max(0, k) : width + min(0, k)], other[:, max(0, -k) : width + min(0, -k)])
+        for k in range(-most, most + 1)
+    )
+
+
+def _correlation(one: FloatArray, other: FloatArray) -> float:
+    """Of two pictures of one size; 0 where one of them is constant."""
+    one, other = one - one.mean(), other - other.mean()
+    size = float(np.sqrt((one * one).sum() * (other * other).sum()))
+    return float((one * other).sum()) / size if size > 0 else 0.0
