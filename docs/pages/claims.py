@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import claims_parts
+import claims_power
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
@@ -64,6 +65,7 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
     found, runs, cost = read(folder), read_runs(folder), folder / COST
     return {
         "verdicts": claims_parts.verdicts(found["pulling"], runs),
+        "power": claims_power.sentences(found["pulling"]),
         "pulling": claims_parts.tables(found["pulling"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "simulated_paper": claims_parts.tables(found["simulated_paper"]),

@@ -1,0 +1,95 @@
+"""Power of the paired t test of the claims: the smallest true difference that a number of seeds can tell from 0.
+
+The spread of a difference between two runs of one seed is pooled over the comparisons of a kind (free number of
+Gaussians, fixed number), because three differences alone say little about their own spread.
+"""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from endotsr.sweeps.ablation import COMPARISONS, FIXED
+
+POWER, LEVEL = 0.8, 0.05
+FREE, AT_FIXED = "a free number of Gaussians", "a fixed number"
+Record = dict[str, Any]
+
+
+@lru_cache
+def power(size: float, pairs: int) -> float:
+    """Probability that the 95 % interval of `pairs` differences leaves out 0.
+
+    size   true mean over the true standard deviation. Integrated over the variance: P(|Z + size sqrt(n)| > t s).
+    """
+    from scipy import integrate, stats
+
+    freedom, shift = pairs - 1, size * np.sqrt(pairs)
+    bound = stats.t.ppf(1 - LEVEL / 2, freedom)
+
+    def weighted(u: float) -> float:
+        reach = bound * np.sqrt(u / freedom)
+        return stats.chi2.pdf(u, freedom) * (stats.norm.sf(reach - shift) + stats.norm.cdf(-reach - shift))
+
+    return float(integrate.quad(weighted, 0.0, stats.chi2.ppf(1 - 1e-12, freedom), limit=200)[0])
+
+
+@lru_cache
+def least_size(pairs: int) -> float:
+    """The mean over the standard deviation that is told from 0 with a probability of POWER."""
+    from scipy import optimize
+
+    return float(optimize.brentq(lambda size: power(size, pairs) - POWER, 1e-3, 100.0))
+
+
+@lru_cache
+def pairs_needed(size: float) -> int:
+    """The smallest number of seeds that tells a mean over the standard deviation from 0."""
+    pairs = 2
+    while power(size, pairs) < POWER:
+        pairs += 1 if pairs < 20 else pairs // 10
+    return pairs
+
+
+def spread(found: Record, metric: str, kind: str) -> float:
+    """Pooled standard deviation of a paired difference between seeds."""
+    of_kind = [r for r in found["increments"] if r["metric"] == metric and kind_of(r["claim"]) == kind]
+    chosen = [row["of"] for row in of_kind if row["pairs"] > 1]
+    sums = [np.square(d - np.mean(d)).sum() for d in ([pair["difference"] for pair in of] for of in chosen)]
+    freedom = sum(len(of) - 1 for of in chosen)
+    return float(np.sqrt(np.sum(sums) / freedom))
+
+
+def kind_of(claim: str) -> str:
+    """Whether both configurations of a claim have the same Gaussians."""
+    return AT_FIXED if FIXED in claim.replace(",", "") else FREE
+
+
+def least_difference(found: Record | None, claim: str, metric: str = "psnr_full") -> float | None:
+    """The smallest true difference that the pairs of a claim tell from 0; None without pairs."""
+    rows = [] if found is None else [r for r in found["increments"] if (r["claim"], r["metric"]) == (claim, metric)]
+    if not rows or rows[0]["pairs"] < 2:
+        return None
+    return least_size(rows[0]["pairs"]) * spread(found or {}, metric, kind_of(claim))
+
+
+def sentences(found: Record | None) -> str:
+    """What the seeds can see, and how many the published gains would take."""
+    if found is None or not found["increments"]:
+        return "Not measured yet."
+    pairs = max(row["pairs"] for row in found["increments"])
+    spreads = {kind: spread(found, "psnr_full", kind) for kind in (FREE, AT_FIXED)}
+    seen = ", or ".join(
+        f"{least_size(pairs) * deviation:.2f} dB with {kind} (standard deviation {deviation:.3f} dB)"
+        for kind, deviation in spreads.items()
+    )
+    steps = [c for c in COMPARISONS if c.published]
+    needed = ", ".join(
+        f"{c.claim} {c.published:+.2f} dB: {pairs_needed(abs(c.published or 1) / spreads[kind_of(c.claim)])}"
+        for c in steps
+    )
+    return (
+        f"**Power.** {pairs} seeds tell a true difference from 0 with a probability of {100 * POWER:.0f} % if it is at "
+        f'least {seen}. A smaller one is most likely "not decided", whether it exists or not. The published gains '
+        f"would take this many seeds: {needed}."
+    )
