@@ -1,0 +1,143 @@
+"""Trainings of a simulated clip at full size beside predictions without a model: by frame, by pixel, in pictures.
+
+    endotsr simulate pulling --out CLIP
+    endotsr train CLIP --preset PRESET --out RUN [--sequence.split blocks --sequence.block-length 8]
+    python docs/pages/full_size.py measure RUN ...    finished runs of the clip, to docs/results/full_size
+    python docs/pages/full_size.py                    the page docs/full_size.md once more from the stored files
+
+A run is stored under its preset and its held-out frames, and replaces the one stored there before. The folder holds
+numbers and small pictures, no model. Only runs of a simulated clip are accepted: a picture of a patient is not stored.
+"""
+
+import sys
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import full_size_text
+import msgspec
+import numpy as np
+from against_flow import KINDS, kinds
+from full_size_pictures import curves_figure, maps_picture, sample_picture
+from marks import read_json, write_marked
+from numpy.typing import NDArray
+
+import endotsr
+from endotsr.errors import InputError
+from endotsr.evaluation.baselines import BASELINES, neighbours, unit_image
+from endotsr.report.style import save
+from endotsr.runs.files import replace_file, write_json
+from endotsr.sequences.between import flows_between
+from endotsr.sequences.sequence import Sequence
+
+DOCS = Path(__file__).parents[1]
+PAGE, FOLDER = DOCS / "full_size.md", DOCS / "results" / "full_size"
+FILE = FOLDER / "runs.json"
+COMMAND = "docs/pages/full_size.py measure RUN ..."
+MODEL, BLEND = "model", "two_neighbours"
+WITHOUT = ("nearest_frame", BLEND, "flow_interpolation")  # of `BASELINES`
+PREDICTIONS = (MODEL, *WITHOUT)
+SHOWN = ("worst", "median", "best")
+
+
+def measured(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.uint8]]]:
+    """Name, numbers and pictures {file stem: picture} of one finished run."""
+    run = endotsr.open_run(folder)
+    sequence, settings = run.sequence, msgspec.to_builtins(run.config)
+    sigma = noise_of(Path(run.record["input"]["source"]), settings["sequence"]["scale"])
+    predict = {name: BASELINES[name][1](sequence) for name in WITHOUT}
+    predict[MODEL] = lambda i: np.clip(run.render(float(sequence.times[i]), i).colour, 0, 1)
+    squares = {name: np.zeros(sequence.masks.shape[1:]) for name in PREDICTIONS}
+    frames, regions = [], {name: dict.fromkeys(("pixels", *PREDICTIONS), 0.0) for name in KINDS}
+    for index in map(int, sequence.test_index):
+        truth, tissue = unit_image(sequence, index), sequence.masks[index]
+        errors = {
+            name: np.where(tissue, np.square(predict[name](index) - truth).mean(axis=0, dtype=np.float64), 0.0)
+            for name in PREDICTIONS
+        }
+        frames.append(frame_numbers(sequence, index, errors))
+        for name, mask in kinds(sequence, index).items():
+            regions[name]["pixels"] += float(mask.sum())
+            for key, error in errors.items():
+                regions[name][key] += float(error[mask].sum())
+        for key, error in errors.items():
+            squares[key] += error
+    shown = chosen(frames)
+    name = f"{settings['preset']}_{full_size_text.split_name(settings['sequence'])}"
+    pictures = {f"{name}_{key}": sample_picture(sequence, index, predict) for key, index in shown.items()}
+    seen = np.maximum(sequence.masks[sequence.test_index].sum(axis=0), 1)
+    pictures[f"{name}_errors"] = maps_picture({key: np.sqrt(total / seen) for key, total in squares.items()})
+    kept = ("iterations_done", "seed", "threads", "machine")
+    numbers = {key: run.record[key] for key in kept} | {"gaussians": run.log[-1]["gaussians"]}
+    numbers |= {"preset": settings["preset"]}
+    numbers |= {"split": full_size_text.split_name(settings["sequence"]), "width": sequence.width}
+    numbers |= {"height": sequence.height, "frame_count": sequence.count, "noise": sigma, "shown": shown}
+    return name, numbers | {"date": date.today().isoformat(), "frames": frames, "regions": regions}, pictures
+
+
+def noise_of(clip: Path, scale: float) -> float:
+    """Standard deviation of noise and rounding of a frame, display units, from the truth of a simulated clip.
+
+    Raises: InputError for a clip without truth, so that no picture of a patient is stored, and for a reduced one, whose
+    noise is not known.
+    """
+    truth = clip / "truth" / "light.npz"
+    if not truth.is_file() or scale != 1:
+        raise InputError(f"{clip}: not a simulated clip at full size; allowed: the folder of `endotsr simulate`")
+    with np.load(truth) as light:
+        return float(np.hypot(light["noise_sigma"], 1 / (255 * np.sqrt(12))))
+
+
+def frame_numbers(sequence: Sequence, index: int, errors: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+    """Mean squared error over the tissue of every prediction, weight of the blend's noise, and motion.
+
+    blend_noise   variance of the noise of the blend over that of a frame: (1 - f)^2 + f^2, 1 if a neighbour is alone
+    motion_px     mean length of the flow between the neighbours over the tissue
+    """
+    near, tissue = neighbours(sequence, index), sequence.masks[index]
+    flow = flows_between(sequence, near.before, near.after).forward if near.before != near.after else np.zeros((2, 1))
+    moved = float(np.hypot(*flow)[tissue].mean()) if near.before != near.after else None
+    numbers = {name: float(error[tissue].mean()) for name, error in errors.items()}
+    weight = (1 - near.fraction) ** 2 + near.fraction**2
+    return {"frame": index, "motion_px": moved, "blend_noise": weight, "squared_error": numbers}
+
+
+def chosen(frames: list[dict[str, Any]]) -> dict[str, int]:
+    """The held-out frames with the largest, the median and the smallest squared error of the model."""
+    order = [row["frame"] for row in sorted(frames, key=lambda row: -row["squared_error"][MODEL])]
+    return dict(zip(SHOWN, (order[0], order[len(order) // 2], order[-1]), strict=True))
+
+
+def store(folders: list[Path]) -> None:
+    """Measure runs, and write their numbers and pictures beside those that are stored."""
+    stored = read_json(FILE, COMMAND) if FILE.exists() else {}
+    for folder in folders:
+        name, numbers, pictures = measured(folder)
+        stored[name] = numbers
+        for stem, picture in pictures.items():
+            content = full_size_text.encoded(picture)
+            replace_file(FOLDER / f"{stem}.webp", lambda path, content=content: path.write_bytes(content))
+    write_json(FILE, dict(sorted(stored.items())))
+
+
+def write_page() -> None:
+    """The curves, and the generated parts of the page."""
+    runs = read_json(FILE, COMMAND)
+    save(curves_figure(runs), FOLDER / "curves.svg")
+    write_marked(PAGE, full_size_text.fragments(runs), "full_size")
+
+
+def main(words: list[str]) -> None:
+    """The command."""
+    try:
+        if words[:1] == ["measure"] and len(words) > 1:
+            store([Path(word) for word in words[1:]])
+        elif words:
+            sys.exit(__doc__)
+        write_page()
+    except InputError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,87 @@
+"""docs/full_size.md: its generated parts are what the stored runs say, and so are its words and those of chapter 14."""
+
+import json
+import re
+from pathlib import Path
+
+import full_size
+import full_size_text
+import numpy as np
+import pytest
+from full_size_text import psnr
+from marks import read_json, replaced
+
+from endotsr.errors import InputError
+
+RUNS = read_json(full_size.FILE, full_size.COMMAND)
+NOTEBOOK = Path(__file__).parents[2] / "notebooks" / "14_full_sequence.py"
+LARGEST = 2_000_000  # bytes of all stored files
+
+
+def test_committed_page_is_what_the_stored_runs_say():
+    text, made = full_size.PAGE.read_text(encoding="utf-8"), full_size_text.fragments(RUNS)
+    assert set(re.findall(r"<!-- full_size:(\w+):start -->", text)) == set(made)
+    assert replaced(text, made, full_size.PAGE, "full_size") == text
+
+
+def test_stored_files_are_small_and_every_one_is_shown():
+    files = [file for file in full_size.FOLDER.iterdir() if file.is_file()]
+    assert sum(file.stat().st_size for file in files) <= LARGEST
+    text = full_size.PAGE.read_text(encoding="utf-8")
+    assert {file.name for file in files} - {full_size.FILE.name} == set(re.findall(r"full_size/([\w.]+)\)", text))
+
+
+def test_chosen_frames_are_the_worst_the_median_and_the_best():
+    frames = [{"frame": i, "squared_error": {"model": value}} for i, value in enumerate((3.0, 1.0, 5.0, 2.0, 4.0))]
+    assert full_size.chosen(frames) == {"worst": 2, "median": 0, "best": 1}
+    for run in RUNS.values():
+        assert full_size.chosen(run["frames"]) == run["shown"]
+
+
+def test_a_clip_without_truth_is_refused(tmp_path):
+    with pytest.raises(InputError, match="not a simulated clip"):
+        full_size.noise_of(tmp_path, 1.0)
+
+
+def test_the_regions_hold_the_whole_error():
+    """Every kind of pixel once: the sums are those of the frames."""
+    for run in RUNS.values():
+        pixels = sum(row["pixels"] for row in run["regions"].values())
+        whole = sum(row["model"] for row in run["regions"].values()) / pixels
+        means = [row["squared_error"]["model"] for row in run["frames"]]
+        assert min(means) < whole < max(means)
+        assert pixels < len(run["frames"]) * run["width"] * run["height"]
+
+
+def test_what_the_page_says_of_noise_and_motion():
+    of_every_eighth = [run for run in RUNS.values() if run["split"] == "eighth"]
+    flow = json.loads((full_size_text.RESULTS / "against_flow.json").read_text(encoding="utf-8"))["frames"]
+    frame_1 = next(row["flow"] for row in flow if row["frame"] == 1)
+    assert f"{frame_1:.2f} dB" in full_size.PAGE.read_text(encoding="utf-8")
+    for run in of_every_eighth:
+        assert psnr(run["noise"] ** 2) < 40 < frame_1
+        slow = [row for row in run["frames"] if row["motion_px"] < 1]
+        fast = [row for row in run["frames"] if row["motion_px"] > 2.9]
+        assert slow and all(behind_flow(row) < 1 for row in slow)
+        assert fast and all(behind_flow(row) > 3 for row in fast)
+        for name in ("flow_interpolation", "model"):
+            means = [np.mean([psnr(row["squared_error"][name]) for row in rows]) for rows in (slow, fast)]
+            assert run["preset"] == "paper" or abs(means[0] - means[1]) < 0.5
+
+
+def behind_flow(row: dict) -> float:
+    """How far the blend is below flow, dB."""
+    return psnr(row["squared_error"]["flow_interpolation"]) - psnr(row["squared_error"]["two_neighbours"])
+
+
+def test_what_chapter_14_says_of_the_blend():
+    """2.2 above for quick, 1.5 below for paper and 0.8 above for sharp on the recorded clip."""
+    words = " ".join(line.removeprefix("# ") for line in NOTEBOOK.read_text(encoding="utf-8").splitlines())
+    run, recorded = RUNS["quick_eighth"], full_size_text.recorded()
+    ahead = {"quick": full_size_text.mean_psnr(run, "model") - full_size_text.mean_psnr(run, "two_neighbours")}
+    for preset in ("paper", "sharp"):
+        means = full_size_text.means(recorded["every_eighth", preset])
+        ahead[preset] = means["model"] - means["blend"]
+    assert f"the preset `quick` is {ahead['quick']:.1f} dB above the blend" in words
+    assert f"the preset `paper` is {-ahead['paper']:.1f} dB below that blend" in words
+    assert f"`sharp` is {ahead['sharp']:.1f} dB above it" in words
