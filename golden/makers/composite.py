@@ -193,8 +193,8 @@ WRONG_PORTS = [
         BOTH,
         edit(
             RECORDS,
-            "d_logit[i] = total[SUM_S] / (one + math.exp(min(opacity_logit[i], largest)))",
-            "d_logit[i] = total[SUM_S] * (one + math.exp(-opacity_logit[i]))",
+            "d_logit[i] = total[SUM_S] / (one + exponential(min(opacity_logit[i], largest)))",
+            "d_logit[i] = total[SUM_S] * (one + exponential(-opacity_logit[i]))",
         ),
     ),
     port(

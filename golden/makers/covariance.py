@@ -120,7 +120,9 @@ WRONG_PORTS = [
         "exp(s / 2); right: exp(s) is the semi-axis",
         BOTH,
         edit(
-            SOURCE, "math.exp(min(max(log_scale, -limit), limit))", "math.exp(min(max(log_scale, -limit), limit) / 2)"
+            SOURCE,
+            "exponential(min(max(log_scale, -limit), limit))",
+            "exponential(min(max(log_scale, -limit), limit) / 2)",
         ),
         edit(SOURCE, "return d_scale * scale if", "return d_scale * scale / 2 if"),
     ),

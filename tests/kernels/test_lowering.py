@@ -29,6 +29,13 @@ def test_kernels_call_nothing_that_a_system_lacks(kernels):
     assert {name for text in kernels.values() for name in lowering.called(text)} <= lowering.LIBRARY
 
 
+def test_no_kernel_of_float32_calls_a_function_that_another_system_rounds_otherwise(kernels):
+    rounding = {"expf", "logf", "log2f", "powf", "sinf", "cosf"}
+    assert {
+        name: lowering.called(text) & rounding for name, text in kernels.items() if lowering.called(text) & rounding
+    } == {}
+
+
 def test_code_for_another_processor_alone_is_refused():
     """An instruction of x86 in a kernel would be seen."""
     text = 'define void @f() {\n  call void asm sideeffect "vzeroupper", ""()\n  ret void\n}\n'

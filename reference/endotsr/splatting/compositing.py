@@ -9,12 +9,12 @@ division by T or 1 - alpha, so it is exact for alpha = 1 and behind opaque stack
 same for the `paper` preset, many pixels at a time.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.elementary import exponential
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
 from endotsr.splatting.binning import TileLists
@@ -84,7 +84,7 @@ def _alpha(record, x, y):
     e = (x - record[U]) - record[SLOPE] * dy
     q = record[INVERSE_C] * dy * dy + record[PRECISION] * e * e
     half = type(q)(0.5)
-    return e, dy, record[OPACITY] * math.exp(-half * q)
+    return e, dy, record[OPACITY] * exponential(-half * q)
 
 
 _alpha_kernel = jit(_alpha)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.elementary import exponential
 from endotsr.kernels.groups import GROUP, column, keep, write_group
 from endotsr.kernels.jit import jit, jit_formula
 from endotsr.kernels.threads import parallel_for
@@ -105,7 +106,7 @@ def rotation_reverse(w, x, y, z, d_rotation):
 def semi_axis(log_scale):
     """S = exp(s), s clipped."""
     limit = type(log_scale)(LOG_SCALE_LIMIT)
-    return math.exp(min(max(log_scale, -limit), limit))
+    return exponential(min(max(log_scale, -limit), limit))
 
 
 @jit_formula

@@ -5,12 +5,11 @@ r = 1/c: a sum of squares, so that q >= 0 always and a needle keeps its digits (
 per Gaussian occupies one or two cache lines (float64: two or three). Its gradient record has 10 numbers.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.elementary import exponential, logarithm
 from endotsr.kernels.exponential import LOG2_E
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
@@ -35,7 +34,7 @@ def _log_sigmoid(first, stop, logit, out):
     zero, one = real(0), real(1)
     for i in range(first, stop):
         x = logit[i]
-        out[i] = min(x, zero) - math.log(one + math.exp(-abs(x)))
+        out[i] = min(x, zero) - logarithm(one + exponential(-abs(x)))
 
 
 _log_sigmoid_kernel = jit(_log_sigmoid)
@@ -60,7 +59,7 @@ def _pack(first, stop, order, mean2d, covariance2d, determinant, log_opacity, co
         record[LOG2_OPACITY] = log_opacity[i] * log2_e
         record[RED], record[GREEN], record[BLUE] = colour[0, i], colour[1, i], colour[2, i]
         record[DEPTH] = depth[i]
-        record[OPACITY] = math.exp(log_opacity[i])
+        record[OPACITY] = exponential(log_opacity[i])
 
 
 _pack_kernel = jit(_pack)
@@ -111,8 +110,8 @@ def _gather(
         d_footprint[0, i] = factor * (-half * total[SUM_SEE])
         d_footprint[1, i] = factor * (a * total[SUM_SEY])
         d_footprint[2, i] = factor * (-half * total[SUM_SYY])
-        # sum of s, times 1 - opacity; the bound keeps math.exp from raising with the JIT off
-        d_logit[i] = total[SUM_S] / (one + math.exp(min(opacity_logit[i], largest)))
+        # sum of s, times 1 - opacity; the bound keeps a float64 from raising with the JIT off
+        d_logit[i] = total[SUM_S] / (one + exponential(min(opacity_logit[i], largest)))
         d_colour[0, i], d_colour[1, i], d_colour[2, i] = total[SUM_RED], total[SUM_GREEN], total[SUM_BLUE]
         d_depth[i] = total[SUM_DEPTH] if keep_depth else zero
 

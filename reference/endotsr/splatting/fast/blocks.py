@@ -211,7 +211,7 @@ def _blend(first_tile, last_tile, records, starts, ranks, limits, background, co
     real = records.dtype.type
     half = real(0.5)
     stop, alpha_max = limits[1], limits[2]
-    log2_cutoff = real(math.log2(limits[0]))
+    log2_cutoff = real(math.log2(np.float64(limits[0])))  # rounded once: the same bits on every system
     height, width = depth.shape
     tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
     buffer, tables = local_array(FORWARD_NUMBERS, records), local_array(TABLES, records)
@@ -295,7 +295,7 @@ def _blend_reverse(
     real = records.dtype.type
     half, zero = real(0.5), real(0)
     stop, alpha_max = limits[1], limits[2]
-    log2_cutoff = real(math.log2(limits[0]))
+    log2_cutoff = real(math.log2(np.float64(limits[0])))  # rounded once: the same bits on every system
     height, width = depth.shape
     tiles_x, words = (width + TILE_WIDTH - 1) // TILE_WIDTH, TILE_HEIGHT // (WORD_ROWS * block_height(records))
     buffer, tables = local_array(REVERSE_NUMBERS, records), local_array(TABLES, records)
