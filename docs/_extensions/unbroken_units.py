@@ -17,14 +17,15 @@ UNITS = (
 )  # fmt: skip
 BREAKABLE = re.compile(rf"(?<=\d) (?=(?:{'|'.join(map(re.escape, sorted(UNITS, key=len, reverse=True)))})(?![\w/]))")
 GROUPS = re.compile(r"(?<=\d) (?=\d{3}(?!\d))")
+EXPONENT = re.compile(r"(?<=\de)-(?=\d)")
 BREAKS = re.compile(r"(?<=[._/,])(?=\w)")
 LONGEST_NAME = 12  # characters of a name that stays whole
 UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.raw, nodes.comment)
 
 
 def unbroken(text: str) -> str:
-    """The text with unbreakable spaces: `12 ms`, `1 462 338`."""
-    return GROUPS.sub("\u202f", BREAKABLE.sub("\u00a0", text))
+    """The text with unbreakable spaces, `12 ms` and `1 462 338`, and a whole exponent, `1e-4`."""
+    return EXPONENT.sub("-\u2060", GROUPS.sub("\u202f", BREAKABLE.sub("\u00a0", text)))
 
 
 class UnbrokenUnits(SphinxPostTransform):

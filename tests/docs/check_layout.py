@@ -32,7 +32,8 @@ function measure(page, width) {
     if (shown(table) && whole && by > 1) say("table", name(table), by);
   }
   for (const word of brokenWords(root)) say("word", word, 0);
-  for (const e of root.querySelectorAll("*")) {
+  for (const e of (root.querySelector("article") || root).querySelectorAll("*")) {
+    if (e.closest("mjx-container")) continue;
     const flow = frame.contentWindow.getComputedStyle(e).overflowX, hides = ["hidden", "clip"].includes(flow);
     const by = e.scrollWidth - e.clientWidth;
     if (hides && by > 1 && shown(e) && e.textContent.trim()) say("cut", e.textContent.trim().slice(0, 40), by);

@@ -14,6 +14,7 @@ from unbroken_units import unbroken  # pyright: ignore[reportMissingImports]
         ("1 462 338 visits of 60 000", "1\u202f462\u202f338 visits of 60\u202f000"),
         ("2 messages, 4 hours, 3 samples", "2 messages, 4 hours, 3 samples"),
         ("frames 12 15 and 2026 123456", "frames 12 15 and 2026 123456"),
+        ("stop 1e-4, 9.7e-10 and a-1", "stop 1e-\u20604, 9.7e-\u206010 and a-1"),
         ("640x512 px", "640x512\u00a0px"),
     ],
 )
