@@ -23,6 +23,7 @@ from endotsr.sequences.sequence import Sequence
 
 WINDOW = 128, 160  # rows and columns of a crop
 BRIGHTEST = 0.06  # error in the brightest colour, display units
+LONGEST_STEP = 8  # frames between two points of one line
 LINES = {"nearest_frame": ":", "two_neighbours": "--", "flow_interpolation": "-."}
 
 
@@ -64,7 +65,7 @@ def curves_figure(runs: dict[str, Any]) -> Any:
     for axes, split in zip(figure.subplots(1, len(splits), sharey=True, squeeze=False)[0], splits, strict=True):
         same = [run for run in runs.values() if run["split"] == split]
         for run, colour in zip(same, LIGHT.colours, strict=False):
-            _curve(axes, run, "model", f"`{run['preset']}`".replace("`", ""), "-", colour)
+            _curve(axes, run, "model", run["preset"], "-", colour)
         for (name, line), grey in zip(LINES.items(), (GREY, "#000000", "#8a6d3b"), strict=True):
             _curve(axes, same[0], name, LABELS[name], line, grey)
         axes.axhline(psnr(same[0]["noise"] ** 2), color=GREY, linewidth=0.8)
@@ -73,17 +74,17 @@ def curves_figure(runs: dict[str, Any]) -> Any:
         plain_axes(axes, sizes=SMALL)
         name_axes(axes, "frame", title=SPLITS[split], sizes=SMALL)
     name_axes(figure.axes[0], y="PSNR of the tissue, dB", sizes=SMALL)
-    legend(figure.axes[-1], sizes=SMALL, loc="lower left", ncols=2)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    legend(figure, sizes=SMALL, loc="outside lower center", ncols=6, handles=handles, labels=labels)
     return figure
 
 
 def _curve(axes: Any, run: dict[str, Any], name: str, label: str, line: str, colour: str) -> None:
-    rows = run["frames"]
-    values = [psnr(row["squared_error"][name]) for row in rows]
-    axes.plot(
-        [row["frame"] for row in rows], values, linestyle=line, color=colour, marker="o", markersize=3,
-        linewidth=1.4, label=label,
-    )  # fmt: skip
+    frames = np.array([row["frame"] for row in run["frames"]], float)
+    values = np.array([psnr(row["squared_error"][name]) for row in run["frames"]])
+    ends = np.flatnonzero(np.diff(frames) > LONGEST_STEP) + 1  # of the blocks: the line does not join them
+    frames, values = np.insert(frames, ends, np.nan), np.insert(values, ends, np.nan)
+    axes.plot(frames, values, linestyle=line, color=colour, marker="o", markersize=3, linewidth=1.4, label=label)
 
 
 def _map(error: FloatArray, tissue: NDArray[np.bool_]) -> ByteImage:

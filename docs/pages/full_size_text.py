@@ -113,7 +113,7 @@ def clip_table(runs: dict[str, Any]) -> str:
         of_models = [f"{same[name]['model']:.2f}" if name in same else "-" for name in PRESETS]
         without = [f"{next(iter(same.values()))[LABELS[name]]:.2f}" for name in PREDICTIONS[1:]]
         rows.append(["recorded", words, *of_models, *without])
-    return markdown(("Clip", "Held out", *(f"`{name}`" for name in PRESETS), "copy", "blend", "flow"), rows)
+    return markdown(("Clip", "Held out", *PRESETS, "copy", "blend", "flow"), rows)
 
 
 def noise_table(runs: dict[str, Any]) -> str:
@@ -147,7 +147,7 @@ def motion_table(runs: dict[str, Any]) -> str:
             without = [psnr(row["squared_error"][key]) for key in PREDICTIONS[1:]]
             moved = "one neighbour" if row["motion_px"] is None else f"{row['motion_px']:.2f}"
             rows.append([str(row["frame"]), moved, *(f"{value:.2f}" for value in (*of_models, *without))])
-        head = ("Frame", "motion between its neighbours, px", *(f"`{run['preset']}`" for run in same))
+        head = ("Frame", "motion between its neighbours, px", *(run["preset"] for run in same))
         parts.append(
             f"{words[0].upper()}{words[1:]}, PSNR of the tissue in dB:\n\n"
             + markdown((*head, "copy", "blend", "flow"), rows)

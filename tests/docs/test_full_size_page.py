@@ -85,3 +85,12 @@ def test_what_chapter_14_says_of_the_blend():
     assert f"the preset `quick` is {ahead['quick']:.1f} dB above the blend" in words
     assert f"the preset `paper` is {-ahead['paper']:.1f} dB below that blend" in words
     assert f"`sharp` is {ahead['sharp']:.1f} dB above it" in words
+
+
+def test_the_first_sentences_of_the_page_are_true():
+    recorded = full_size_text.recorded()
+    for run in RUNS.values():
+        ahead = full_size_text.mean_psnr(run, "model") - full_size_text.mean_psnr(run, "two_neighbours")
+        assert run["preset"] != "quick" or round(ahead) == 2
+    paper, sharp = (full_size_text.means(recorded["every_eighth", name]) for name in ("paper", "sharp"))
+    assert paper["model"] < paper["blend"] and sharp["model"] > sharp["blend"]
