@@ -29,7 +29,7 @@ def power(size: float, pairs: int) -> float:
 
     def weighted(u: float) -> float:
         reach = bound * np.sqrt(u / freedom)
-        return stats.chi2.pdf(u, freedom) * (stats.norm.sf(reach - shift) + stats.norm.cdf(-reach - shift))
+        return float(stats.chi2.pdf(u, freedom) * (stats.norm.sf(reach - shift) + stats.norm.cdf(-reach - shift)))
 
     return float(integrate.quad(weighted, 0.0, stats.chi2.ppf(1 - 1e-12, freedom), limit=200)[0])
 
@@ -39,7 +39,8 @@ def least_size(pairs: int) -> float:
     """The mean over the standard deviation that is told from 0 with a probability of POWER."""
     from scipy import optimize
 
-    return float(optimize.brentq(lambda size: power(size, pairs) - POWER, 1e-3, 100.0))
+    found = optimize.root_scalar(lambda size: power(size, pairs) - POWER, bracket=(1e-3, 100.0), method="brentq")
+    return float(found.root)
 
 
 @lru_cache
@@ -55,7 +56,7 @@ def spread(found: Record, metric: str, kind: str) -> float:
     """Pooled standard deviation of a paired difference between seeds."""
     of_kind = [r for r in found["increments"] if r["metric"] == metric and kind_of(r["claim"]) == kind]
     chosen = [row["of"] for row in of_kind if row["pairs"] > 1]
-    sums = [np.square(d - np.mean(d)).sum() for d in ([pair["difference"] for pair in of] for of in chosen)]
+    sums = [np.square(d - d.mean()).sum() for d in (np.array([p["difference"] for p in of]) for of in chosen)]
     freedom = sum(len(of) - 1 for of in chosen)
     return float(np.sqrt(np.sum(sums) / freedom))
 

@@ -19,12 +19,13 @@ import msgspec
 import numpy as np
 from against_flow import KINDS, kinds
 from full_size_pictures import curves_figure, maps_picture, sample_picture
+from full_size_text import PREDICTIONS
 from marks import read_json, write_marked
 from numpy.typing import NDArray
 
 import endotsr
 from endotsr.errors import InputError
-from endotsr.evaluation.baselines import BASELINES, neighbours, unit_image
+from endotsr.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image
 from endotsr.report.style import save
 from endotsr.runs.files import replace_file, write_json
 from endotsr.sequences.between import flows_between
@@ -34,21 +35,21 @@ DOCS = Path(__file__).parents[1]
 PAGE, FOLDER = DOCS / "full_size.md", DOCS / "results" / "full_size"
 FILE = FOLDER / "runs.json"
 COMMAND = "docs/pages/full_size.py measure RUN ..."
-MODEL, BLEND = "model", "two_neighbours"
-WITHOUT = ("nearest_frame", BLEND, "flow_interpolation")  # of `BASELINES`
-PREDICTIONS = (MODEL, *WITHOUT)
+MODEL = "model"
 SHOWN = ("worst", "median", "best")
 
 
 def measured(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.uint8]]]:
     """Name, numbers and pictures {file stem: picture} of one finished run."""
     run = endotsr.open_run(folder)
+    if not isinstance(run, endotsr.Run):
+        raise InputError(f"{folder}: a recording in windows; allowed: one run")
     sequence, settings = run.sequence, msgspec.to_builtins(run.config)
     sigma = noise_of(Path(run.record["input"]["source"]), settings["sequence"]["scale"])
-    predict = {name: BASELINES[name][1](sequence) for name in WITHOUT}
-    predict[MODEL] = lambda i: np.clip(run.render(float(sequence.times[i]), i).colour, 0, 1)
+    predict = predictions(run)
     squares = {name: np.zeros(sequence.masks.shape[1:]) for name in PREDICTIONS}
-    frames, regions = [], {name: dict.fromkeys(("pixels", *PREDICTIONS), 0.0) for name in KINDS}
+    frames: list[dict[str, Any]] = []
+    regions: dict[str, dict[str, float]] = {name: dict.fromkeys(("pixels", *PREDICTIONS), 0.0) for name in KINDS}
     for index in map(int, sequence.test_index):
         truth, tissue = unit_image(sequence, index), sequence.masks[index]
         errors = {
@@ -62,17 +63,28 @@ def measured(folder: Path) -> tuple[str, dict[str, Any], dict[str, NDArray[np.ui
                 regions[name][key] += float(error[mask].sum())
         for key, error in errors.items():
             squares[key] += error
-    shown = chosen(frames)
-    name = f"{settings['preset']}_{full_size_text.split_name(settings['sequence'])}"
+    shown, split = chosen(frames), full_size_text.split_name(settings["sequence"])
+    name = f"{settings['preset']}_{split}"
     pictures = {f"{name}_{key}": sample_picture(sequence, index, predict) for key, index in shown.items()}
     seen = np.maximum(sequence.masks[sequence.test_index].sum(axis=0), 1)
     pictures[f"{name}_errors"] = maps_picture({key: np.sqrt(total / seen) for key, total in squares.items()})
-    kept = ("iterations_done", "seed", "threads", "machine")
-    numbers = {key: run.record[key] for key in kept} | {"gaussians": run.log[-1]["gaussians"]}
-    numbers |= {"preset": settings["preset"]}
-    numbers |= {"split": full_size_text.split_name(settings["sequence"]), "width": sequence.width}
-    numbers |= {"height": sequence.height, "frame_count": sequence.count, "noise": sigma, "shown": shown}
-    return name, numbers | {"date": date.today().isoformat(), "frames": frames, "regions": regions}, pictures
+    about = about_run(run) | {"preset": settings["preset"], "split": split, "noise": sigma, "shown": shown}
+    return name, about | {"frames": frames, "regions": regions}, pictures
+
+
+def predictions(run: endotsr.Run) -> dict[str, RenderFrame]:
+    """Every prediction of a frame by its index, the render of the model clipped to [0, 1]."""
+    sequence = run.sequence
+    found = {name: BASELINES[name][1](sequence) for name in PREDICTIONS if name != MODEL}
+    return found | {MODEL: lambda i: np.clip(run.render(float(sequence.times[i]), i).colour, 0, 1)}
+
+
+def about_run(run: endotsr.Run) -> dict[str, Any]:
+    """Length, size, machine and date of a run."""
+    sequence = run.sequence
+    kept = {key: run.record[key] for key in ("iterations_done", "seed", "threads", "machine")}
+    size = {"width": sequence.width, "height": sequence.height, "frame_count": sequence.count}
+    return kept | size | {"gaussians": run.log[-1]["gaussians"], "date": date.today().isoformat()}
 
 
 def noise_of(clip: Path, scale: float) -> float:

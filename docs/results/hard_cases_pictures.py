@@ -39,7 +39,8 @@ def needle_opacity() -> Pair:
     textbook = (c * dx * dx - F32(2) * b * dx * dy + a * dy * dy) / out.determinant[0]
     eta = dx - slope * dy
     ours = across * dy * dy + along * eta * eta
-    return tuple(np.where(q < 0, F32(0), np.exp(-q / F32(2))) for q in (textbook, ours))
+    drawn = [np.where(q < 0, F32(0), np.exp(-q / F32(2))) for q in (textbook, ours)]
+    return drawn[0], drawn[1]
 
 
 def opaque_gradient() -> Pair:
@@ -70,7 +71,7 @@ def unknown_under_the_instrument() -> Pair:
         (rendered, observed, tissue),
     ):
         _, saved = masked_ssim_forward(picture, ssim_target(frame, mask))
-        found.append(np.abs(masked_ssim_reverse(F32(1), saved)).mean(axis=0))
+        found.append(np.abs(masked_ssim_reverse(1.0, saved)).mean(axis=0))
     return found[0], found[1]
 
 
