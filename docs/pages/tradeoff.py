@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import tradeoff_stop
 from marks import read_json, write_marked
 from tradeoff_curves import draw_training
 from tradeoff_figures import draw
@@ -87,7 +88,13 @@ def write_page() -> None:
     draw(result, RESULTS)
     for name, study in trainings.items():
         draw_training(study, RESULTS, f"tradeoff_training_{name}")
-    write_marked(PAGE, fragments(result, read_scenes(), trainings), "tradeoff")
+    write_marked(PAGE, parts(), "tradeoff")
+
+
+def parts() -> dict[str, str]:
+    """Every generated part of the page by name."""
+    result, stop = read_json(RESULTS / "tradeoff.json", COMMAND), read_json(tradeoff_stop.FILE, tradeoff_stop.__file__)
+    return fragments(result, read_scenes(), read_trainings()) | {"stop": tradeoff_stop.sentences(stop)}
 
 
 def main(words: list[str]) -> None:

@@ -1,0 +1,49 @@
+"""Every chapter has a motive, a derivation, figures and exercises, and the table in notebooks/index.md says so."""
+
+import re
+
+import chapters
+import pytest
+from marks import read_json, replaced
+
+TEXTS = {file.stem: file.read_text(encoding="utf-8") for file in sorted(chapters.NOTEBOOKS.glob("*.py"))}
+CUTS = {
+    "derivation": ("\n# ## The reverse pass", "\n# ## Another section"),
+    "figure": ("plt.show()", "pass"),
+    "exercises": ("\n# 3. ", "\n# "),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_chapter_lacks_nothing(name):
+    assert chapters.missing(name, chapters.chapter_of(TEXTS[name])) == []
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("element", ["derivation", "figure", "exercises"])
+def test_an_element_that_is_taken_out_is_missing(name, element):
+    if element == "derivation" and name in chapters.MEASURES:
+        pytest.skip("measures what others derive")
+    text = TEXTS[name].replace(*CUTS[element])
+    if element == "derivation":
+        text = re.sub(r"\*\*\(\d+\.\d+\)", "", text)
+    assert chapters.missing(name, chapters.chapter_of(text)) == [element]
+
+
+def test_a_chapter_that_begins_with_an_equation_has_no_motive():
+    head, _, tail = TEXTS["05_covariance"].partition("\n# # ")
+    title, _, rest = tail.partition("\n#\n# ")
+    chapter = chapters.chapter_of(f"{head}\n# # {title}\n#\n# ## The equation\n# {rest}")
+    assert chapters.missing("05_covariance", chapter) == ["motive"]
+
+
+def test_the_committed_table_is_what_the_notebooks_have():
+    text, times = chapters.PAGE.read_text(encoding="utf-8"), read_json(chapters.FILE, chapters.COMMAND)
+    assert replaced(text, {"table": chapters.table(chapters.chapters(), times)}, chapters.PAGE, "chapters") == text
+
+
+def test_every_chapter_was_timed_and_the_book_takes_ten_minutes_at_most():
+    times = read_json(chapters.FILE, chapters.COMMAND)["chapters"]
+    assert set(times) == set(TEXTS)
+    assert all(row["processor_seconds"] > 0 for row in times.values())
+    assert sum(row["processor_seconds"] for row in times.values()) <= chapters.LONGEST
