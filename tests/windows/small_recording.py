@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import msgspec
+
 from endotsr.config import DEMO, Config, config_from_dict
 from endotsr.simulator.folder import write_sequence
 from endotsr.simulator.scenes import scene_of
@@ -34,10 +36,10 @@ def settings(iterations: int = 20, **sections: dict) -> Config:
     return config_from_dict(small)
 
 
-def write_recording(folder: Path, effects: str = "breathing,highlights") -> Path:
+def write_recording(folder: Path, effects: str = "breathing,highlights", frames: int = FRAMES) -> Path:
     """The recording, in the layout of EndoNeRF."""
     folder.mkdir()
-    write_sequence(folder, scene_of(effects, SIZE))
+    write_sequence(folder, scene_of(effects, msgspec.structs.replace(SIZE, frames=frames)))
     return folder
 
 

@@ -106,10 +106,26 @@ def test_tissue_out_of_sight_is_dropped(both, monkeypatch):
     state = carried_state(neighbour, moved, config)
     u = state.gaussians.position[0] / state.gaussians.position[2] * aside[0].fx + aside[0].cx
     assert u.min() > -0.2 * aside[0].width and state.gaussians.count < 0.7 * count
+
+
+def test_the_faintest_are_dropped_and_growth_keeps_its_room(both):
+    neighbour, sequence, config = both
     plain = msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=100))
-    small = carried_state(neighbour, sequence, plain)
-    faint = np.sort(neighbour.model.gaussians.opacity_logit)[count - 100]
-    assert small.gaussians.count == 100 and small.gaussians.opacity_logit.min() >= faint
+    count, logit = carried_state(neighbour, sequence, plain).gaussians.count, neighbour.model.gaussians.opacity_logit
+    carried = carried_state(neighbour, sequence, plain).gaussians.opacity_logit[:80]
+    assert 80 <= count <= 100, "80 are carried, and new tissue takes what is free"
+    np.testing.assert_array_equal(np.sort(carried), np.sort(logit)[-80:])
+
+
+def test_gaussians_do_not_accumulate_along_a_chain(tmp_path):
+    """Without the bound each window of this chain ends with more Gaussians than the one before."""
+    source = write_recording(tmp_path / "source", frames=104)
+    config = settings(40, density={"gradient_threshold": 1e-5, "start": 2, "until": 12, "maximum": 40_000})
+    trained(source, tmp_path / "run", Wanted(32, 8, 4), config)
+    folders = [tmp_path / "run" / "windows" / f"{k:03d}" for k in range(4)]
+    counts = [load_model(open_run(folder)).gaussians.count for folder in folders]
+    assert max(counts[1:]) <= counts[0] < 40_000
+    assert [open_run(folder).config().density.maximum for folder in folders[1:]] == counts[:3]
 
 
 def test_a_chain_trains_a_part_of_the_schedule_and_says_so(recording, tmp_path):

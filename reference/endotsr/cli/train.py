@@ -115,6 +115,7 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
     """Train a recording in windows, or what is missing of it, and measure it."""
     from endotsr.cli.parts.windows import WindowsWanted, evaluate_windows, train_windows
     from endotsr.cli.sweep import Place
+    from endotsr.windows.make import with_visits
 
     assert options.out is not None
     if options.effects != "everything":
@@ -122,8 +123,11 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
     if options.resume:
         _refuse_other_settings(options.out, words)
     place = Place(options.workers, options.threads or None, options.scheduler)
+    named, config = explicit_settings(TrainOptions, words), _settings(options)
+    if options.iterations is None and not named & {"training.iterations", "training.visits_per_frame"}:
+        config = with_visits(config)
     asked = WindowsWanted(
-        options.sequence, options.out, _settings(options), options.windows or "", options.overlap, options.chain, place
+        options.sequence, options.out, config, options.windows or "", options.overlap, options.chain, place
     )
     code = train_windows(asked, resume=options.resume)
     if options.evaluate and code == 0:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 COVERED = 0.5  # least opacity of a pixel that the carried Gaussians show; elsewhere new tissue is added
 MARGIN = 0.1  # of the picture's sides: a Gaussian farther outside of every training frame is out of sight
+CARRIED = 0.8  # of `density.maximum`: most Gaussians that are carried; the rest is left to growth
 CAMERA_TOLERANCE = 1e-3  # of the median depth: how far two windows may see one frame from different places
 
 
@@ -90,15 +91,15 @@ class Neighbour(NamedTuple):
 def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "TrainingState":
     """The state with which a window begins, before its first iteration.
 
-    Gaussians that lie outside of every training frame are dropped; if more than `density.maximum` are left, so are the
-    faintest. Where the others cover less than half of a pixel of tissue, points are drawn as at a cold start, as many
-    as the uncovered fraction asks for. Moments are 0. Exposures and poses are those of the neighbour, constant beyond
-    its last frame.
+    Gaussians that lie outside of every training frame are dropped; if more than 0.8 `density.maximum` are left, so are
+    the faintest. Where the others cover less than half of a pixel of tissue, points are drawn as at a cold start, as
+    many as the uncovered fraction asks for and `density.maximum` allows. Moments are 0. Exposures and poses are those
+    of the neighbour, constant beyond its last frame.
     """
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     place = neighbour.join(sequence)
     gaussians = _canonical(neighbour, int(sequence.train_index[place]), config, dtype)
-    gaussians = _gathered(gaussians, _kept(gaussians, sequence, config.density.maximum))
+    gaussians = _gathered(gaussians, _kept(gaussians, sequence, max(1, int(CARRIED * config.density.maximum))))
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     if config.initialisation.motion != "none" and config.model.spectral_motion:
         gaussians = _with_motion(gaussians, sequence, place, spectral)
@@ -139,17 +140,17 @@ def _canonical(neighbour: Neighbour, frame: int, config: Config, dtype: Any) -> 
     )
 
 
-def _kept(gaussians: Gaussians, sequence: Sequence, maximum: int) -> BoolArray:
-    """(N,) the Gaussians whose centre some training frame sees, or nearly; the `maximum` most opaque of them."""
+def _kept(gaussians: Gaussians, sequence: Sequence, most: int) -> BoolArray:
+    """(N,) the Gaussians whose centre some training frame sees, or nearly; the `most` opaque of them."""
     seen = np.zeros(gaussians.count, bool)
     for camera in {id(c): c for c in (sequence.cameras[i] for i in sequence.train_index)}.values():
         u, v, depth = project(camera, gaussians.position)
         x, y = MARGIN * camera.width, MARGIN * camera.height
         inside = (u >= -x) & (u <= camera.width + x) & (v >= -y) & (v <= camera.height + y)
         seen |= (depth > 0) & inside
-    if np.count_nonzero(seen) > maximum:
+    if np.count_nonzero(seen) > most:
         places = np.flatnonzero(seen)
-        faint = np.argsort(-gaussians.opacity_logit[places], kind="stable")[maximum:]
+        faint = np.argsort(-gaussians.opacity_logit[places], kind="stable")[most:]
         seen[places[faint]] = False
     return seen
 
@@ -199,11 +200,13 @@ def _new_tissue(
         scene, _ = scene_at(gaussians, spectral, config.model, float(sequence.times[i]))
         rendered, _ = render_forward(scene, sequence.cameras[i], raster_settings(config), degree=0)
         missing[i] = sequence.masks[i] & (rendered.opacity < COVERED)
-    fraction = missing[sequence.train_index].mean()
-    if not fraction:
+    fraction, room = missing[sequence.train_index].mean(), config.density.maximum - gaussians.count
+    if not fraction or room < 1:
         return None
     wanted = config.initialisation
-    wanted = msgspec.structs.replace(wanted, first_frame_points=max(1, round(wanted.first_frame_points * fraction)))
+    first = min(max(1, round(wanted.first_frame_points * fraction)), room)
+    others = min(wanted.other_frame_points, room - first)
+    wanted = msgspec.structs.replace(wanted, first_frame_points=first, other_frame_points=others)
     try:
         points = training_points(replace(sequence, masks=missing), wanted, rng)
     except InputError:  # no depth where tissue is missing

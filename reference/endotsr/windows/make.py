@@ -17,7 +17,7 @@ from endotsr.config import Config, config_to_toml, lengthened, load_config, with
 from endotsr.errors import InputError
 from endotsr.runs.files import replacing_folder
 from endotsr.runs.folder import open_run, refuse_existing
-from endotsr.runs.log import last_iteration
+from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
@@ -31,6 +31,7 @@ from endotsr.windows.survey import survey
 
 LOCK = "windows.lock"
 SETTINGS = "config.toml"
+VISITS = 36  # least iterations of a cold window per training frame, unless the length is given
 WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
 Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
 
@@ -59,6 +60,15 @@ def plan_recording(
     return record
 
 
+def with_visits(config: Config) -> Config:
+    """The settings with at least 36 iterations per training frame, so that a longer window is trained for longer.
+
+    36 is what preset `demo` gives a window of 48 frames. 15 leave such a window far from a fit (B18).
+    """
+    visits = max(VISITS, config.training.visits_per_frame)
+    return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=visits))
+
+
 def recording_settings(run: Path) -> Config:
     """The settings of a run of windows; those of a window have its frames and its length."""
     return load_config(run / SETTINGS)
@@ -71,6 +81,8 @@ def window_folder(run: Path, window: Window) -> Path:
 
 def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outcome]:
     """Train every window that is not finished; returns one outcome a window, in their order.
+
+    The job of a warm window is made when its neighbour is trained, whose Gaussians are the most that it may hold.
 
     outcomes   makes runs, anywhere; its outcomes come in any order, None when there is none
     Raises:    InputError for a folder that cannot be used, one that is trained already, and a full disk;
@@ -86,10 +98,7 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
         reporter.begin(watch.total)
         try:
             for wave in waves(record):
-                todo = [
-                    window_job(run, record, k, config, cold=True) if _lonely(jobs[k], found, reporter) else jobs[k]
-                    for k in wave
-                ]
+                todo = [window_job(run, record, k, config, cold=_lonely(jobs[k], found, reporter)) for k in wave]
                 _made(todo, outcomes, reporter, watch, found)
         except KeyboardInterrupt:
             done = sum(outcome.status == FINISHED for outcome in found.values())
@@ -124,7 +133,9 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
         neighbour, shorter = record.windows[k - 1], warm_settings(own)
         saved = own.training.iterations - shorter.training.iterations
         shift = window.first - neighbour.first
-        start, own = CarriedStart(str(window_folder(run, neighbour)), shift, record.shared(k), saved), shorter
+        beside = window_folder(run, neighbour)
+        start = CarriedStart(str(beside), shift, record.shared(k), saved)
+        own = no_larger(shorter, last_entry(beside / "log.jsonl").get("gaussians"))
     return Job(
         window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
         str(folder), start, measured=False,
@@ -138,6 +149,17 @@ def warm_settings(cold: Config) -> Config:
         shorter.training, residual_activation=0, harmonics_interval=1, coarse_start=False
     )
     return msgspec.structs.replace(shorter, training=training)
+
+
+def no_larger(config: Config, gaussians: int | None) -> Config:
+    """The settings with at most so many Gaussians, those that the neighbour ended with; unchanged before it is trained.
+
+    Without this bound each window of a chain adds to the Gaussians that are carried to it, and memory and time grow
+    along the chain.
+    """
+    if gaussians is None or gaussians >= config.density.maximum:
+        return config
+    return msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=max(1, gaussians)))
 
 
 def size_of(job: Job) -> tuple[int, int, int]:
