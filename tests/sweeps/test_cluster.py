@@ -1,14 +1,12 @@
 """A sweep through a real Dask scheduler and real worker processes; skipped without Dask."""
 
-import contextlib
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from dask_cluster import Cluster, in_the_middle
 from tiny_sweep import (
     BASE,
     CONFIGURATIONS,
@@ -27,40 +25,6 @@ from endotsr.cli.main import main
 pytest.importorskip("distributed", reason="Dask is not installed (pip install 'endotsr[cluster]')")
 
 LENGTH = 100  # iterations, enough to kill a worker in the middle
-
-
-class Cluster:
-    """A scheduler and its workers, each a process."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._processes = folder, []
-        file = folder / "scheduler.json"
-        self._start("scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
-        wait_until(lambda: file.exists() and file.read_text().strip().endswith("}"))
-        self.address = json.loads(file.read_text())["address"]
-
-    def worker(self, name: str, *more: str, **environment: str) -> subprocess.Popen:
-        """Start a worker."""
-        words = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name)
-        local = ("--local-directory", str(self._folder / name))
-        return self._start("worker", self.address, *words, *local, *more, **environment)
-
-    def _start(self, kind: str, *words: str, **environment: str) -> subprocess.Popen:
-        log = (self._folder / f"{kind}.log").open("ab")
-        process = subprocess.Popen(
-            [sys.executable, "-m", f"distributed.cli.dask_{kind}", *words],
-            env=os.environ | {"MPLBACKEND": "Agg"} | environment,
-            stdout=log,
-            stderr=log,
-        )
-        self._processes.append(process)
-        return process
-
-    def end(self) -> None:
-        """End all processes."""
-        for process in self._processes:
-            with contextlib.suppress(ProcessLookupError):
-                kill(process)
 
 
 @pytest.fixture
@@ -90,7 +54,7 @@ def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster,
     runs = out / "runs"
     # the middle: one run is finished, and the worker is in the middle of another
     wait_until(lambda: len(list(runs.glob("*/metrics.json"))) >= 1 or sweep.poll() is not None, 900)
-    wait_until(lambda: _in_the_middle(first.pid) or sweep.poll() is not None, 900)
+    wait_until(lambda: in_the_middle(first.pid, LENGTH) or sweep.poll() is not None, 900)
     assert sweep.poll() is None, sweep.communicate()
     finished = {path.parent.name: path.stat().st_mtime_ns for path in runs.glob("*/metrics.json")}
     kill(first)
@@ -109,16 +73,6 @@ def test_a_killed_worker_loses_nothing_and_results_equal_the_local_pool(cluster,
     assert main(["sweep", str(spec), "--out", str(local), "--workers", "1", "--threads", "1"]) == 0
     assert numbers(out) == numbers(local)
     assert_same_checkpoints(out, local)
-
-
-def _in_the_middle(pid: int) -> bool:
-    """Whether a process trains a run that has a checkpoint and is not in its last third."""
-    for link in Path(f"/proc/{pid}/fd").iterdir():
-        with contextlib.suppress(OSError):
-            log = link.readlink()
-            if log.name == "log.jsonl" and (log.parent / "checkpoint.npz").exists():
-                return 7 < len(log.read_text().splitlines()) < LENGTH * 2 // 3
-    return False
 
 
 def test_no_scheduler_is_one_line(capsys, tmp_path):
