@@ -76,16 +76,21 @@ UNDIFFERENTIATED = {
         "none: the guide to recordings shows one",
     ),
     "b18b": Undifferentiated(
+        ("endotsr.windows.scene.blended",),
+        "it comes after training",
+        "tests/windows/test_scene.py",
+        "none: windows are an option of training that is not part of the paper",
+    ),
+    "b18c": Undifferentiated(
         ("endotsr.windows.carry.carried_state",),
         "it comes before training",
         "tests/windows/test_carry.py",
         "none: windows are an option of training that is not part of the paper",
-        "none: the guide to recordings shows one",
     ),
-    "b18c": Undifferentiated(
-        ("endotsr.windows.scene.blended",),
+    "b18d": Undifferentiated(
+        ("endotsr.windows.follow.followed",),
         "it comes after training",
-        "tests/windows/test_scene.py",
+        "tests/windows/test_follow.py",
         "none: windows are an option of training that is not part of the paper",
         "none: the guide to recordings shows one",
     ),

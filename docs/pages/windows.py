@@ -7,10 +7,10 @@
     python docs/pages/windows.py table                                                write the tables again
 
 `recording` simulates breathing, pulsation, a moving camera, an instrument and a drift of the light as a StereoMIS
-recording, and makes the film with the commands of the guide. `warm` reads a run whose windows started warm: it trains
-every one of them again from a cold start, on the whole schedule, and finds the iteration at which the cold run reaches
-the training loss with which the warm one ends. Results are added to docs/results/windows.json; the tables stand in
-docs/guides/recording.md.
+recording, and makes the film with the commands of the guide; with `--keep` the same command continues what was
+interrupted. `warm` reads a run whose windows started warm: it trains every one of them again from a cold start, on the
+whole schedule, and finds the iteration at which the cold run reaches the training loss with which the warm one ends.
+Results are added to docs/results/windows.json; the tables stand in docs/guides/recording.md.
 """
 
 import argparse
@@ -22,6 +22,7 @@ import tempfile
 import time
 from datetime import date
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,12 @@ from marks import write_marked
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
+from endotsr.simulator.recorded import recorded_positions
 from endotsr.sweeps.execute import execute
+from endotsr.windows.follow import seam_errors
 from endotsr.windows.make import recording_settings, window_job
 from endotsr.windows.record import read_record
+from endotsr.windows.scene import WindowFrames, open_windows
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"
@@ -72,13 +76,49 @@ def row_of(run: Path, name: str, seconds: float, preset: str) -> dict[str, Any]:
 
 
 def trained(source: Path, run: Path, name: str, options: argparse.Namespace, windows: str) -> dict[str, Any]:
-    """One training in windows, with its evaluation."""
+    """One training in windows, with its evaluation; a run that was begun is continued."""
     words = ["train", str(source), "--out", str(run), "--windows", windows, "--preset", options.preset]
-    words += ["--chain", str(options.chain), "--workers", str(options.workers)]
+    words += ["--chain", str(options.chain), "--sequence.split", options.split]
     words += ["--iterations", str(options.iterations)] if options.iterations else []
+    words = ["train", "--out", str(run), "--resume"] if run.exists() else words
+    words += ["--workers", str(options.workers)]
     words += ["--lpips", str(options.lpips)] if options.lpips else []
     seconds, _ = command(*words)
-    return row_of(run, name, seconds, options.preset)
+    return row_of(run, name if options.split == "every_eighth" else f"{name}, {options.split}", seconds, options.preset)
+
+
+class Steps:
+    """The seconds of commands, kept in a folder: a command whose output exists is not run again."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder / "steps.json"
+        self.seconds = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
+
+    def make(self, name: str, out: Path, *words: str) -> None:
+        """Run a command, unless its output is there."""
+        if not out.exists():
+            self.keep(name, command(*words)[0])
+
+    def keep(self, name: str, seconds: float) -> None:
+        """Note the seconds of a step, added to those of earlier parts of it."""
+        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
+        write_json(self._file, self.seconds)
+
+
+def followed_errors(run: Path, raw: Path) -> dict[str, Any]:
+    """Errors of points that are followed across seams and inside of windows; the truth is that of the raw recording."""
+    scene = open_windows(run)
+    frames, place = WindowFrames(scene), {g: i for i, g in enumerate(scene.frames)}
+    camera = scene.cameras[0]
+    read = SimpleNamespace(names=scene.record.names, width=camera.width, height=camera.height)
+    positions = recorded_positions(raw, read)  # pyright: ignore[reportArgumentType]
+    assert positions is not None
+
+    def masks(g: int) -> np.ndarray:
+        k = scene.owner(g)
+        return frames.of_window(k).masks[g - scene.plan.windows[k].first]
+
+    return seam_errors(scene, masks, lambda g, other: positions(place[g], place[other]))._asdict()
 
 
 def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
@@ -90,22 +130,28 @@ def recording(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     words += ["--height", height, "--frames", str(options.frames)]
     for effect, length in cycles.items():
         words += [f"--{effect}.cycles", f"{options.frames / length:g}"]
-    command(*words)
-    steps = {"prepare": command("prepare", str(raw), "--out", str(clip))[0]}
-    steps["depth"] = command("depth", str(clip), "--nearest", "25", "--farthest", "120")[0]
-    name = f"simulated {options.frames} frames {options.size}"
-    found = trained(clip, run, name, options, options.windows[0])
-    steps["train"] = found["seconds"]
-    steps["film"] = command("render", str(run), "--film", str(folder / "film.mp4"))[0]
-    return found | {"steps": steps}
+    steps, depth = Steps(folder), clip / "depth"
+    steps.make("simulate", raw, *words)
+    steps.make("prepare", clip, "prepare", str(raw), "--out", str(clip))
+    steps.make("depth", depth, "depth", str(clip), "--nearest", "25", "--farthest", "120")
+    found = trained(clip, run, f"simulated {options.frames} frames {options.size}", options, options.windows[0])
+    steps.keep("train", found["seconds"])
+    film, page = folder / "film.mp4", folder / "page.html"
+    steps.make("film", film, "render", str(run), "--film", str(film))
+    steps.make("page", page, "export", str(run), "--out", str(page))
+    largest = max(file.stat().st_size for file in (folder / "page_windows").iterdir())
+    return found | {
+        "steps": steps.seconds,
+        "followed": followed_errors(run, raw),
+        "page_bytes": {"page": page.stat().st_size, "largest_window": largest},
+    }
 
 
-def warm(run: Path) -> list[dict[str, Any]]:
-    """For every warm window: its iterations, and those of a cold run that reach the same loss."""
+def warm(run: Path, most: int) -> list[dict[str, Any]]:
+    """For the first warm windows: their iterations, and those of a cold run that reach the same loss."""
     record, config, found = read_record(run), recording_settings(run), []
-    for k, window in enumerate(record.windows):
-        if window.start == "cold":
-            continue
+    for k in [k for k, window in enumerate(record.windows) if window.start == "warm"][:most]:
+        window = record.windows[k]
         job = window_job(run, record, k, config)
         mine = losses(Path(job.folder))
         other = window_job(run, record, k, config, cold=True)._replace(
@@ -147,6 +193,23 @@ def table(rows: list[dict[str, Any]]) -> str:
     return markdown(headings, cells)
 
 
+def seam_table(rows: list[dict[str, Any]]) -> str:
+    """Points that are followed for 16 frames, and the minutes of the commands, for every raw recording."""
+    headings = ["Recording", "Seams", "Across, of the motion", "Inside, of the motion",
+                "Minutes: prepare, depth, train, film", "Page, largest window, MB"]  # fmt: skip
+    cells = []
+    for row in rows:
+        if (f := row.get("followed")) is None:
+            continue
+        minutes = ", ".join(f"{row['steps'][name] / 60:.1f}" for name in ("prepare", "depth", "train", "film"))
+        cells.append([
+            row["name"], f"{f['seams']}", f"{f['across']:.2f} of {f['across_motion']:.2f} mm",
+            f"{f['inside']:.2f} of {f['inside_motion']:.2f} mm", minutes,
+            ", ".join(f"{size / 1e6:.1f}" for size in row["page_bytes"].values()),
+        ])  # fmt: skip
+    return markdown(headings, cells) if cells else "Not measured yet."
+
+
 def warm_table(rows: list[dict[str, Any]]) -> str:
     """One warm window a row."""
     if not rows:
@@ -170,7 +233,9 @@ def main() -> None:
     parser.add_argument("--chain", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--iterations", type=int)
+    parser.add_argument("--most", type=int, default=1000, help="warm windows that are trained again (warm)")
     parser.add_argument("--preset", default="quick")
+    parser.add_argument("--split", choices=["every_eighth", "every_second", "blocks"], default="every_eighth")
     parser.add_argument("--lpips", type=Path)
     parser.add_argument("--keep", type=Path, help="folder for what is made (default: a temporary one)")
     options = parser.parse_args()
@@ -185,10 +250,11 @@ def main() -> None:
                 run = folder / f"windows{number}"
                 known["rows"].append(trained(options.source, run, options.source.name, options, number))
         elif options.what == "warm":
-            known["warm"] = warm(options.source)
+            known["warm"] = warm(options.source, options.most)
     write_json(FILE, known)
     if PAGE.exists():
-        write_marked(PAGE, {"runs": table(known["rows"]), "warm": warm_table(known["warm"])}, "windows")
+        tables = {"runs": table(known["rows"]), "seams": seam_table(known["rows"]), "warm": warm_table(known["warm"])}
+        write_marked(PAGE, tables, "windows")
 
 
 if __name__ == "__main__":

@@ -14,13 +14,14 @@ from endotsr.errors import InputError
 class ExportOptions:
     """Write a scene for other programs, as a page that plays it, or as a slim model that `render` and `export` read.
 
-    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows gives .ply files, each of its windows the
-    rest. The ending of --out chooses what is written: `.npz` is a slim model of the whole scene, `.html` is a page with
-    the moving scene, `.glb` holds points that move, `.ply` is one time of the scene, and a name without an ending is a
-    folder with one .ply file for every time.
+    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows gives .ply files and a page, each of its
+    windows the rest. The ending of --out chooses what is written: `.npz` is a slim model of the whole scene, `.html` is
+    a page with the moving scene, `.glb` holds points that move, `.ply` is one time of the scene, and a name without an
+    ending is a folder with one .ply file for every time.
 
     The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
-    kept at key times, between which the page interpolates; the colours are those that the observed camera sees.
+    kept at key times, between which the page interpolates; the colours are those that the observed camera sees. The
+    page of a run of windows has a folder beside it, from which it loads the window that is played.
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
@@ -42,7 +43,7 @@ class ExportOptions:
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
     """components to leave out"""
     keys: Annotated[int | None, Option("N")] = None
-    """of a page: largest number of key times, default 32; more are smoother and make the page larger"""
+    """of a page: largest number of key times, default 32 (a window: 16); more are smoother and make the page larger"""
     title: str = ""
     """of a page: its heading (default: the name of the scene)"""
     held_out: bool = True
@@ -91,13 +92,42 @@ def _write_page(options: ExportOptions) -> None:
     from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import load_run_sequence
     from endotsr.views.page import KEYS, check_page, write_page
+    from endotsr.windows.page import WINDOW_KEYS
+    from endotsr.windows.record import is_windowed
 
-    keys = KEYS if options.keys is None else options.keys
+    usual = WINDOW_KEYS if is_windowed(options.scene) else KEYS
+    keys = usual if options.keys is None else options.keys
     check_page(options.out, keys)
     refuse_unwritable(options.out)
+    title = options.title or options.scene.absolute().name
+    if is_windowed(options.scene):
+        _write_windows_page(options, title, keys)
+        return
     scene = open_scene(options.scene)
     wanted = options.held_out and scene.folder is not None
     sequence = load_run_sequence(scene.folder, options.sequence) if wanted and scene.folder else None
-    size = write_page(options.out, scene, options.title or options.scene.absolute().name, keys, sequence)
+    size = write_page(options.out, scene, title, keys, sequence)
     print(f"{options.out}: {size / 1e6:.1f} MB, open it in a browser")
     write_result(options.json, page=options.out, bytes=size, held_out=sequence is not None)
+
+
+def _write_windows_page(options: ExportOptions, title: str, keys: int) -> None:
+    """The page of a recording, and the folder of its windows."""
+    from endotsr.windows.page import window_files, write_windows_page
+    from endotsr.windows.scene import WindowFrames, open_windows
+
+    scene, folder = open_windows(options.scene), window_files(options.out)
+    frames = WindowFrames(scene, options.sequence) if options.held_out else None
+    found = write_windows_page(options.out, scene, title, keys, frames)
+    print(
+        f"{options.out}: {found.page / 1e6:.1f} MB, and {folder}: {len(found.windows)} windows of at most"
+        f" {max(found.windows) / 1e6:.1f} MB, which belong together; open the page in a browser"
+    )
+    write_result(
+        options.json,
+        page=options.out,
+        bytes=found.page,
+        windows=found.windows,
+        folder=folder,
+        held_out=frames is not None,
+    )

@@ -10,7 +10,7 @@ import json
 import re
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +20,14 @@ from endotsr.export.scene import MovingScene
 from endotsr.fitting.model import raster_settings
 from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode_transparent
 from endotsr.runs.files import replace_file
+from endotsr.sequences.record import SequenceRecord
 from endotsr.sequences.sequence import Sequence
 from endotsr.views.cameras import pivot_depth_of
 from endotsr.views.panels import ERROR_SCALE
-from endotsr.views.trajectories import header, key_times, packed, trajectories
+from endotsr.views.trajectories import Trajectories, header, key_times, packed, trajectories
 
 MOST_KEYS = 128
+SECONDS = 4  # that the page takes to play one set of Gaussians where the duration is unknown
 KEYS = 32  # key times unless more or fewer are asked for
 RUN_PAGE = "view.html"  # in a run folder
 TEMPLATE, SCRIPT = "viewer.html", "viewer.js"
@@ -62,36 +64,56 @@ def page(scene: MovingScene, title: str, keys: int, sequence: Sequence | None = 
     sequence   the frames; without it the page has no held-out frames and no error
     """
     found = trajectories(scene, key_times(scene, keys))
-    about = header(found) | _about(scene) | {"held_out": _held_out(sequence) if sequence else []}
+    low, high, pivot = depths_shown(scene)
+    about = header(found) | about_frames(scene.record) | about_pictures(scene, pivot) | {"depth_range": [low, high]}
+    about |= {"cameras": camera_numbers(scene), "seconds": SECONDS}
+    held_out = [frame._asdict() for frame in held_out_frames(sequence)] if sequence else []
+    return page_text(title, about | {"held_out": held_out}, encoded(found))
+
+
+def encoded(found: Trajectories) -> str:
+    """The compressed numbers as text."""
+    return base64.b64encode(packed(found)).decode("ascii")
+
+
+def page_text(title: str, about: dict[str, object], data: str) -> str:
+    """The template with its heading, its script, what the script reads, and the numbers of the Gaussians."""
     folder = resources.files("endotsr.views")
     text = (folder / TEMPLATE).read_text(encoding="utf-8")
     parts = {
         "@TITLE@": html.escape(title),
         "@SCRIPT@": (folder / SCRIPT).read_text(encoding="utf-8"),
         "@ABOUT@": json.dumps(about).replace("<", "\\u003c"),
-        "@DATA@": base64.b64encode(packed(found)).decode("ascii"),
+        "@DATA@": data,
     }
     return re.sub("|".join(parts), lambda mark: parts[mark[0]], text)
 
 
-def _about(scene: MovingScene) -> dict[str, Any]:
-    """Cameras, rules of the rasteriser, colours, and the depths that they span."""
-    record, settings = scene.record, raster_settings(scene.model.config)
-    cameras = scene.cameras
-    out = scene.render(record.times[0], cameras[0])
-    low, high = depth_range(normalised_depth(out))
-    shown = cameras[:1] if record.static_camera else cameras
+def about_frames(record: SequenceRecord) -> dict[str, object]:
+    """Names and times of the frames, the unit of length, and the seconds from time 0 to time 1 (0 = unknown)."""
+    frames = {"names": record.names, "times": record.times}
+    return {"unit": record.unit, "duration": record.duration, "frames": frames}
+
+
+def depths_shown(scene: MovingScene) -> tuple[float, float, float]:
+    """Least and largest depth of the first picture, and that of the point about which the view turns; scene units."""
+    out = scene.render(scene.record.times[0], scene.cameras[0])
+    return *depth_range(normalised_depth(out)), pivot_depth_of(out.depth, out.opacity)
+
+
+def camera_numbers(scene: MovingScene) -> list[list[float]]:
+    """Rotation, translation, focal lengths and centre of each frame's camera; one row where the camera rests."""
+    shown = scene.cameras[:1] if scene.record.static_camera else scene.cameras
+    return [[*np.ravel(c.rotation).tolist(), *np.ravel(c.translation).tolist(), c.fx, c.fy, c.cx, c.cy] for c in shown]
+
+
+def about_pictures(scene: MovingScene, pivot_depth: float) -> dict[str, object]:
+    """Size of the pictures, rules of the rasteriser and colours."""
+    settings, camera = raster_settings(scene.model.config), scene.cameras[0]
     return {
-        "unit": record.unit,
-        "duration": record.duration,
-        "frames": {"names": record.names, "times": record.times},
-        "cameras": [
-            [*np.ravel(c.rotation).tolist(), *np.ravel(c.translation).tolist(), c.fx, c.fy, c.cx, c.cy] for c in shown
-        ],
-        "width": cameras[0].width,
-        "height": cameras[0].height,
-        "pivot_depth": pivot_depth_of(out.depth, out.opacity),
-        "depth_range": [low, high],
+        "width": camera.width,
+        "height": camera.height,
+        "pivot_depth": pivot_depth,
         "error_scale": ERROR_SCALE,
         "raster": {
             "near": settings.near,
@@ -104,11 +126,19 @@ def _about(scene: MovingScene) -> dict[str, Any]:
     }
 
 
-def _held_out(sequence: Sequence) -> list[dict[str, Any]]:
-    """The held-out frames as pictures; an excluded pixel is transparent."""
+class HeldOut(NamedTuple):
+    """A held-out frame."""
+
+    name: str
+    time: float
+    picture: str  # data: address; an excluded pixel is transparent
+
+
+def held_out_frames(sequence: Sequence) -> list[HeldOut]:
+    """The held-out frames as pictures."""
     found = []
     for i in map(int, sequence.test_index):
         picture = np.dstack([sequence.images[i].transpose(1, 2, 0), sequence.masks[i] * np.uint8(255)])
         uri = data_uri(encode_transparent(picture), "png")
-        found.append({"name": sequence.names[i], "time": float(sequence.times[i]), "picture": uri})
+        found.append(HeldOut(sequence.names[i], float(sequence.times[i]), uri))
     return found

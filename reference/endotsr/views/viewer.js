@@ -4,7 +4,7 @@
 (async function () {
 const element = (id) => document.getElementById(id);
 const about = JSON.parse(element("about").textContent);
-const N = about.count, K = about.times.length, WIDTH = 1024, ROWS = Math.max(1, Math.ceil(N / WIDTH));
+const WIDTH = 1024;  // Gaussians in a row of a texture
 
 function fail(message) {
   element("failure").textContent = message;
@@ -13,15 +13,14 @@ function fail(message) {
 }
 
 // ---------------------------------------------------------------- the numbers
-async function unpack() {
-  const text = element("data").textContent.trim(), raw = atob(text), bytes = new Uint8Array(raw.length);
+async function unpack(text) {
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  element("data").textContent = "";
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-function summed(planes, row, words) {  // one row (K, N): differences between key times added up
+function summed(planes, row, words, K, N) {  // one row (K, N): differences between key times added up
   const size = K * N, out = words ? new Uint16Array(size) : new Uint8Array(size);
   for (let i = 0; i < size; i++) {
     const step = words ? planes[row * size + i] | (planes[(row + 1) * size + i] << 8) : planes[row * size + i];
@@ -29,12 +28,6 @@ function summed(planes, row, words) {  // one row (K, N): differences between ke
   }
   return out;
 }
-
-let planes;
-try { planes = await unpack(); } catch (error) { return fail("This browser cannot unpack the scene: " + error); }
-const words = [0, 2, 4, 6, 8, 10].map((row) => summed(planes, row, true));
-const small = [0, 1, 2, 3, 4, 5, 6, 7].map((row) => summed(planes, 12 + row, false));
-planes = null;
 
 // ---------------------------------------------------------------- programs
 const canvas = element("scene");
@@ -114,12 +107,13 @@ void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 -
 
 const SHOW_FRAGMENT = `#version 300 es
 precision highp float;
-uniform sampler2D drawn, map, truth; uniform int layer; uniform float error_scale;
+uniform sampler2D drawn, later, map, truth; uniform int layer; uniform float error_scale, weight;
 out vec4 result;
 vec3 mapped(float level) { return texelFetch(map, ivec2(int(clamp(level, 0.0, 1.0) * 255.0 + 0.5), 0), 0).rgb; }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 sum = texelFetch(drawn, at, 0);
+  if (weight > 0.0) sum = mix(sum, texelFetch(later, at, 0), weight);
   vec3 shown = sum.rgb;
   if (layer == 1) shown = sum.a > 0.05 ? mapped(sum.r / sum.a) : vec3(0.376, 0.376, 0.4);
   if (layer == 2) shown = vec3(sum.a);
@@ -156,31 +150,43 @@ try {
   show = program(SHOW_VERTEX, SHOW_FRAGMENT);
 } catch (error) { return fail("The shaders cannot be compiled: " + error.message); }
 
-// ---------------------------------------------------------------- textures
-function layered(unit, format, inside, type, fill, Kind) {
-  const texture = gl.createTexture(), layer = new Kind(WIDTH * ROWS * 4);
-  gl.activeTexture(gl.TEXTURE0 + unit);
+// ---------------------------------------------------------------- parts: one set of Gaussians each
+function layered({count: N, K, rows}, format, inside, type, fill, Kind) {
+  const texture = gl.createTexture(), layer = new Kind(WIDTH * rows * 4);
+  gl.activeTexture(gl.TEXTURE0);
   gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
-  gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, inside, WIDTH, ROWS, K);
+  gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, inside, WIDTH, rows, K);
   for (let k = 0; k < K; k++) {
     for (let i = 0; i < N; i++) fill(layer, 4 * i, k * N + i);
-    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, k, WIDTH, ROWS, 1, format, type, layer);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, k, WIDTH, rows, 1, format, type, layer);
   }
   gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
   gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  return texture;
 }
 gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-layered(0, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
-  for (let c = 0; c < 4; c++) out[o + c] = words[c][i];
-}, Uint16Array);
-layered(1, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
-  out[o] = words[4][i]; out[o + 1] = words[5][i];
-  out[o + 2] = small[0][i] | (small[1][i] << 8); out[o + 3] = small[2][i] | (small[3][i] << 8);
-}, Uint16Array);
-layered(2, gl.RGBA_INTEGER, gl.RGBA8UI, gl.UNSIGNED_BYTE, (out, o, i) => {
-  for (let c = 0; c < 4; c++) out[o + c] = small[4 + c][i];
-}, Uint8Array);
-const ranges = about.high.map((high, row) => high - about.low[row]);
+
+async function part(numbers, text) {  // numbers: count, times, low, high, cameras, held_out of one set of Gaussians
+  const N = numbers.count, K = numbers.times.length, planes = await unpack(text);
+  const words = [0, 2, 4, 6, 8, 10].map((row) => summed(planes, row, true, K, N));
+  const small = [0, 1, 2, 3, 4, 5, 6, 7].map((row) => summed(planes, 12 + row, false, K, N));
+  const made = {...numbers, K, rows: Math.max(1, Math.ceil(N / WIDTH)), position: words.slice(0, 3),
+    ranges: numbers.high.map((high, row) => high - numbers.low[row])};
+  made.textures = [
+    layered(made, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
+      for (let c = 0; c < 4; c++) out[o + c] = words[c][i];
+    }, Uint16Array),
+    layered(made, gl.RGBA_INTEGER, gl.RGBA16UI, gl.UNSIGNED_SHORT, (out, o, i) => {
+      out[o] = words[4][i]; out[o + 1] = words[5][i];
+      out[o + 2] = small[0][i] | (small[1][i] << 8); out[o + 3] = small[2][i] | (small[3][i] << 8);
+    }, Uint16Array),
+    layered(made, gl.RGBA_INTEGER, gl.RGBA8UI, gl.UNSIGNED_BYTE, (out, o, i) => {
+      for (let c = 0; c < 4; c++) out[o + c] = small[4 + c][i];
+    }, Uint8Array)];
+  made.depth = new Float32Array(N);
+  made.order = [new Uint32Array(N), new Uint32Array(N)];
+  return made;
+}
 
 function flat(unit) {
   const texture = gl.createTexture();
@@ -190,12 +196,14 @@ function flat(unit) {
   for (const key of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, key, gl.CLAMP_TO_EDGE);
   return texture;
 }
-const drawn = flat(3);
-if (precise) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, about.width, about.height, 0, gl.RGBA, gl.HALF_FLOAT, null);
-else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, about.width, about.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
-const buffer = gl.createFramebuffer();
-gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, drawn, 0);
+const buffers = [3, 6].map((unit) => {  // one picture, and that of the window it is blended with
+  const texture = flat(unit), buffer = gl.createFramebuffer();
+  if (precise) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, about.width, about.height, 0, gl.RGBA, gl.HALF_FLOAT, null);
+  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, about.width, about.height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+  return buffer;
+});
 const MAPS = {1: "viridis", 3: "magma"};
 flat(4);
 flat(5);
@@ -210,18 +218,97 @@ const order = gl.createBuffer(), item = gl.getAttribLocation(splat.made, "item")
 const field = gl.createVertexArray();
 gl.bindVertexArray(field);
 gl.bindBuffer(gl.ARRAY_BUFFER, order);
-gl.bufferData(gl.ARRAY_BUFFER, 4 * Math.max(N, 1), gl.STREAM_DRAW);
 gl.enableVertexAttribArray(item);
 gl.vertexAttribIPointer(item, 1, gl.UNSIGNED_INT, 0, 0);
 gl.vertexAttribDivisor(item, 1);
 const nothing = gl.createVertexArray();
 
+// ---------------------------------------------------------------- windows: parts that are loaded when they are played
+// A page of one run has one part, whose numbers stand in the page. That of a recording has a script file for each window.
+const MOST_PARTS = 4;  // held at a time
+const spans = about.windows || [{begin: 0, end: 1}];
+const loaded = new Map();  // number of a window -> its part, or the promise of it; the one used last comes last
+
+function shows(time) {  // numbers of the windows that show a time: none in a gap, two in an overlap
+  const found = [];
+  spans.forEach((span, k) => {
+    if (span.begin <= time && (time < span.end || time === span.end && !(spans[k + 1] && spans[k + 1].begin <= time)))
+      found.push(k);
+  });
+  return found;
+}
+
+function fetched(k) {  // a promise of window k
+  if (!loaded.has(k)) loaded.set(k, about.windows ? new Promise((done, failed) => {
+    const script = document.createElement("script");
+    script.src = spans[k].file;
+    script.onerror = () => failed(new Error(spans[k].file + " is missing; it belongs beside the page."));
+    window.endotsr_window = window.endotsr_window || {};
+    window.endotsr_window[k] = (numbers, text) => part(numbers, text).then(done, failed);
+    document.head.append(script);
+    script.onload = () => script.remove();
+  }).then((made) => {
+    delete window.endotsr_window[k];
+    loaded.set(k, made);
+    forget();
+    markWindows();
+    return made;
+  }).catch((error) => { loaded.delete(k); fail(error.message); throw error; }) : part(about, element("data").textContent.trim())
+    .then((made) => { loaded.set(k, made); return made; }));
+  return Promise.resolve(loaded.get(k));
+}
+
+function forget() {  // textures of the windows that were not used for longest
+  const ready = [...loaded.keys()].filter((k) => loaded.get(k).textures && !shows(state.time).includes(k));
+  for (const k of ready.slice(0, Math.max(0, loaded.size - MOST_PARTS))) {
+    loaded.get(k).textures.forEach((texture) => gl.deleteTexture(texture));
+    loaded.delete(k);
+  }
+}
+
+function partsNow() {  // the loaded parts of this time with their weights; what is missing is fetched
+  const wanted = shows(state.time), found = [];
+  for (const k of wanted) {
+    const here = loaded.get(k);
+    if (here && here.textures) {
+      loaded.delete(k);  // the last one of the map is the one used last
+      loaded.set(k, here);
+      found.push([here, 1]);
+    } else if (!here) fetched(k).then(() => draw(), () => stop());
+  }
+  const last = wanted[wanted.length - 1], span = spans[last];
+  if (span && state.time > (span.begin + span.end) / 2 && last + 1 < spans.length && !loaded.has(last + 1))
+    fetched(last + 1).catch(() => stop());
+  if (found.length === 2) {
+    const begin = spans[wanted[1]].begin, end = spans[wanted[0]].end;
+    found[1][1] = (state.time - begin) / (end - begin);
+  }
+  return found;
+}
+const waiting = () => shows(state.time).some((k) => !(loaded.get(k) && loaded.get(k).textures));
+
+function markWindows() {  // the strip below the slider: which windows there are, and which are loaded
+  for (const [k, mark] of [...element("windows").children].entries())
+    mark.classList.toggle("on", Boolean(loaded.get(k) && loaded.get(k).textures));
+}
+if (about.windows) {
+  element("windows").hidden = false;
+  spans.forEach((span, k) => {
+    const mark = document.createElement("button");
+    mark.style.left = 100 * span.begin + "%";
+    mark.style.width = 100 * (span.end - span.begin) + "%";
+    mark.title = "Window " + span.name + ", frames " + span.frames;
+    mark.setAttribute("aria-label", mark.title);
+    mark.onclick = () => { go(span.begin); draw(); };
+    element("windows").append(mark);
+  });
+}
+
 // ---------------------------------------------------------------- time, camera, order
 const state = {time: 0, yaw: 0, pitch: 0, closer: 1, right: 0, down: 0, layer: 0, playing: false, orbiting: false,
   phase: 0, speed: 1, clock: 0};  // right, down: shift of the picture, pixels; clock: time while the error layer waits
 
-function keysAt(time) {
-  const times = about.times;
+function keysAt({times, K}, time) {
   let k = 0;
   while (k + 2 < K && times[k + 1] <= time) k++;
   if (K < 2) return [0, 0, 0];
@@ -247,7 +334,8 @@ function apply(a, v) {
 }
 
 function cameraNow() {  // the observed camera, turned about the pivot on its axis, and moved along the axis
-  const frame = about.cameras.length > 1 ? nearestFrame(state.time) : 0, numbers = about.cameras[frame];
+  const {cameras, first} = shownPart, frame = nearestFrame(state.time) - (first || 0);
+  const numbers = cameras[Math.min(Math.max(frame, 0), cameras.length - 1)];  // a camera at rest is written once
   const [sy, cy, sp, cp] = [Math.sin(state.yaw), Math.cos(state.yaw), Math.sin(state.pitch), Math.cos(state.pitch)];
   const turn = multiply([1, 0, 0, 0, cp, sp, 0, -sp, cp], [cy, 0, sy, 0, 1, 0, -sy, 0, cy]);
   const pivot = [0, 0, about.pivot_depth], t = numbers.slice(9, 12);
@@ -258,13 +346,13 @@ function cameraNow() {  // the observed camera, turned about the pivot on its ax
   return {rotation: multiply(turn, numbers.slice(0, 9)), translation: moved, lens: numbers.slice(12, 16)};
 }
 
-const depthBits = new Uint32Array(N), depth = new Float32Array(depthBits.buffer);
-const sorted = new Uint32Array(N), other = new Uint32Array(N), counts = new Uint32Array(65537);
+const counts = new Uint32Array(65537);
 
-function sortByDepth(camera, [k0, k1, f]) {  // from far to near: two passes of 16 bits over the bits of the depth
+function sortByDepth(of, camera, [k0, k1, f]) {  // from far to near: two passes of 16 bits over the bits of the depth
+  const {count: N, ranges, low, depth, order: [sorted, other]} = of, depthBits = new Uint32Array(depth.buffer);
   const r = camera.rotation, scale = [0, 1, 2].map((c) => r[6 + c] * ranges[c] / 65535);
-  const base = camera.translation[2] + r[6] * about.low[0] + r[7] * about.low[1] + r[8] * about.low[2];
-  const [x, y, z] = words, a = k0 * N, b = k1 * N, g = 1 - f;
+  const base = camera.translation[2] + r[6] * low[0] + r[7] * low[1] + r[8] * low[2];
+  const [x, y, z] = of.position, a = k0 * N, b = k1 * N, g = 1 - f;
   for (let i = 0; i < N; i++) {
     const value = base + scale[0] * (g * x[a + i] + f * x[b + i]) + scale[1] * (g * y[a + i] + f * y[b + i])
       + scale[2] * (g * z[a + i] + f * z[b + i]);
@@ -281,10 +369,8 @@ function sortByDepth(camera, [k0, k1, f]) {  // from far to near: two passes of 
 }
 
 // ---------------------------------------------------------------- a picture
-function draw(layer = state.layer) {
-  const camera = cameraNow(), keys = keysAt(state.time), {made, at} = splat, raster = about.raster;
-  const size = [about.width, about.height];
-  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+function splats(of, camera, layer) {  // one part, into the buffer that is bound
+  const keys = keysAt(of, state.time), {made, at} = splat, raster = about.raster, size = [about.width, about.height];
   gl.viewport(0, 0, ...size);
   gl.clearColor(0, 0, 0, 0);
   gl.clear(gl.COLOR_BUFFER_BIT);
@@ -293,12 +379,16 @@ function draw(layer = state.layer) {
   gl.useProgram(made);
   gl.bindVertexArray(field);
   gl.bindBuffer(gl.ARRAY_BUFFER, order);
-  gl.bufferSubData(gl.ARRAY_BUFFER, 0, sortByDepth(camera, keys));
-  for (const [name, unit] of [["first", 0], ["second", 1], ["third", 2]]) gl.uniform1i(at[name], unit);
+  gl.bufferData(gl.ARRAY_BUFFER, sortByDepth(of, camera, keys), gl.STREAM_DRAW);
+  for (const [unit, name] of ["first", "second", "third"].entries()) {
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, of.textures[unit]);
+    gl.uniform1i(at[name], unit);
+  }
   gl.uniform2i(at.keys, keys[0], keys[1]);
   gl.uniform1f(at.between, keys[2]);
-  gl.uniform3fv(at.low, about.low);
-  gl.uniform3fv(at.range, ranges);
+  gl.uniform3fv(at.low, of.low);
+  gl.uniform3fv(at.range, of.ranges);
   gl.uniformMatrix3fv(at.turn, true, camera.rotation);
   gl.uniform3fv(at.move, camera.translation);
   gl.uniform4fv(at.lens, camera.lens);
@@ -311,15 +401,30 @@ function draw(layer = state.layer) {
   gl.uniform1f(at.cutoff, raster.alpha_cutoff);
   gl.uniform1f(at.alpha_max, raster.alpha_max);
   gl.uniform1i(at.layer, layer);
-  gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, N);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, of.count);
   gl.disable(gl.BLEND);
+}
+
+let shownPart = null, weight = 0;  // the part whose camera is used; weight of the later of two that are blended
+function draw(layer = state.layer) {
+  const parts = partsNow();
+  if (!parts.length) return describe();  // its numbers are on their way; the last picture stays
+  weight = parts.length > 1 ? parts[1][1] : 0;
+  shownPart = parts[weight > 0.5 ? 1 : 0][0];
+  const camera = cameraNow();
+  parts.forEach(([of], i) => {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffers[i]);
+    splats(of, camera, layer);
+  });
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   gl.useProgram(show.made);
   gl.bindVertexArray(nothing);
   gl.uniform1i(show.at.drawn, 3);
+  gl.uniform1i(show.at.later, 6);
   gl.uniform1i(show.at.map, 4);
   gl.uniform1i(show.at.truth, 5);
   gl.uniform1i(show.at.layer, state.layer);
+  gl.uniform1f(show.at.weight, weight);
   gl.uniform1f(show.at.error_scale, about.error_scale);
   gl.drawArrays(gl.TRIANGLES, 0, 3);
   describe();
@@ -336,9 +441,17 @@ function describe() {
   const i = nearestFrame(state.time), frame = about.frames.names[i];
   element("time").textContent = "frame " + (i + 1) + " of " + about.frames.names.length + ", t = " + state.time.toFixed(3)
     + (about.duration ? ", " + (state.time * about.duration).toFixed(2) + " s" : "");
-  element("shown").textContent = (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame;
+  const gap = shows(state.time).length ? null : "No window shows this time" + gapReason(state.time);
+  element("shown").textContent = gap || (waiting() ? "Loading window " + shows(state.time).map((k) => spans[k].name).join(" and ")
+    : (moved() ? "Turned view" : "View of the camera") + ", nearest frame " + frame);
+  chips();
   clearTimeout(addressed);
   addressed = setTimeout(address, 200);
+}
+
+function gapReason(time) {
+  const gap = (about.left_out || []).find((found) => found.begin <= time && time <= found.end);
+  return gap ? ": " + gap.reason : "";
 }
 
 let addressed = 0;
@@ -394,12 +507,15 @@ async function visit(frame, error = false) {
   unmark();
   state.time = frame.time;
   held = frame;
-  element("chips").querySelectorAll("button")[about.held_out.indexOf(frame)].classList.add("on");
-  element("truth").src = frame.picture;
+  draw();  // the chips of this time
+  for (const chip of element("chips").querySelectorAll("button")) chip.classList.toggle("on", chip.title === frame.name);
+  const source = frame.picture || (await fetched(frame.window)).held_out[frame.place].picture;
+  if (held !== frame) return;
+  element("truth").src = source;
   element("truth_name").textContent = "Held-out frame " + frame.name + "; grey is excluded";
   element("beside").hidden = false;
   element("stage").classList.add("two");
-  const bytes = await (await fetch(frame.picture)).blob();
+  const bytes = await (await fetch(source)).blob();
   const picture = await createImageBitmap(bytes, {premultiplyAlpha: "none", colorSpaceConversion: "none"});
   if (held !== frame) return;  // another one was chosen meanwhile
   gl.activeTexture(gl.TEXTURE5);
@@ -430,8 +546,9 @@ let before = 0;
 function tick(now) {
   const seconds = Math.min((now - before) / 1000, 0.1);
   before = now;
-  if (state.playing) {
-    state.clock = ((state.layer === 3 ? state.clock : state.time) + state.speed * seconds / (about.duration || 4)) % 1;
+  if (state.playing && !waiting()) {
+    state.clock = ((state.layer === 3 ? state.clock : state.time) + state.speed * seconds / (about.duration || about.seconds)) % 1;
+    if (!shows(state.clock).length) state.clock = (spans.find((span) => span.begin > state.clock) || spans[0]).begin;
     go(state.clock);
   }
   if (state.orbiting) {
@@ -481,13 +598,17 @@ function unmark() {
 
 function surface(x, y) {  // the point of the rendered surface at a pixel of the picture, or null
   draw(1);
-  const sum = new Float32Array(4), bytes = new Uint8Array(4);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-  if (precise) gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.FLOAT, sum);
-  else {
-    gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-    sum.set([...bytes].map((v) => v / 255));
-  }
+  const sum = [0, 0, 0, 0];
+  [[buffers[0], 1 - weight], [buffers[1], weight]].forEach(([buffer, share]) => {
+    const found = new Float32Array(4), bytes = new Uint8Array(4);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+    if (precise) gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.FLOAT, found);
+    else {
+      gl.readPixels(x, about.height - 1 - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+      found.set([...bytes].map((v) => v / 255));
+    }
+    if (share > 0) found.forEach((v, c) => { sum[c] += share * v; });
+  });
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   draw();
   if (sum[3] < 0.5) return null;
@@ -570,19 +691,29 @@ document.onkeydown = (event) => {  // buttons, slider and list keep their own ke
   else KEYS[event.key]();
   draw();
 };
-for (const frame of about.held_out) {
-  const chip = document.createElement("button");
-  chip.textContent = frame.time.toFixed(3);
-  chip.title = frame.name;
-  chip.onclick = () => visit(frame, state.layer === 3);
-  element("chips").append(chip);
-  element("chips").hidden = false;
-  element("layer").options[3].disabled = false;
+let chipped = "";  // the windows whose held-out frames have a button
+function chips() {
+  const now = shows(state.time), frames = about.held_out.filter((frame) => !about.windows || now.includes(frame.window));
+  if (chipped === now.join()) return;
+  chipped = now.join();
+  for (const chip of element("chips").querySelectorAll("button")) chip.remove();
+  for (const frame of frames) {
+    const chip = document.createElement("button");
+    chip.textContent = frame.time.toFixed(3);
+    chip.title = frame.name;
+    chip.onclick = () => visit(frame, state.layer === 3);
+    chip.classList.toggle("on", frame === held);
+    element("chips").append(chip);
+  }
+  element("chips").hidden = frames.length === 0;
 }
-element("note").textContent = N.toLocaleString("en") + " Gaussians, " + K + " key times, lengths in " + about.unit +
+element("layer").options[3].disabled = about.held_out.length === 0;
+element("note").textContent = about.count.toLocaleString("en") + " Gaussians" +
+  (about.windows ? " at most in each of " + spans.length + " windows, which are loaded as they are played, lengths in "
+    : ", " + about.times.length + " key times, lengths in ") + about.unit +
   ". Between key times the page interpolates. Drag to turn the scene; the wheel or two fingers bring it closer. " +
   "Shift or the right button moves it. Keys: space plays, arrows turn, with shift they move, + and - bring it closer, comma and full stop change the frame, o orbits, 0 resets.";
-if (K < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
+if (!about.windows && about.times.length < 2) for (const id of ["play", "slider", "time"]) element(id).hidden = true;
 
 // `#t=0.4&layer=depth&yaw=0.2` opens the page at a moment; `probe` adds the drawn picture and its time as text.
 const asked = new URLSearchParams(location.hash.slice(1));
@@ -591,6 +722,8 @@ const wish = (name, rest = 0) => Number(asked.get(name)) || rest;
 look(wish("yaw"), wish("pitch"), wish("closer", 1), wish("right"), wish("down"));
 const layer = LAYERS.indexOf(asked.get("layer"));
 choose(layer > 0 && layer < 3 ? layer : 0);
+try { await Promise.all(shows(state.time).map(fetched)); }
+catch (error) { return about.windows ? null : fail("This browser cannot unpack the scene: " + error); }
 draw();
 if (asked.has("held_out")) {
   const frame = about.held_out[Number(asked.get("held_out"))];

@@ -1,5 +1,6 @@
 """A run of windows from Python: what `endotsr.open_run` returns for one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
@@ -8,6 +9,7 @@ from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.export.scene import COMPONENTS
+from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.record import SequenceRecord, nearest_frame
 from endotsr.splatting.camera import Camera
@@ -64,6 +66,34 @@ class WindowedRun:
                 )
             camera = self.scene.cameras[int(place)]
         return self.scene.render(float(time), camera, without)
+
+    def follow(self, points: FloatArray, frame: int, frames: Sequence[int]) -> FloatArray:
+        """Positions (F, 3, P) of points (3, P) that are tissue at one frame, at other frames; scene units, world axes.
+
+        frame, frames   of the recording, counted from 0
+
+        A point moves with the Gaussians around it, and passes to those of the next window in the middle of an overlap
+        (B18d). Behind a cut its position is NaN. Raises: InputError for a frame that no window shows.
+        """
+        from endotsr.windows.follow import followed
+
+        return followed(self.scene, points, frame, frames)
+
+    def view(self, path: str | Path, *, held_out: bool = False) -> Path:
+        """Write the page that plays the recording, and the folder of its windows beside it; returns the page.
+
+        held_out  also show the held-out frames, for which the sequence is read
+
+        Raises: InputError for a name that is not that of a page, and for a folder of windows that holds other files.
+        """
+        from endotsr.views.page import check_page
+        from endotsr.windows.page import WINDOW_KEYS, write_windows_page
+
+        path = Path(path)
+        check_page(path, WINDOW_KEYS)
+        frames = WindowFrames(self.scene, self._source) if held_out else None
+        write_windows_page(path, self.scene, path.stem, WINDOW_KEYS, frames)
+        return path
 
     def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
         """Metrics of the held-out frames of all windows, what each window cost, and the flicker at seams.

@@ -89,7 +89,7 @@ class WindowedScene(MovingScene):
         found = []
         for k, window in enumerate(self.plan.windows):
             if window.first <= g < window.end or (g == window.end and not self._shown_later(k, g)):
-                found.append(WindowPart(k, self._local(k, g), 1.0))
+                found.append(WindowPart(k, self.local_time(k, g), 1.0))
         if not found:
             gap = next((gap for gap in self.plan.left_out if gap.first <= g < gap.end), None)
             why = f": frames {gap.first}:{gap.end} are left out: {gap.reason}" if gap else ""
@@ -108,7 +108,7 @@ class WindowedScene(MovingScene):
     def _shown_later(self, k: int, g: float) -> bool:
         return k + 1 < len(self.plan.windows) and self.plan.windows[k + 1].first <= g
 
-    def _local(self, k: int, g: float) -> float:
+    def local_time(self, k: int, g: float) -> float:
         """The time of window k at frame g: linear between the times of its frames, 1 at the frame behind the last."""
         window, times = self.plan.windows[k], self._times[k]
         return float(np.interp(g - window.first, np.arange(window.count + 1), [*times, 1.0]))
@@ -159,11 +159,11 @@ def open_any(path: Path) -> MovingScene:
 
 
 def refuse_one_set(path: Path, out: Path) -> None:
-    """Raises InputError for a slim model or a page of a run of windows: each holds one set of Gaussians."""
-    if is_windowed(path) and out.suffix.lower() in (".npz", ".glb", ".html", ".htm"):
+    """Raises InputError for a file that holds one set of Gaussians, of a run of windows, which has many."""
+    if is_windowed(path) and out.suffix.lower() in (".npz", ".glb"):
         raise InputError(
-            f"{out}: holds one set of Gaussians, and {path} has one in each window; allowed: .ply files, or the run of"
-            f" a window, {path / FOLDER / '000'}"
+            f"{out}: holds one set of Gaussians, and {path} has one in each window; allowed: .ply files, a page, or the"
+            f" run of a window, {path / FOLDER / '000'}"
         )
 
 
