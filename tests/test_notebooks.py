@@ -50,7 +50,7 @@ def _drawn_to_nowhere(monkeypatch):
     plt.close("all")
 
 
-TRAIN = ("00_why", "14_full_sequence", "18_between", "19_tracked_motion", "20_first_look")
+TRAIN = ("00_why", "14_full_sequence", "18_between", "19_tracked_motion", "20_first_look", "21_one_seam")
 SLOW = dict.fromkeys(TRAIN, pytest.mark.slow)
 
 

@@ -1,0 +1,236 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 21. One seam
+#
+# A recording of minutes is trained in windows that overlap, each a run of its own. Two windows that were trained apart
+# do not show the same picture where they overlap. This chapter follows one seam: how two windows are shown as one
+# scene, {eq}`eq-b18b`, and how a window starts from its neighbour, {eq}`eq-b18c`. Both are on the page
+# {doc}`/specification/b18_windows`; the paper does not have them.
+
+# %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
+import inspect
+import json
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import endotsr
+from endotsr.config import config_from_dict
+from endotsr.evaluation.metrics import psnr_tissue
+from endotsr.gradcheck import all_pairs, check_pair, one_thread, pair_stream, table
+from endotsr.runs.folder import open_run
+from endotsr.simulator import SimulatorSettings
+from endotsr.simulator.folder import write_sequence
+from endotsr.simulator.scenes import scene_of
+from endotsr.sweeps.execute import execute
+from endotsr.windows import scene as definition
+from endotsr.windows.carry import CarriedStart
+from endotsr.windows.make import make_windows, plan_recording, window_folder
+from endotsr.windows.plan import Wanted
+from endotsr.windows.scene import open_windows
+
+# %% [markdown]
+# ## Two windows
+#
+# The recording has 56 frames with breathing, a beat and highlights. Two windows of 32 frames share frames 24 to 31. They
+# are trained twice: both cold, and the second one warm, in 40 % of the iterations.
+
+# %%
+folder = Path(tempfile.mkdtemp())
+size = SimulatorSettings(width=96, height=76, frames=56)
+(folder / "recording").mkdir()
+write_sequence(folder / "recording", scene_of("breathing,pulsation,highlights,noise", size))
+settings = config_from_dict(
+    {
+        "preset": "demo",
+        "initialisation": {"first_frame_points": 2000, "other_frame_points": 500},
+        "density": {"maximum": 4000},
+        "training": {"iterations": 1500, "threads": 1},
+    }
+)
+settings = endotsr.config.with_iterations(settings, 500)
+
+
+class Quiet:
+    begin = step = say = lambda self, *given: None
+
+
+for name, chain in (("cold", 1), ("warm", 2)):
+    plan_recording(folder / "recording", settings, Wanted(32, 8, chain), folder / name)
+    here = lambda jobs: (execute(job, 1) for job in jobs)
+    assert all(made.status == "finished" for made in make_windows(folder / name, here, Quiet()))
+scenes = {name: open_windows(folder / name) for name in ("cold", "warm")}
+plan = scenes["cold"].plan
+print([(window.first, window.end) for window in plan.windows])
+
+# %% [markdown]
+# ## The blend
+#
+# Window $k+1$ begins with frame $b$, and window $k$ ends before frame $e$. At frame $g$ the scene shows
+#
+# $$
+# \hat I(g)=\bigl(1-w(g)\bigr)\,\hat I(g)+w(g)\,\hat I'(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
+# $$
+#
+# **(21.1) The ends.** $w(b)=0$ and $w(e)=1$: where the overlap begins the scene is still window $k$ alone, and where it
+# ends it is window $k+1$ alone. Both windows are continuous in time, and so is $w$, so the scene has no jump.
+#
+# **(21.2) The largest step.** Let the windows differ by $\delta$ at a pixel, nearly constant over the overlap. A change
+# of window between two frames is a step of $\delta$ at once. The blend adds $\delta/(e-b)$ to each frame of the overlap.
+#
+# **(21.3) The error.** Let the windows have errors $\epsilon,\epsilon'$ of equal variance $\sigma^2$ with the
+# correlation $c$. The blend has $\bigl[(1-w)^2+w^2+2w(1-w)c\bigr]\sigma^2$, which is never above $\sigma^2$, and
+# $\frac{1+c}{2}\sigma^2$ in the middle.
+
+# %% tags=["transcription"]
+print(inspect.getsource(definition.blended))
+
+# %%
+scene = scenes["cold"]
+camera, (first, second) = scene.cameras[0], plan.windows
+begin, end = second.first, first.end
+colour = lambda part: scene.window(part.window).render(part.time, camera).colour
+for g in (begin, begin + 2.5, end):
+    w = (g - begin) / (end - begin)
+    two = [part for part in scene.parts(g) if part.weight > 0]
+    np.testing.assert_allclose(sum(part.weight for part in two), 1)
+    expected = sum(part.weight * colour(part) for part in two)
+    np.testing.assert_allclose(
+        scene.render(g / plan.frames, camera).colour, expected, atol=1e-6
+    )
+    print(f"g = {g}: w = {w:.3f}, windows {[part.window for part in two]}")
+
+# %% [markdown]
+# Steps (21.2) and (21.3), measured: the steps from one frame to the next with the blend and with a change of window in
+# the middle, and the PSNR of either window and of the blend in the middle of the overlap.
+
+# %%
+middle = (begin + end) // 2
+frames = range(begin - 6, end + 6)
+alone = {g: [colour(part) for part in scene.parts(g)] for g in frames}
+blend = [scene.render(g / plan.frames, camera).colour for g in frames]
+hard = [alone[g][0 if g <= middle else -1] for g in frames]
+steps = {
+    name: np.array([np.sqrt(np.square(b - a).mean()) for a, b in pairwise(course)])
+    for name, course in (("blend", blend), ("change of window", hard))
+}
+whole = endotsr.load_sequence(folder / "recording", settings)
+truth, tissue = whole.images[middle] / 255, whole.masks[middle]
+values = [
+    psnr_tissue(picture, truth, tissue)
+    for picture in (*alone[middle], blend[6 + middle - begin])
+]
+print("PSNR: windows {:.2f} and {:.2f} dB, blend {:.2f} dB".format(*values))
+print({name: f"largest step {255 * course.max():.2f} levels" for name, course in steps.items()})
+assert steps["blend"].max() < steps["change of window"].max()
+assert values[2] > max(values[:2])
+
+# %% [markdown]
+# ## The warm start
+#
+# The second window takes the Gaussians of the first at one shared frame, the join, at the time $t^*$ of the neighbour
+# and $u^*$ of its own:
+#
+# $$
+# \mu=\mu_n(t^*)-C\,\phi(u^*),\qquad q=q_n(t^*),\qquad s=s_n(t^*),\qquad
+# h_0=h_{0,n}+\tfrac{\beta}{Y_{00}}\tanh\bigl(A_n\bar\phi_n(t^*)\bigr)
+# $$
+#
+# **(21.4) Time is not carried.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour. What
+# they say about $t^*$ is put into the canonical Gaussian, and they start from 0.
+#
+# **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. The subtraction of
+# $C\,\phi(u^*)$ leaves the Gaussian in its place at the join, whatever $C$ is: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
+#
+# **(21.6) The picture at the join** is therefore that of the neighbour.
+
+# %%
+shift, shared = second.first - first.first, first.end - second.first
+start = CarriedStart(str(window_folder(folder / "cold", first)), shift, shared, 0)
+run = open_run(window_folder(folder / "warm", second))
+sequence = endotsr.load_sequence(
+    folder / "recording", settings, frames=f"{second.first}:{second.end}"
+)
+state = start.state(sequence, run.config())
+largest = np.abs(state.gaussians.motion_coefficients).max()
+print(f"{state.gaussians.count} Gaussians, coefficients C up to {largest:.2f}")
+assert not state.gaussians.fdm_weight.any() and state.gaussians.motion_coefficients.any()
+
+# %% [markdown]
+# ## Figure: the seam, and what the warm start saves
+#
+# Left: the step from one frame to the next across the overlap (grey). Right: the loss of the second window from a cold
+# and from a warm start, each smoothed over 20 iterations.
+
+# %% tags=["hide-input"]
+losses = {
+    name: np.array(
+        [
+            json.loads(line)["loss"]
+            for line in open(window_folder(folder / name, second) / "log.jsonl")
+        ]
+    )
+    for name in scenes
+}
+smooth = {
+    name: np.convolve(loss, np.full(20, 1 / 20), "valid") for name, loss in losses.items()
+}
+figure, axes = plt.subplots(1, 2, figsize=(13, 3.4), layout="constrained")
+for (name, course), colours in zip(steps.items(), ("tab:blue", "tab:red")):
+    axes[0].plot(np.array(frames)[1:], 255 * course, color=colours, label=name)
+axes[0].axvspan(begin, end, color="0.92", zorder=0)
+axes[0].set(xlabel="frame", ylabel="step, grey levels")
+for (name, course), colours in zip(smooth.items(), ("tab:blue", "tab:orange")):
+    axes[1].plot(np.arange(course.size) + 20, course, color=colours, label=f"{name} start")
+axes[1].set(xlabel="iteration", ylabel="loss", yscale="log")
+for axis in axes:
+    axis.legend(fontsize=8)
+plt.show()
+print(f"iterations: cold {losses['cold'].size}, warm {losses['warm'].size}")
+print("mean loss of the first 20: cold {cold[0]:.4f}, warm {warm[0]:.4f}".format(**smooth))
+assert smooth["warm"][0] < 0.7 * smooth["cold"][0]
+assert losses["warm"].size == 0.4 * losses["cold"].size
+
+# %% [markdown]
+# ## The reverse pass
+#
+# There is none: the blend is part of no loss, and a state that is carried is a constant of the training that it starts.
+# The pair to check is the motion {eq}`eq-3` whose coefficients (21.5) fits.
+
+# %%
+with one_thread():
+    report = check_pair(all_pairs()["motion"], pair_stream("motion", 0))
+print(table([report]))
+assert report.passed
+
+# %% [markdown]
+# ## Exercise
+#
+# 1. By (21.2) a longer overlap makes a seam softer. What does it cost? Count the iterations of a recording of $G$ frames
+#    in windows of $N$ frames with the overlap $K$.
+# 2. Write the blend of two pictures from (21.1) and let the cell below *The blend* judge it: compare your picture with
+#    `scene.render`. The motion of (21.5) has golden cases: `--only motion` ({doc}`index`).
+# 3. The cell below answers this one. Two windows have errors with the correlation $c=0$. By how many decibels is the
+#    blend in the middle better than either window, by (21.3)? And for $c=1$?
+
+# %% jupyter={"source_hidden": true} tags=["hide-cell"]
+# Answer. The variance halves, which is 10 log10(2) = 3.01 dB; for c = 1 nothing is gained.
+rng = np.random.default_rng(21)
+noise = rng.normal(size=(2, 400_000))
+for c, gain in ((0.0, 10 * np.log10(2)), (1.0, 0.0)):
+    other = c * noise[0] + np.sqrt(1 - c**2) * noise[1]
+    np.testing.assert_allclose(-10 * np.log10(np.var((noise[0] + other) / 2)), gain, atol=0.03)
