@@ -30,7 +30,9 @@ class _Reported:
     only: Annotated[str, Option("FAMILY[/CASE]")] = ""
     """judge this family or case alone; there is then no claim, and exit code 0 means that nothing was refused"""
     all: bool = False
-    """list the cases that passed, too"""
+    """list the cases that passed, too, and leave nothing out"""
+    search: Annotated[float, Option("SECONDS")] = 8.0
+    """seconds of computing that the search for the cause of a refusal may take; 0 leaves it out"""
 
 
 @dataclass
@@ -131,6 +133,10 @@ def _run(words: list[str]) -> int:
 def _tell(report, golden, outdir: Path, options: _Reported) -> int:
     from endotsr.golden.judge.report import as_html, as_json, as_table
 
+    if report.first_wrong and options.search > 0:
+        from endotsr.golden.search.find import explain
+
+        explain(golden, report, outdir, options.search)
     print(as_table(report, everything=options.all))
     if options.json:
         options.json.write_bytes(as_json(report))

@@ -151,7 +151,8 @@ def test_a_refusal_like_no_known_mistake_says_so_and_shows_the_difference(golden
     off[1, 2] += 5e-12
     (folder / "translation.npy").write_bytes(npy_bytes(off))
     lines = as_table(judge(golden, tmp_path, "float64", level=1, only="motion")).splitlines()
-    assert next(s for s in lines if s.startswith("motion/generic")).endswith("looks like none of the known mistakes")
+    assert next(s for s in lines if s.startswith("motion/generic")).endswith("refused: not explained")
+    assert lines[1] == "looks like none of the known mistakes"
     assert not [line for line in lines if line == "looks like:" or "made for" in line]
     (line,) = [line for line in lines if "motion/generic/translation" in line]
     ((got, right, difference),) = re.findall(r"at \[1, 2\] (\S+), expected (\S+): off by (\S+)", line)

@@ -9,6 +9,22 @@ from typing import Any
 
 from endotsr.golden.judge.format import Case
 
+PARTS = {
+    "scene": ("frequencies", "dictionary", "atoms", "appearance", "motion", "deformation"),
+    "render": ("covariance", "projection", "harmonics", "composite"),
+    "objective": ("scene", "render", "masked_l1", "masked_ssim", "normalised_depth", "smoothness", "laplacian",
+                  "matern", "exposure"),
+    "training": ("objective", "calibration", "adam", "schedule", "density"),
+    "determinism": ("objective",),
+}  # fmt: skip
+"""Operations that an operation is made of."""
+
+
+def made_of(operation: str) -> set[str]:
+    """All operations that an operation is made of, at any depth."""
+    parts = set(PARTS.get(operation, ()))
+    return parts.union(*map(made_of, parts))
+
 
 def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
     """Lines on the first operation with a refused output, by level and then in the order of the cases; [] = none.
@@ -16,15 +32,13 @@ def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
     reports   case reports of the judge, whose outputs hold their forms
     """
     known = {case.name: case for case in cases}
-    wrong = [(o.level, k, r.name) for k, r in enumerate(reports) for o in r.outputs if o.status == "refused"]
-    wrong = [one for one in wrong if one[2] in known]
-    if not wrong:
+    level, first = first_wrong(cases, reports)
+    if first is None:
         return []
-    first = known[min(wrong)[2]]
     mine = [r for r in reports if r.name in known and known[r.name].operation == first.operation and r.outputs]
     refused = [(r, o) for r in mine for o in r.outputs if o.status == "refused"]
     place = f"operation {first.operation}" + (f", equation ({first.equation})" if first.equation else "")
-    lines = [f"first wrong: {place}, level {min(wrong)[0]}, {_direction(mine, refused)}"]
+    lines = [f"first wrong: {place}, level {level}, {_direction(mine, refused)}"]
     for name in dict.fromkeys(o.name for _, o in refused):
         forms = [o.forms for _, o in refused if o.name == name]
         shared = [form for form in forms[0] if all(form in other for other in forms)]
@@ -32,9 +46,17 @@ def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
         lines.append(f"  {name}: {text}")
     bad = list(dict.fromkeys(r.name for r, _ in refused))
     if 2 * len(bad) <= len(mine):
-        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:4])
+        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:4]) + "; and below" * (len(bad) > 4)
         lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}")
     return lines
+
+
+def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Case | None]:
+    """The first case with a refused output, by level and then in the order of the cases, and that level."""
+    known = {case.name: case for case in cases}
+    wrong = [(o.level, k, r.name) for k, r in enumerate(reports) for o in r.outputs if o.status == "refused"]
+    wrong = [one for one in wrong if one[2] in known]
+    return (min(wrong)[0], known[min(wrong)[2]]) if wrong else (0, None)
 
 
 def _direction(mine: Sequence[Any], refused: Sequence[tuple[Any, Any]]) -> str:

@@ -22,7 +22,7 @@ NEAR = 2e-3  # fraction of the way from right to wrong within which a fingerprin
 ROUNDINGS = 4.0  # tolerances of one entry, per root of the number of entries, that a fingerprint may be off
 LIKE = 1.5  # decades within which the size of a rounding mistake is that of another port's
 NAMED = 0.5  # score from which a mistake is named
-MENTIONED = 0.2  # score from which it is listed as a partial resemblance
+MENTIONED = 0.4  # score from which it is listed as a partial resemblance
 
 
 class Taken(NamedTuple):

@@ -3,6 +3,7 @@
 import base64
 import html
 import struct
+import sys
 import zlib
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.golden.judge.diagnose import made_of
 from endotsr.golden.judge.format import LEVELS
 from endotsr.golden.judge.npy import Refused, read_plain
 from endotsr.golden.judge.recognise import Suspect
@@ -17,7 +19,9 @@ from endotsr.golden.judge.store import Golden
 from endotsr.golden.judge.verdict import CaseReport, OutputReport, Report
 
 MOST_LINES = 60  # refused outputs that the table prints
+MOST_NAMED = 3  # mistakes that it names
 MOST_PICTURES = 40
+MORE = "--all prints"  # said where something is left out
 UNKNOWN = "looks like none of the known mistakes"
 
 
@@ -28,22 +32,34 @@ def as_json(report: Report) -> bytes:
 
 
 def as_table(report: Report, *, everything: bool = False) -> str:
-    """The report for a terminal: the cases that did not pass, or all of them."""
-    shown = [case for case in report.cases if everything or case.status != "passed"]
-    lines = [*report.diagnosis, *([""] if report.diagnosis else [])]
+    """The report for a terminal, the answer first: the cases that did not pass, or all of them and all that is said."""
+    most = sys.maxsize if everything else MOST_LINES
+    shown = [case for case in report.cases if everything or case.status not in ("passed", "not ported")]
+    opening = answer(report, everything=everything)
+    lines = [*opening, *([""] if opening else [])]
     lines += [f"{'case':<32} {'level':>5} {'outputs':>8}  verdict"] if shown else []
     for case in shown:
         good = sum(o.status == "passed" for o in case.outputs)
-        lines.append(f"{case.name:<32} {_level(case):>5} {good:>4}/{len(case.outputs):<3}  {_summary(case)}")
-    if len(shown) < len(report.cases):
-        lines.append(f"{len(report.cases) - len(shown)} of {len(report.cases)} cases passed")
-    lines += _listed("refused outputs:", [f"{c.name}/{o.name}: {_line(o)}" for c, o in _outputs(report, "refused")])
-    lines += _listed("missing outputs:", _missing(report))
-    lines += _suspects(report)
+        verdict = _summary(case, report)
+        lines.append(f"{case.name:<32} {_level(case):>5} {good:>4}/{len(case.outputs):<3}  {verdict}")
+    for status in ("passed", "not ported") if not everything else ():
+        count = sum(case.status == status for case in report.cases)
+        lines += [f"{count} of {len(report.cases)} cases {status}"] if count else []
+    refused = [f"{c.name}/{o.name}: {_line(o)}" for c, o in _outputs(report, "refused")]
+    lines += _listed("refused outputs:", refused, most)
+    lines += _listed("missing outputs:", _missing(report), most)
     lines += [""] + [
         f"level {k} ({LEVELS[k]}): {good} of {asked} outputs" for k, (good, asked) in report.levels.items()
     ]
     return "\n".join([*lines, *report.notes, report.claim])
+
+
+def answer(report: Report, *, everything: bool = False) -> list[str]:
+    """What is wrong: how the port failed, the first wrong operation, what explains it and what it is like."""
+    return [
+        *report.failures, *report.diagnosis[:1], *report.causes, *_suspects(report, everything=everything),
+        *report.diagnosis[1:],
+    ]  # fmt: skip
 
 
 def _level(case: CaseReport) -> int:
@@ -56,36 +72,42 @@ def _outputs(report: Report, status: str) -> list[tuple[CaseReport, OutputReport
 
 
 def _missing(report: Report) -> list[str]:
-    """The names of missing outputs, one line a case."""
-    names: dict[str, list[str]] = {}
+    """The names of missing outputs, one line a case, and below it what is there under another name."""
+    lines: dict[str, list[str]] = {}
+    more: dict[str, list[str]] = {}
     for case, output in _outputs(report, "missing"):
-        names.setdefault(case.name, []).append(output.name)
-    return [f"{case}: {', '.join(outputs)}" for case, outputs in names.items()]
+        lines.setdefault(case.name, []).append(output.name)
+        found = output.reason.partition("; ")[2]
+        more.setdefault(case.name, []).extend([f"  {output.name}: {found}"] if found else [])
+    return [line for case, names in lines.items() for line in (f"{case}: {', '.join(names)}", *more[case])]
 
 
-def _listed(title: str, lines: list[str]) -> list[str]:
+def _listed(title: str, lines: list[str], most: int) -> list[str]:
     if not lines:
         return []
-    more = [f"  ... and {len(lines) - MOST_LINES} more"] if len(lines) > MOST_LINES else []
-    return ["", title, *(f"  {line}" for line in lines[:MOST_LINES]), *more]
+    more = [f"  and {len(lines) - most} more lines, which {MORE}"] if len(lines) > most else []
+    return ["", title, *(f"  {line}" for line in lines[:most]), *more]
 
 
-def _suspects(report: Report) -> list[str]:
+def _suspects(report: Report, *, everything: bool) -> list[str]:
     """The mistakes that are named, with what speaks for and against each, and otherwise the partial resemblances."""
     if not any(case.status == "refused" for case in report.cases):
         return []
     named = [s for s in report.suspects if s.named]
-    lines = ["", "looks like:"] if named else ["", UNKNOWN]
-    for suspect in named[:5]:
+    most = len(named) if everything else MOST_NAMED
+    lines = ["looks like:"] if named else []
+    for suspect in named[:most]:
         lines.append(f"  {suspect.flag}: {suspect.title} ({suspect.wrong})")
-        lines += [f"    {line}" for line in said(suspect)]
-    if not named and report.suspects:
-        names = ", ".join(f"{s.flag} ({s.score:.2f})" for s in report.suspects[:3])
-        lines.append(f"  resembles in part, of 1: {names}")
-    return lines
+        lines += [f"    {line}" for line in said(suspect, everything=everything)]
+    lines += [f"  and {len(named) - most} more, which {MORE}"] if len(named) > most else []
+    if named:
+        return lines
+    names = ", ".join(f"{s.flag} ({s.score:.2f})" for s in (report.suspects if everything else report.suspects[:3]))
+    more = f", and {len(report.suspects) - 3} more, which {MORE}" if len(report.suspects) > 3 and not everything else ""
+    return [f"{UNKNOWN}; resembles in part, of 1: {names}{more}"] if names else [] if report.causes else [UNKNOWN]
 
 
-def said(suspect: Suspect) -> list[str]:
+def said(suspect: Suspect, *, everything: bool = False) -> list[str]:
     """What speaks for a mistake, and what against it."""
     e = suspect.evidence
     cases = len({name.rpartition("/")[0] for name in e.agrees + e.fits})
@@ -96,19 +118,30 @@ def said(suspect: Suspect) -> list[str]:
         ("refused, although it leaves them right", e.unexplained),
     ):
         if names:
-            more = f" and {len(names) - 2} more" if len(names) > 2 else ""
-            lines.append(f"against it: {text}: {', '.join(names[:2])}{more}")
+            most = len(names) if everything else 2
+            more = f" and {len(names) - most} more, which {MORE}" if len(names) > most else ""
+            lines.append(f"against it: {text}: {', '.join(names[:most])}{more}")
     return lines
 
 
-def _summary(case: CaseReport) -> str:
+def _summary(case: CaseReport, report: Report) -> str:
+    """The status of a case, and why it is refused as far as that is known."""
     if case.status in ("passed", "not ported"):
         return case.status
-    first = f"; {case.first_wrong}" if case.first_wrong else ""
+    why = _why(case, report) if any(o.expected is not None for o in case.outputs) else ""
+    return "; ".join(filter(None, (f"{case.status}: {why}" if why else case.status, case.first_wrong)))
+
+
+def _why(case: CaseReport, report: Report) -> str:
+    first = report.first_wrong
     if case.looks_like:
-        return f"{case.status}: looks like {', '.join(case.looks_like[:3])}{first}"
-    known = any(o.expected is not None for o in case.outputs)
-    return f"{case.status}: {UNKNOWN}{first}" if known else case.status
+        return f"looks like {', '.join(case.looks_like)}"
+    if first in made_of(case.operation):
+        return f"follows from {first}"
+    if report.causes and case.operation == first:
+        return "explained by the change above"
+    named = [s.flag for s in report.suspects if s.named]
+    return f"{named[0]} is not examined here" if named and named[0] not in case.evidence else "not explained"
 
 
 def _line(output: OutputReport) -> str:
@@ -123,7 +156,7 @@ def _line(output: OutputReport) -> str:
 
 
 def as_html(report: Report, golden: Golden, outputs: Path) -> str:
-    """One page: claim, levels, suspects, every case; refused images with expected, got and difference."""
+    """One page: claim, answer, levels, every case; refused images with expected, got and difference."""
     e = html.escape
     rows, pictures = [], 0
     for case in report.cases:
@@ -132,26 +165,24 @@ def as_html(report: Report, golden: Golden, outputs: Path) -> str:
             if o.status == "passed":
                 continue
             picture = ""
-            if o.status == "refused" and pictures < MOST_PICTURES:
+            if o.status == "refused":
                 picture = _pictures(golden, outputs, case, o.name)
                 pictures += bool(picture)
+                picture = picture if pictures <= MOST_PICTURES else ""
             details.append(f"<li><b>{e(o.name)}</b> (level {o.level}) {e(_line(o))}{picture}</li>")
         body = f"<ul>{''.join(details)}</ul>" if details else ""
         rows.append(
             f'<tr class="{case.status}"><td>{e(case.name)}</td><td>{_level(case)}</td><td>{e(case.title)}</td>'
-            f"<td>{e(_summary(case))}{body}</td></tr>"
+            f"<td>{e(_summary(case, report))}{body}</td></tr>"
         )
     levels = "".join(
         f"<tr><td>{k}</td><td>{e(LEVELS[k])}</td><td>{a} of {b}</td></tr>" for k, (a, b) in report.levels.items()
     )
-    suspects = "".join(
-        f"<li><b>{e(s.flag)}</b>: {e(s.title)}. {e(s.wrong)}. {e('; '.join(said(s)))}</li>"
-        for s in report.suspects[:8]
-        if s.named
-    )
+    opening = "\n".join(answer(report, everything=True))
+    left_out = f"{pictures - MOST_PICTURES} more pictures are left out; --only FAMILY draws those of one family."
     return _PAGE.format(
         claim=e(report.claim), levels=levels, rows="".join(rows), notes=e(" ".join(report.notes)),
-        suspects=f"<h2>Looks like</h2><ul>{suspects}</ul>" if suspects else "",
+        answer=f"<pre>{e(opening)}</pre>" if opening else "", left_out=left_out if pictures > MOST_PICTURES else "",
     )  # fmt: skip
 
 
@@ -162,11 +193,13 @@ table{{border-collapse:collapse;width:100%}}td,th{{text-align:left;vertical-alig
 border-bottom:1px solid #dde3ea}}.passed td:first-child{{border-left:4px solid #3a8f5c}}
 .refused td:first-child{{border-left:4px solid #b3392f}}.missing td:first-child{{border-left:4px solid #b8a03a}}
 img{{image-rendering:pixelated;height:120px;margin:.3em .6em .3em 0;border:1px solid #ccd}}figure{{margin:0}}
+pre{{white-space:pre-wrap;overflow-wrap:anywhere;background:#f4f6f8;padding:.6em}}
 figcaption{{color:#5a6675;font-size:13px}}td,li{{overflow-wrap:anywhere}}ul{{padding-left:1.2em}}
 @media(max-width:640px){{tr,td{{display:block}}th{{display:none}}td{{border:0;padding:.1em .6em}}
-tr{{border-bottom:1px solid #dde3ea;padding:.3em 0}}}}</style></head><body><h1>{claim}</h1><p>{notes}</p>
-<table><tr><th>level</th><th></th><th>outputs</th></tr>{levels}</table>{suspects}
-<h2>Cases</h2><table><tr><th>case</th><th>level</th><th>what it is for</th><th>verdict</th></tr>{rows}</table>
+tr{{border-bottom:1px solid #dde3ea;padding:.3em 0}}}}</style></head><body><h1>{claim}</h1><p>{notes}</p>{answer}
+<table><tr><th>level</th><th></th><th>outputs</th></tr>{levels}</table>
+<h2>Cases</h2><p>{left_out}</p>
+<table><tr><th>case</th><th>level</th><th>what it is for</th><th>verdict</th></tr>{rows}</table>
 </body></html>
 """
 

@@ -1,5 +1,8 @@
 """The judge: compares a folder of outputs with the golden cases. Every state of the folder leads to a verdict."""
 
+import difflib
+import os
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -9,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.golden.judge.compare import Verdict, judged, misses
-from endotsr.golden.judge.diagnose import diagnosis
+from endotsr.golden.judge.diagnose import diagnosis, first_wrong
 from endotsr.golden.judge.format import LEVELS, Case, Output, Precision
 from endotsr.golden.judge.npy import Refused, read_plain, read_text
 from endotsr.golden.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
@@ -18,6 +21,9 @@ from endotsr.golden.judge.store import Golden
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
 LARGEST_RELATED = 20_000  # entries of an output for which relations are sought
+MISSING = "missing"  # how the reader of arrays refuses a file that is not there
+MOST_FILES = 1000  # of the folder of a case in which a missing output is looked for under another name
+RESEMBLES = 0.6  # from 0 to 1: likeness of two names
 
 Status = Literal["passed", "refused", "missing", "not ported"]
 
@@ -42,6 +48,8 @@ class CaseReport(msgspec.Struct, kw_only=True):
 
     name: str
     title: str
+    operation: str = ""
+    """empty for the comparison of two runs"""
     level: int
     status: Status
     outputs: list[OutputReport]
@@ -74,6 +82,13 @@ class Report(msgspec.Struct, kw_only=True):
     notes: list[str]
     diagnosis: list[str] = []
     """the first wrong operation and how its outputs relate to the expected ones; empty where nothing is refused"""
+    causes: list[str] = []
+    """changes of the definition that give the outputs of that operation as the port wrote them; see golden.search"""
+    failures: list[str] = []
+    """how the port failed as a program"""
+
+    first_wrong: str = ""
+    """the first operation with a refused output"""
 
     @property
     def passed(self) -> bool:
@@ -119,7 +134,7 @@ def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]
     try:
         lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
     except Refused as refusal:
-        return (), [] if str(refusal) == "missing" else [f"{NOT_PORTED}: {refusal}; every operation is judged"]
+        return (), [] if str(refusal) == MISSING else [f"{NOT_PORTED}: {refusal}; every operation is judged"]
     named = {line.split("#")[0].strip() for line in lines} - {""}
     known = dict.fromkeys(case.operation for case in golden.cases)
     unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - set(known))]
@@ -128,8 +143,9 @@ def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]
 
 def _left_out(case: Case) -> CaseReport:
     return CaseReport(
-        name=case.name, title=case.title, level=case.level, status="not ported", outputs=[], looks_like=[], made_for=[]
-    )
+        name=case.name, title=case.title, operation=case.operation, level=case.level, status="not ported", outputs=[],
+        looks_like=[], made_for=[],
+    )  # fmt: skip
 
 
 def conclude(
@@ -143,17 +159,18 @@ def conclude(
         if good < asked or not asked:
             break
         reached = k
+    _, first = first_wrong(golden.cases, reports)
     return Report(
         version=golden.manifest.version, precision=precision, asked_level=level, level=reached, without=without,
         claim=_claim(golden, reached, precision, without), levels=counts, cases=reports,
         suspects=suspects_of(golden, merged(r.evidence for r in reports)), notes=notes,
-        diagnosis=diagnosis(golden.cases, reports),
+        diagnosis=diagnosis(golden.cases, reports), first_wrong=first.operation if first else "",
     )  # fmt: skip
 
 
 def without_claim(report: Report, reasons: list[str]) -> None:
     """Remove the claim, because a port that fails has none, even if it wrote outputs before it failed."""
-    report.notes += reasons
+    report.failures += reasons
     report.level, report.claim = -1, f"no claim: {'; '.join(dict.fromkeys(reasons))}"
 
 
@@ -182,6 +199,7 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
                 taken[name] = _taken(folder / f"{name}.npy", outputs, asked, precision)
             except Refused as refusal:
                 taken[name] = refusal
+    _name_strays(folder, taken)
     tries = [_held_against(golden, case, taken, precision, answer) for answer in range(case.answers)]
     best = min(range(case.answers), key=lambda k: misses((o.level, o.status == "passed") for o in tries[k][0]))
     found, seen = tries[best]
@@ -189,10 +207,24 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
     evidence = evidence_of(case, seen, precision)
     scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
     return CaseReport(
-        name=case.name, title=case.title, level=case.level, status=_together(found), outputs=found,
+        name=case.name, title=case.title, operation=case.operation, level=case.level, status=_together(found),
+        outputs=found,
         looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
         made_for=list(case.flags), answer=best, first_wrong=_first_wrong(case, found), evidence=evidence,
     )  # fmt: skip
+
+
+def _name_strays(folder: Path, taken: dict[str, NDArray | Refused]) -> None:
+    """Name beside a missing output the file of its folder that is no output and has a similar name."""
+    missing = [name for name, got in taken.items() if isinstance(got, Refused) and str(got) == MISSING]
+    try:
+        files = [entry.name for entry in islice(os.scandir(folder), MOST_FILES)] if missing else []
+    except OSError:
+        return
+    strays = [name.removesuffix(".npy") for name in sorted(files) if name.removesuffix(".npy") not in taken]
+    for name in missing:
+        for stray in difflib.get_close_matches(name, strays, 1, RESEMBLES):
+            taken[name] = Refused(f"{MISSING}; {f'{stray}.npy'[:60]!a} is there and is no output of this case")
 
 
 def _relate(
@@ -222,7 +254,7 @@ def _held_against(
         asked = case.outputs[name]
         expected = golden.array(case, asked.answer(answer))
         if isinstance(got, Refused):
-            status: Status = "missing" if str(got) == "missing" else "refused"
+            status: Status = "missing" if str(got).startswith(MISSING) else "refused"
             found.append(OutputReport(name=name, level=asked.level, status=status, reason=str(got)))
             seen[name] = Taken(status, None, expected)
             continue

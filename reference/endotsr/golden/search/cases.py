@@ -1,0 +1,114 @@
+"""The cases of one operation as the port answered them, and whether other answers are the same."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endotsr.golden.judge.compare import scale_of
+from endotsr.golden.judge.format import FLIP_BUDGET, Case
+from endotsr.golden.judge.npy import Refused, read_plain
+from endotsr.golden.judge.relate import FITS
+from endotsr.golden.judge.store import Golden, in_precision
+from endotsr.golden.judge.verdict import CaseReport
+from endotsr.stages.stage import Inputs, Outputs, Settings, Stage, tidy
+
+PIECE = 1e-6  # length of a step along which a derivative is taken, in units of the input
+DERIVATIVE = 1e-4  # part by which it may be off
+
+
+class Answered:
+    """One case: the outputs of the port, and what differences are rounding."""
+
+    def __init__(self, golden: Golden, case: Case, report: CaseReport, outputs: Path, precision: str) -> None:
+        self.case, self.settings = case, case.settings
+        self.inputs: Inputs = in_precision(golden.inputs(case), "float64")
+        self.refused = {o.name for o in report.outputs if o.status == "refused"}
+        self.got: dict[str, NDArray] = {}
+        self.unit: dict[str, NDArray | float] = {}
+        for name in (o.name for o in report.outputs if o.status in ("passed", "refused")):
+            asked, rule = case.outputs[name], case.outputs[name].compare
+            expected = golden.array(case, asked.answer(report.answer))
+            try:
+                got = read_plain(outputs / case.name / f"{name}.npy", outputs, 8 * max(expected.size, 1))
+            except Refused:
+                continue
+            tolerance = rule.float64 if precision == "float64" else rule.float32
+            if got.shape == expected.shape and rule.kind != "identical":
+                self.got[name] = got.astype(np.float64)
+                self.unit[name] = FITS * tolerance * scale_of(expected, rule.scale or "max")
+                self.unit[name] = 0.0 if rule.kind == "exact" else self.unit[name]
+        self.refused &= self.got.keys()
+        self.right: Outputs = {}
+        self.saved: Any = None
+        self.ahead: list[str] = []
+        self.back: list[str] = []
+
+    def begin(self, stage: Stage) -> None:
+        """Compute the right outputs, and tell those of the forward pass from gradients."""
+        forward, self.saved = self.forward(stage, self.inputs, self.settings)
+        self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
+        self.ahead = [name for name in self.got if name in forward]
+        self.back = [name for name in self.got if name not in forward]
+
+    def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
+        """Outputs without gradients, and what the reverse pass needs."""
+        found, saved = stage.forward(inputs, settings)
+        more = {} if stage.extra is None else stage.extra(inputs, settings, saved)
+        return tidy({**found, **more}), (saved, tuple(found))
+
+    def reverse(self, stage: Stage, inputs: Inputs, saved: Any) -> Outputs:
+        """Gradients, where the case asks for them."""
+        own, names = saved
+        given = {name: inputs[f"d_{name}"] for name in names if f"d_{name}" in inputs}
+        if stage.is_loss:
+            given = dict.fromkeys(names, np.array(1.0)) | given
+        return tidy(stage.reverse(given, own)) if stage.reverse is not None and given.keys() == set(names) else {}
+
+    def same(self, found: Mapping[str, NDArray], names: Sequence[str] | set[str]) -> bool:
+        """Whether all of these outputs are those of the port."""
+        return all(name in found and self._same(name, np.asarray(found[name])) for name in names)
+
+    def _same(self, name: str, value: NDArray) -> bool:
+        got, rule = self.got[name], self.case.outputs[name].compare
+        if value.shape != got.shape or value.dtype.kind == "c":
+            return False
+        with np.errstate(all="ignore"):
+            off = ~(np.abs(value - got) <= self.unit[name]) & ~(np.isnan(value) & np.isnan(got)) & (value != got)
+        return int(off.sum()) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
+
+    def distance(self, found: Mapping[str, NDArray], names: Sequence[str]) -> NDArray | None:
+        """Differences of real outputs from those of the port, in units of their scale; None = they have no number."""
+        parts = []
+        for name in names:
+            value, got = np.asarray(found.get(name, np.nan), np.float64), self.got[name]
+            size = float(np.abs(got[np.isfinite(got)]).max(initial=0)) or 1.0
+            if value.shape != got.shape:
+                return None
+            parts.append(np.where(np.isfinite(got), value - got, 0).reshape(-1) / size)
+        joined = np.concatenate(parts) if parts else np.zeros(0)
+        return joined if np.isfinite(joined).all() else None
+
+    def is_derivative(self, stage: Stage) -> bool | None:
+        """Whether the gradients of the port are the derivatives of the forward pass as it is now, along one line.
+
+        None: it cannot be told here
+        """
+        names = [name for name in self.inputs if f"d_{name}" in self.got]
+        if not names:
+            return None
+        random = np.random.default_rng(0)
+        along = {name: random.uniform(-1, 1, self.inputs[name].shape) for name in names}
+        values: list[Any] = []
+        if not all(np.isfinite(array).all() for array in self.inputs.values() if array.dtype.kind == "f"):
+            return None
+        for sign in (1, -1):
+            moved = {**self.inputs, **{name: self.inputs[name] + sign * PIECE * along[name] for name in names}}
+            found, _ = stage.forward(moved, self.settings)
+            values.append(sum((np.asarray(self.inputs.get(f"d_{n}", 1.0)) * found[n]).sum() for n in found))
+        parts = [float((self.got[f"d_{name}"] * along[name]).sum()) for name in names]
+        size = float(np.abs([(np.abs(self.got[f"d_{n}"] * along[n])).sum() for n in names]).sum())
+        found = (values[0] - values[1]) / (2 * PIECE)
+        return bool(abs(found - sum(parts)) <= DERIVATIVE * size) if size > 0 and np.isfinite(found + size) else None

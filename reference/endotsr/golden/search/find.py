@@ -1,0 +1,310 @@
+"""The search: every single change of the definition against the outputs of a port, within a number of seconds."""
+
+import ast
+import contextlib
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from endotsr.golden.judge.format import Case
+from endotsr.golden.judge.store import Golden
+from endotsr.golden.judge.verdict import Report
+from endotsr.golden.search.cases import Answered
+from endotsr.golden.search.numbers import START, best_number, plain_first, said_number
+from endotsr.golden.search.places import Place, Spot, definition_modules, executed, names_in, spots, written
+from endotsr.golden.search.requests import Request, other_requests
+from endotsr.golden.search.rewrites import rewrites, with_number
+from endotsr.stages.definition import definition_stages
+from endotsr.stages.stage import Outputs, Stage
+
+SECONDS = 8.0  # of computing that a search may take
+LATEST = 1000  # a spot of which it is not known what it reaches
+ENOUGH = 40  # equal explanations after which the search ends
+MOST_LINES = 3  # of the source that are named where all explain the outputs equally
+MOST_VALUES = 64  # of an expression, that are looked at
+WHOLE = {
+    "all": "every output",
+    "derivative": "every forward output, of which the gradients of the port are the derivatives,",
+    "forward": "every forward output; the gradients of the port are wrong in another way,",
+}
+"""What a change explains, the most first."""
+Install = Callable[[], Any]  # makes a change and returns what takes it back
+
+
+class Hit(NamedTuple):
+    """A change with which the definition gives what the port wrote."""
+
+    text: str
+    where: str  # equation and line
+    function: str  # in which the line stands
+    whole: str  # a key of WHOLE
+    rank: tuple[int, ...]
+
+
+class Live(NamedTuple):
+    """A spot, a phase, its values, and how late it is tried: by the outputs that passed and that a change spoils."""
+
+    spot: Spot
+    mode: str
+    values: list[Any]
+    late: int
+
+
+class Search:
+    """The search for one operation: its cases, of which the first has the most refused outputs, and what was found."""
+
+    def __init__(self, stage: Stage, answered: Sequence[Answered], known: Sequence[Case], seconds: float) -> None:
+        self.stage, self.cases, self.known, self.end = stage, answered, known, time.process_time() + seconds
+        self.hits: list[Hit] = []
+        self.tried = 0
+        for one in answered:
+            one.begin(stage)
+        first = answered[0]
+        real = [name for name in sorted(first.refused) if first.case.outputs[name].dtype == "real"]
+        self.real = [name for name in real if name in first.ahead] or real  # that a number is sought by
+        self.ahead = any(one.refused & set(one.ahead) for one in answered)  # a forward output is refused
+        self.back = any(one.refused & set(one.back) for one in answered)
+
+    @property
+    def over(self) -> bool:
+        """Whether time is up, or enough is found."""
+        return time.process_time() > self.end or len(self.hits) >= ENOUGH
+
+    def fits(self, install: Install | None, mode: str, request: Request | None = None) -> str:
+        """How much of all cases a change explains: a key of WHOLE, or "" for nothing."""
+        self.tried += 1
+        gradients: list[bool | None] = []  # of cases whose gradients are not those of the definition with the change
+        for one in self.cases:
+            inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
+            found, saved = one.right, one.saved
+            if mode != "reverse":
+                with _installed(install):
+                    found, saved = one.forward(self.stage, inputs, settings)
+            if not one.same(request.tell(found) if request else found, one.ahead):
+                return ""
+            if one.back and False not in gradients:
+                with _installed(install if mode != "forward" else None):
+                    back = one.reverse(self.stage, inputs, saved)
+                if not one.same(request.tell(back) if request else back, one.back):
+                    if mode == "reverse" or not self.ahead:
+                        return ""
+                    with _installed(install):
+                        gradients.append(one.is_derivative(self.stage))
+        return "all" if not gradients else "derivative" if True in gradients and False not in gradients else "forward"
+
+    def outputs(self, install: Install | None, mode: str, request: Request | None = None) -> Outputs:
+        """All outputs of the first case with a change."""
+        one = self.cases[0]
+        self.tried += 1
+        inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
+        found, saved = one.right, one.saved
+        if mode != "reverse":
+            with _installed(install):
+                found, saved = one.forward(self.stage, inputs, settings)
+        with _installed(install if mode != "forward" else None):
+            return {**found, **one.reverse(self.stage, inputs, saved)}
+
+    def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[float], int]:
+        """Numbers to try, the plainest first, and how many outputs that passed another number spoils."""
+        one = self.cases[0]
+
+        def off(value: float) -> Any:
+            return one.distance(at(value), self.real)
+
+        moved = at(rest + START * (abs(rest) or 1.0))
+        number = best_number(off, rest, one.distance(one.right, self.real)) if self.real else None
+        late = sum(not one.same(moved, [name]) for name in one.got if name not in one.refused)
+        changes = not all(np.array_equal(moved[name], one.right[name]) for name in one.got)
+        known = number is not None and abs(number - rest) > START
+        return plain_first(number) if number is not None and known else [], late if changes else LATEST - 1
+
+    def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
+        """Keep a change that fits."""
+        if whole:
+            if spot and not self.ahead and spot.place.phases == {"forward"}:
+                rank = (rank[0] + 1, *rank[1:])  # what is refused is computed elsewhere
+            where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
+            self.hits.append(Hit(text, where, function, whole, (int(whole == "forward"), *rank, len(self.hits))))
+
+    def modes(self, place: Place) -> list[str]:
+        """The phases in which a change of a place can make what is refused."""
+        if len(place.phases) == 1:
+            return list(place.phases)
+        return ["both", "forward", *["reverse"] * self.back] if self.ahead else ["reverse"]
+
+
+@contextlib.contextmanager
+def _installed(install: Install | None) -> Iterator[None]:
+    back = install() if install else None
+    try:
+        yield
+    finally:
+        if back:
+            back()
+
+
+def search(stage: Stage, answered: Sequence[Answered], known: Sequence[Case], seconds: float = SECONDS) -> Search:
+    """Changes of one operation that explain what a port wrote, best first in `hits`."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        found = Search(stage, answered, known, seconds)
+        _requests(found)
+        calls: dict[str, Callable[[], Any]] = {
+            "forward": lambda: [one.forward(stage, one.inputs, one.settings) for one in answered],
+            "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
+        }
+        places = executed(calls)
+        for constants in (False, True):
+            live = _numbers(found, [place for place in places if place.is_constant == constants])
+            for texts, rank in ((_texts, 1), (_names, 2)):
+                lines = {hit.where for hit in found.hits if hit.rank[:2] < (0, 2)}
+                for one in live:  # once something is found, the rest of its line is tried
+                    if not lines or one.spot.place.where(one.spot.node) in lines:
+                        _try(found, one, texts(one), rank)
+    for module in definition_modules():
+        for name in ("_knob", "_seen"):
+            module.__dict__.pop(name, None)
+    found.hits.sort(key=lambda hit: hit.rank)
+    return found
+
+
+def _requests(search: Search) -> None:
+    """Settings and inputs that are taken otherwise; where a setting is a number, also the one that fits best."""
+    for request in other_requests([one.case for one in search.cases], search.known):
+        if search.over:
+            return
+        with contextlib.suppress(Exception):
+            for one in [request] if request.at is None else _best_fixed(search, request.at, request.rest):
+                search.note(search.fits(None, "both", one), one.text, None, *one.rank)
+
+
+def _best_fixed(search: Search, at: Callable[[float], Request], rest: float) -> list[Request]:
+    """A setting fixed at the number that fits best, if nothing else was found."""
+    if search.hits:
+        return []
+    numbers, _ = search.number(lambda value: search.outputs(None, "both", at(value)), rest)
+    return [at(value) for value in numbers]
+
+
+def _numbers(search: Search, places: Sequence[Place]) -> list[Live]:
+    """Factors, terms and constants of another size; returns the spots that are reached, the most promising first."""
+    live: list[Live] = []
+    for place in places:
+        for spot in spots(place):
+            for mode in search.modes(place):
+                if search.over:
+                    return live
+                if values := _values(search, spot, mode):
+                    live.append(Live(spot, mode, values, _solved(search, spot, mode, values)))
+    return sorted(live, key=lambda one: one.late)
+
+
+def _values(search: Search, spot: Spot, mode: str) -> list[Any]:
+    """Values of an expression in the first case, None for one that is no array; a statement has True."""
+    if isinstance(spot.node, ast.stmt):
+        return [True]
+    found: list[Any] = []
+
+    def seen(value: Any) -> Any:
+        if len(found) < MOST_VALUES:
+            found.append(value if isinstance(value, bool | int | float | np.ndarray | np.generic) else None)
+        return value
+
+    spot.place.module.__dict__["_seen"] = seen
+    with contextlib.suppress(Exception):
+        with written(spot, f"_seen({ast.unparse(spot.node)})"):
+            install = spot.place.compiled()
+        search.outputs(install, mode)
+    return found
+
+
+def _solved(search: Search, spot: Spot, mode: str, values: list[Any]) -> int:
+    """Look for the number at a spot with which all is explained; returns how late other texts are tried there."""
+    late = LATEST
+    for text, rest in with_number(spot.node, values):
+        with contextlib.suppress(Exception):
+            with written(spot, text):
+                install = spot.place.compiled()
+
+            def at(value: float, install: Install = install) -> Outputs:
+                spot.place.module.__dict__["_knob"] = value
+                return search.outputs(install, mode)
+
+            numbers, spoils = search.number(at, rest)
+            late = min(late, spoils)
+            for value in numbers:
+                spot.place.module.__dict__["_knob"] = value
+                if whole := search.fits(install, mode):
+                    rank = 2 if isinstance(spot.node, ast.Constant) else 3
+                    said = _replaced(spot, mode, said_number(spot.node, rest, value))
+                    search.note(whole, said, spot, 3 if value == numbers[-1] != 0 else 1, rank)
+                    break
+    return late
+
+
+def _texts(one: Live) -> Iterator[tuple[str, int]]:
+    """Other texts of a spot."""
+    return rewrites(one.spot.node, one.values, one.spot.truth)
+
+
+def _names(one: Live) -> Iterator[tuple[str, int]]:
+    """Another array or number of the function in place of one."""
+    is_name = isinstance(one.spot.node, ast.Name | ast.Attribute)
+    return ((name, 0) for name in (names_in(one.spot.place) if is_name else ()))
+
+
+def _try(search: Search, one: Live, texts: Iterator[tuple[str, int]], rank: int) -> None:
+    for text, less in texts:
+        if search.over:
+            return
+        with contextlib.suppress(Exception):
+            with written(one.spot, text):
+                install = one.spot.place.compiled()
+            search.note(search.fits(install, one.mode), _replaced(one.spot, one.mode, text), one.spot, rank, less)
+
+
+def _replaced(spot: Spot, mode: str, new: str) -> str:
+    side = "" if mode == "both" or len(spot.place.phases) == 1 else f", in the {mode} pass alone"
+    return f"`{new}` where `{ast.unparse(spot.node)}` is right{side}"
+
+
+def explained(golden: Golden, report: Report, outputs: Path, operation: str, seconds: float = SECONDS) -> Search | None:
+    """The search for the mistake of an operation; None where the definition does not compute it, or nothing is left."""
+    stage = definition_stages().get(operation)
+    cases = {case.name: case for case in golden.cases if case.operation == operation}
+    judged = [r for r in report.cases if r.name in cases and r.status != "not ported"]
+    answered = [Answered(golden, cases[r.name], r, outputs, report.precision) for r in judged]
+    answered = [one for one in answered if one.got]
+    answered.sort(key=lambda one: (-len(one.refused), -sum(one.got[name].size for name in one.refused)))
+    if stage is None or not answered or not answered[0].refused:
+        return None
+    return search(stage, answered, golden.cases, seconds)
+
+
+def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECONDS) -> None:
+    """Write into a report what a search for the mistake of its first wrong operation finds."""
+    found = explained(golden, report, outputs, report.first_wrong, seconds) if report.first_wrong else None
+    report.causes = sentences(found) if found else []
+
+
+def sentences(search: Search) -> list[str]:
+    """The changes that explain most, one a line of the source; nothing where changes in many functions do."""
+    best: dict[str, Hit] = {}
+    for hit in search.hits:
+        if hit.rank[:3] == search.hits[0].rank[:3]:
+            best.setdefault(hit.where or hit.text, hit)
+    functions = sorted({hit.function for hit in best.values()})
+    if not best or len(functions) > MOST_LINES:
+        return []
+    said = [f"{hit.text}{f': {hit.where}' if hit.where else ''}" for hit in best.values()]
+    rest = [f"  or equally with {one}" for one in said[1:]]
+    if len(best) > MOST_LINES:
+        said[0] = f"for example {said[0]}"
+        rest = [f"  or equally with another change in {', '.join(functions)}: {len(best)} lines"]
+    number = len(search.cases)
+    whole = f"  ({WHOLE[search.hits[0].whole]} of its {number} case{'s' * (number > 1)})"
+    return [f"your outputs are those of the definition with {said[0]}", *rest, whole]

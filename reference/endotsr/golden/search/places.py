@@ -1,0 +1,215 @@
+"""Places in the source of the definition: what a stage executes, and the running of it with one place changed."""
+
+import ast
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+ROOM = "endotsr.definition"
+EQUATION = re.compile(r"\((B?M?\d+b?)\)")  # in the docstring of a function
+STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a line
+
+
+class Place:
+    """A function of the definition, or a constant with the constants that are made of it."""
+
+    def __init__(self, module: ModuleType, statement: ast.FunctionDef | ast.Assign, phases: frozenset[str]) -> None:
+        self.module, self.statement, self.phases = module, statement, phases
+        self.name = f"{module.__name__.rpartition('.')[2]}.{getattr(statement, 'name', 'constants')}"
+        self.file = Path(str(module.__file__))
+        self.lines = self.file.read_text(encoding="utf-8").splitlines()
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is no function."""
+        return isinstance(self.statement, ast.Assign)
+
+    def compiled(self) -> Callable[[], Any]:
+        """What installs the statement as it stands now; it returns what takes it back."""
+        if isinstance(self.statement, ast.Assign):
+            return self._constants(self.statement)
+        name, function = self.statement.name, self.module.__dict__[self.statement.name]
+        made = compile(ast.Module([self.statement], []), str(self.file), "exec")
+        code = next(c for c in made.co_consts if isinstance(c, CodeType) and c.co_name == name)
+
+        def install() -> Callable[[], None]:
+            right, function.__code__ = function.__code__, code
+            return lambda: setattr(function, "__code__", right)
+
+        return install
+
+    def _constants(self, statement: ast.Assign) -> Callable[[], Any]:
+        changed: set[str] = set(_targets(statement))
+        wanted: list[ast.stmt] = [statement]
+        for one in (s for s in syntax(self.module).body if isinstance(s, ast.Assign)):
+            used = {n.id for n in ast.walk(one.value) if isinstance(n, ast.Name)}
+            if one.lineno > statement.lineno and used & changed:
+                wanted.append(one)
+                changed |= set(_targets(one))
+        code = compile(ast.Module(wanted, []), str(self.file), "exec")
+
+        def install() -> Callable[[], Any]:
+            values = dict(self.module.__dict__)
+            exec(code, values)
+            before = [
+                (room, name, room.__dict__[name])
+                for room in definition_modules()
+                for name in changed
+                if room.__dict__.get(name) is self.module.__dict__[name]
+            ]
+            for room, name, _ in before:
+                setattr(room, name, values[name])
+            return lambda: [setattr(*one) for one in before]
+
+        return install
+
+    def where(self, node: ast.AST) -> str:
+        """Equation and line of a node of the statement."""
+        line = getattr(node, "lineno", self.statement.lineno)
+        text = ast.get_docstring(self.statement) if isinstance(self.statement, ast.FunctionDef) else ""
+        found = EQUATION.search(text or "") or EQUATION.search(ast.get_docstring(syntax(self.module)) or "")
+        step = STEP.search(self.lines[line - 1])
+        equation = f"equation ({found[1]}), " if found else ""
+        return f"{equation}{f'step {step[1]}, ' if step else ''}definition/{self.file.name}:{line}"
+
+
+class Spot(NamedTuple):
+    """All expressions of one text in a place, or one of them, as (node that holds it, field, index in a list)."""
+
+    place: Place
+    node: ast.expr | ast.stmt
+    holders: tuple[tuple[ast.AST, str, int | None], ...]
+
+    @property
+    def truth(self) -> bool:
+        """Whether it stands where a condition stands."""
+        holder, field, index = self.holders[0]
+        match holder:
+            case ast.Call():
+                return index == 0 and ast.unparse(holder.func) == "np.where"
+            case ast.BinOp(op=ast.BitAnd() | ast.BitOr()) | ast.UnaryOp(op=ast.Invert() | ast.Not()) | ast.BoolOp():
+                return True
+            case ast.AugAssign(op=ast.BitAnd() | ast.BitOr()):
+                return True
+        return field == "test"
+
+
+@contextmanager
+def written(spot: Spot, text: str) -> Iterator[None]:
+    """The syntax tree of the place with another text at the spot. Raises SyntaxError for what is no expression."""
+    for holder, field, index in spot.holders:
+        made = ast.Pass() if isinstance(spot.node, ast.stmt) else ast.parse(text, mode="eval").body
+        for node in ast.walk(made):
+            ast.copy_location(node, spot.node)
+        _put(holder, field, index, made)
+    try:
+        yield
+    finally:
+        for holder, field, index in spot.holders:
+            _put(holder, field, index, spot.node)
+
+
+def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
+    if index is None:
+        setattr(holder, field, node)
+    else:
+        getattr(holder, field)[index] = node
+
+
+def spots(place: Place) -> list[Spot]:
+    """Every expression that is read in a place, and its statements; what occurs several times also all at once."""
+    found: dict[str, list[Spot]] = {}
+    body = place.statement.body if isinstance(place.statement, ast.FunctionDef) else [place.statement]
+    for statement in body:
+        for holder in ast.walk(statement):
+            for field, value in ast.iter_fields(holder):
+                stored = isinstance(holder, ast.Subscript) and isinstance(holder.ctx, ast.Store)
+                if field in ("func", "annotation", "targets") or (stored and field == "value"):
+                    continue
+                for index, node in enumerate(value) if isinstance(value, list) else ((None, value),):
+                    if _is_read(node):
+                        spot = Spot(place, node, ((holder, field, index),))
+                        found.setdefault(ast.unparse(node), []).append(spot)
+    groups = [Spot(place, of[0].node, tuple(s.holders[0] for s in of)) for of in found.values() if len(of) > 1]
+    return [spot for of in found.values() for spot in of] + groups
+
+
+def _is_read(node: Any) -> bool:
+    if not isinstance(node, ast.expr):
+        return isinstance(node, ast.Assign | ast.AugAssign | ast.If)
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float) or (isinstance(node.value, str) and "->" in node.value)
+    if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
+        return isinstance(node.ctx, ast.Load) and ast.unparse(node) != "np"
+    return not isinstance(node, ast.Tuple | ast.List | ast.Dict | ast.Slice | ast.Lambda | ast.Starred)
+
+
+def names_in(place: Place) -> list[str]:
+    """Names that a function reads and that are its own, and attributes by what they are read of."""
+    if not isinstance(place.statement, ast.FunctionDef):
+        return []
+    own = {a.arg for a in ast.walk(place.statement.args) if isinstance(a, ast.arg)}
+    nodes = list(ast.walk(place.statement))
+    own |= {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return sorted(
+        own | {ast.unparse(n) for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}
+    )
+
+
+def executed(phases: dict[str, Callable[[], Any]]) -> list[Place]:
+    """The places of the definition that run in some calls, by phase, and the constants of their modules."""
+    codes: dict[CodeType, set[str]] = {}
+    for phase, call in phases.items():
+
+        def seen(frame: Any, event: str, argument: Any, phase: str = phase) -> None:
+            if event == "call":
+                codes.setdefault(frame.f_code, set()).add(phase)
+
+        before = sys.getprofile()
+        sys.setprofile(seen)
+        try:
+            call()
+        finally:
+            sys.setprofile(before)
+    found = []
+    for module in definition_modules():
+        functions = {
+            name: frozenset(codes[f.__code__])
+            for name, f in inspect.getmembers(module, inspect.isfunction)
+            if f.__module__ == module.__name__ and f.__code__ in codes
+        }
+        for statement in syntax(module).body:
+            if isinstance(statement, ast.FunctionDef) and statement.name in functions:
+                found.append(Place(module, statement, functions[statement.name]))
+            elif isinstance(statement, ast.Assign) and functions and _is_number(module, statement):
+                found.append(Place(module, statement, frozenset().union(*functions.values())))
+    return found
+
+
+def _is_number(module: ModuleType, statement: ast.Assign) -> bool:
+    values = [module.__dict__[name] for name in _targets(statement)]
+    return not any(isinstance(value, type | FunctionType) or hasattr(value, "_fields") for value in values)
+
+
+def _targets(statement: ast.Assign) -> Sequence[str]:
+    return [n.id for target in statement.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+
+
+def definition_modules() -> list[ModuleType]:
+    """The modules of the definition that are loaded."""
+    return [m for name, m in sorted(sys.modules.items()) if name.startswith(f"{ROOM}.") and m is not None]
+
+
+_trees: dict[str, ast.Module] = {}
+
+
+def syntax(module: ModuleType) -> ast.Module:
+    """The syntax tree of a module, the same one at every call."""
+    if module.__name__ not in _trees:
+        _trees[module.__name__] = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
+    return _trees[module.__name__]

@@ -1,0 +1,134 @@
+"""Other texts for an expression of the definition, as a mistake would write it.
+
+Nothing here knows the method: a constant has another value, an operation is left out or taken for its neighbour, a
+comparison includes its end, a factor or a term is added whose size is found from the outputs.
+"""
+
+import ast
+from collections.abc import Iterator, Sequence
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+TWINS = (
+    "sin cos", "exp exp2", "log log2", "log log10", "maximum minimum", "max min", "max mean", "max sum", "sum mean",
+    "sum max", "mean sum", "median mean", "median min", "median max", "mean median", "ceil floor", "ceil rint",
+    "round floor", "round ceil", "rint floor", "rint trunc", "trunc floor", "trunc rint", "tanh arctan", "cosh sinh",
+    "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort",
+)  # fmt: skip
+"""Functions that are taken for another."""
+OPERATORS: dict[type, str] = {
+    ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l})",
+    ast.Sub: "{l}; -({r}); ({l}) + ({r}); ({r}) - ({l})",
+    ast.Mult: "{l}; {r}; ({l}) / ({r}); ({r}) / ({l}); ({l}) + ({r})",
+    ast.Div: "{l}; 1 / ({r}); ({l}) * ({r}); ({r}) / ({l}); ({l}) / ({r}) ** 2; ({l}) / np.sqrt({r}); ({l}) // ({r})",
+    ast.FloorDiv: "{l}; ({l}) / ({r}); -(-({l}) // ({r}))",
+    ast.Mod: "{l}; ({l}) // ({r})",
+    ast.Pow: "{l}; ({l}) ** (({r}) + 1); ({l}) ** (({r}) - 1); ({l}) ** (2 * ({r})); np.abs({l}); np.sqrt({l})",
+    ast.MatMult: "{l}; {r}; ({l}).T @ ({r}); ({l}) @ ({r}).T; ({r}) @ ({l}); (({l}) @ ({r})).T; ({l}).T @ ({r}).T",
+    ast.BitAnd: "{l}; {r}; ({l}) | ({r})",
+    ast.BitOr: "{l}; {r}; ({l}) & ({r})",
+}
+COMPARED = {ast.Lt: "<= >=", ast.LtE: "< >", ast.Gt: ">= <=", ast.GtE: "> <", ast.Eq: "!= > <", ast.NotEq: "=="}
+SWAPS = ("[1, 0, 2]", "[2, 1, 0]", "[0, 2, 1]", "[1, 2, 0]", "[2, 0, 1]")
+
+
+def rewrites(node: ast.expr | ast.stmt, values: Sequence[Any], truth: bool) -> Iterator[tuple[str, int]]:
+    """Other texts for an expression, or the leaving out of a statement, each with its rank, 0 = the most likely.
+
+    values   that the expression had; a text that would change none of them is not made
+    truth    the expression is a condition
+    """
+    if isinstance(node, ast.stmt):
+        yield "pass", 0
+        return
+    text = ast.unparse(node)
+    if truth or isinstance(node, ast.Compare | ast.BoolOp):
+        yield from (("True", 0), ("False", 0), (f"~({text})", 2))
+    yield from ((other, 1 if other in text else 2) for other in _rewrites(node))
+    if not truth and not isinstance(node, ast.Constant | ast.Compare | ast.BoolOp):
+        yield from ((pattern.format(*[text] * pattern.count("{}")), 3) for pattern in _wrapped(values))
+
+
+def _rewrites(node: ast.expr) -> Iterator[str]:
+    match node:
+        case ast.Constant(value=bool() as v):
+            yield str(not v)
+        case ast.Constant(value=int() | float() as v):
+            yield from dict.fromkeys(f"{k!r}" for k in (0, 1, 2, 3, -v, v + 1, v - 1, 2 * v, v / 2) if k != v)
+        case ast.Constant(value=str() as v) if "->" in v:
+            yield from _other_sums(v)
+        case ast.BinOp():
+            sides = {"l": ast.unparse(node.left), "r": ast.unparse(node.right)}
+            yield from (pattern.format(**sides) for pattern in OPERATORS.get(type(node.op), "{l}").split("; "))
+        case ast.UnaryOp() | ast.Subscript() | ast.Attribute(attr="T"):
+            yield ast.unparse(node.operand if isinstance(node, ast.UnaryOp) else node.value)
+        case ast.BoolOp():
+            yield from map(ast.unparse, node.values)
+        case ast.IfExp():
+            yield from (ast.unparse(node.body), ast.unparse(node.orelse))
+        case ast.Compare():
+            left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
+            yield from (f"({left}) {sign} ({right})" for sign in COMPARED.get(type(node.ops[0]), "!=").split())
+        case ast.Call():
+            yield from _other_calls(node)
+    inner = [n for n in ast.walk(node) if isinstance(n, ast.BinOp | ast.Call | ast.Name | ast.Attribute)]
+    yield from dict.fromkeys(ast.unparse(n) for n in inner[1:12] if "np" not in ast.unparse(n)[:3])
+
+
+def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tuple[str, float]]:
+    """Texts in which `_knob` is a number to be found, and its value where nothing is changed."""
+    if isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind == "f" for value in values):
+        text = ast.unparse(node)
+        yield f"_knob * ({text})", 1.0
+        if not isinstance(node, ast.Constant):
+            yield f"({text}) + _knob", 0.0
+    elif isinstance(node, ast.Constant) and type(node.value) is int and node.value:
+        yield f"{node.value} * _knob", 1.0
+
+
+def _wrapped(values: Sequence[Any]) -> Iterator[str]:
+    """Patterns that change one of the values."""
+    arrays = [np.asarray(value) for value in values]
+    if any(a.dtype.kind == "f" for a in arrays):
+        yield from ("0 * ({})", "-({})", "2 * ({})", "({}) / 2", "({}) ** 2", "1 / ({})")
+        yield from ["np.abs({})", "np.maximum({}, 0)"] * any((a < 0).any() for a in arrays)
+        yield from ["np.minimum({}, 1)"] * any((a > 1).any() for a in arrays)
+        yield from ["np.sqrt({})"] * all((a >= 0).all() for a in arrays)
+    elif any(a.ndim == 0 and a.dtype.kind in "iu" for a in arrays):
+        yield from ("({}) + 1", "({}) - 1")
+    if any(a.ndim for a in arrays):
+        yield from ("({})[::-1]", "np.mean({})")
+        yield from ["({}).T", "np.swapaxes({}, 0, 1)"] * any(a.ndim > 1 for a in arrays)
+        yield from [f"({{}})[{order}]" for order in SWAPS] * any(a.shape[:1] == (3,) for a in arrays)
+        yield from ["({}) / np.linalg.norm({}, axis=0)"] * any(a.shape[:1] in ((3,), (4,)) for a in arrays)
+
+
+def _other_calls(node: ast.Call) -> Iterator[str]:
+    function, arguments = ast.unparse(node.func), [ast.unparse(a) for a in node.args]
+    name = function.rpartition(".")[2]
+    if isinstance(node.func, ast.Attribute) and function != f"np.{name}":
+        owner = ast.unparse(node.func.value)
+        yield owner
+        if name in ("mean", "sum") and not arguments:
+            yield f"np.mean(({owner})[({owner}) != 0])"
+    yield from arguments
+    rest = ast.unparse(node)[len(function) :]
+    yield from (function[: -len(name)] + pair.split()[1] + rest for pair in TWINS if pair.split()[0] == name)
+    words = [ast.unparse(word) for word in node.keywords]
+    yield from (f"{function}({', '.join([*arguments, *words[:k], *words[k + 1 :]])})" for k in range(len(words)))
+    for k in range(len(arguments) - 1):
+        turned = [*arguments[:k], arguments[k + 1], arguments[k], *arguments[k + 2 :]]
+        yield f"{function}({', '.join([*turned, *words])})"
+
+
+def _other_sums(text: str) -> Iterator[str]:
+    """The indices of one operand of a sum, or of the result, in another order."""
+    operands, result = text.split("->")
+    parts = [*operands.split(","), result]
+    for k, part in enumerate(parts):
+        for order in ("".join(order) for order in permutations(part)):
+            if order != part:
+                turned = [*parts[:k], order, *parts[k + 1 :]]
+                yield repr(f"{','.join(turned[:-1])}->{turned[-1]}")

@@ -1,0 +1,191 @@
+"""The search for a mistake that is on no list: what is wrong in the definition is found again, by its line."""
+
+import time
+
+import numpy as np
+import pytest
+
+from endotsr.definition import covariance, density_control, dictionary, masked_l1, masked_ssim, matern
+from endotsr.golden.judge.diagnose import PARTS, made_of
+from endotsr.golden.judge.npy import write_npy
+from endotsr.golden.judge.store import golden_folder, in_precision, read_golden
+from endotsr.golden.judge.verdict import judge
+from endotsr.golden.reference import stored
+from endotsr.golden.search.find import explain
+from endotsr.golden.search.places import executed
+from endotsr.stages.definition import definition_stages
+
+
+@pytest.fixture(scope="module")
+def golden():
+    return read_golden(golden_folder())
+
+
+def causes(golden, folder, operation, *, inputs=lambda found: found, settings=lambda found: found, seconds=8.0):
+    """What is said of the answers of the definition as it is patched now, for all cases of an operation."""
+    for case in (case for case in golden.cases if case.operation == operation):
+        given = inputs(in_precision(golden.inputs(case), "float64"))
+        with np.errstate(all="ignore"):
+            found = definition_stages()[operation].compute(given, settings(case.settings))
+        for name in case.outputs:
+            write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
+    return report(golden, folder, operation, seconds)
+
+
+def report(golden, folder, operation, seconds=8.0):
+    (family,) = {case.family for case in golden.cases if case.operation == operation}
+    with pytest.MonkeyPatch.context() as right:
+        for module, name, function in RIGHT:
+            right.setattr(module, name, function)
+        found = judge(golden, folder, "float64", level=4, only=family)
+        explain(golden, found, folder, seconds)
+    return "\n".join(found.causes)
+
+
+PATCHED = [
+    (masked_ssim, "C1"),
+    (covariance, "covariance_reverse"),
+    (density_control, "densify"),
+    (dictionary, "dictionary_reverse"),
+    (masked_l1, "masked_l1_reverse"),
+    (matern, "matern_penalty_forward"),
+    (matern, "matern_penalty_reverse"),
+    (matern, "matern_weights"),
+]
+RIGHT = [(module, name, getattr(module, name)) for module, name in PATCHED]
+
+
+def line_of(module, text):
+    """How a report names the line of a file of the definition."""
+    with open(module.__file__, encoding="utf-8") as file:
+        (number,) = [k for k, line in enumerate(file, start=1) if text in line]
+    return f"definition/{module.__name__.rpartition('.')[2]}.py:{number}"
+
+
+def test_a_constant_of_another_value_is_found_with_its_value(golden, tmp_path, monkeypatch):
+    monkeypatch.setattr(masked_ssim, "C1", 0.02**2)
+    said = causes(golden, tmp_path, "masked_ssim")
+    assert said.startswith(
+        "your outputs are those of the definition with `0.02` where `0.01` is right: equation (B7), "
+    )
+    assert line_of(masked_ssim, "C1, C2 =") in said and "every output of its 5 cases" in said
+
+
+def test_a_part_that_is_left_out_is_found(golden, tmp_path, monkeypatch):
+    right = covariance.covariance_reverse
+
+    def whole(d_shape, saved):
+        found, (q, inverse) = right(d_shape, saved), covariance.unit(saved.quaternion)
+        return found._replace(d_quaternion=covariance.rotation_reverse(q, d_shape.rotation) * inverse)
+
+    monkeypatch.setattr(covariance, "covariance_reverse", whole)
+    said = causes(golden, tmp_path, "covariance")
+    assert "with `g` where `g - (g * q).sum(axis=0) * q` is right: equation (B2), step (5.8), " in said
+    assert line_of(covariance, "# (5.8)") in said
+
+
+def test_a_comparison_without_its_end_is_found(golden, tmp_path, monkeypatch):
+    right = density_control.densify
+
+    def without_end(gaussians, statistics, config, *rest):
+        above = np.nextafter(config.gradient_threshold, np.inf)
+        return right(gaussians, statistics, config._replace(gradient_threshold=above), *rest)
+
+    class Fields(dict):
+        __getattr__ = dict.__getitem__
+
+        def _replace(self, **changes):
+            return Fields({**self, **changes})
+
+    def converted(gaussians, statistics, config, *rest):
+        fields = {name: getattr(config, name) for name in config.__struct_fields__}
+        return without_end(gaussians, statistics, Fields(fields), *rest)
+
+    monkeypatch.setattr(density_control, "densify", converted)
+    said = causes(golden, tmp_path, "density")
+    assert "`(steepness) > (least)` where `steepness >= least` is right: equation (B11)" in said
+
+
+def test_a_setting_that_is_fixed_is_found(golden, tmp_path):
+    def fixed(settings):
+        return {**settings, "raster": {**settings["raster"], "low_pass": 0.25}}
+
+    said = causes(golden, tmp_path, "projection", settings=fixed)
+    assert said.startswith("your outputs are those of the definition with raster.low_pass fixed at 0.25\n")
+
+
+def test_an_input_in_another_order_is_found(golden, tmp_path):
+    order = [3, 0, 1, 2]
+    folder = tmp_path / "turned"
+    for case in (case for case in golden.cases if case.operation == "covariance"):
+        given = in_precision(golden.inputs(case), "float64")
+        found = definition_stages()["covariance"].compute({**given, "quaternion": given["quaternion"][order]}, {})
+        found["d_quaternion"] = found["d_quaternion"][np.argsort(order)]
+        for name in case.outputs:
+            write_npy(folder / case.name / f"{name}.npy", stored(found[name]))
+    said = report(golden, folder, "covariance")
+    assert "with the input quaternion read in the order [3, 0, 1, 2] along axis 0\n  (every output of" in said
+
+
+def test_one_pass_alone_is_told(golden, tmp_path, monkeypatch):
+    right = dictionary.dictionary_reverse
+
+    def with_cosine_for_sine(d_phi, saved):
+        return right(d_phi * np.repeat([1.0, -1.0], d_phi.size // 2), saved)
+
+    monkeypatch.setattr(dictionary, "dictionary_reverse", with_cosine_for_sine)
+    said = causes(golden, tmp_path, "dictionary")
+    assert line_of(dictionary, "d_turns = 2") in said and "every output of its 2 cases" in said
+
+
+@pytest.mark.parametrize(
+    ("slope", "text"),
+    [
+        (2.0, "every forward output, of which the gradients of the port are the derivatives,"),
+        (5.0, "every forward output; the gradients of the port are wrong in another way,"),
+    ],
+)
+def test_gradients_that_follow_a_wrong_forward_pass_are_told_from_others(golden, tmp_path, monkeypatch, slope, text):
+    (_, _, forward), (_, _, reverse) = RIGHT[5:7]
+    monkeypatch.setattr(matern, "matern_penalty_forward", lambda c, rho: (2 * forward(c, rho)[0], forward(c, rho)[1]))
+    monkeypatch.setattr(matern, "matern_penalty_reverse", lambda d, saved: slope * reverse(d, saved))
+    said = causes(golden, tmp_path, "matern")
+    assert "`3` where `6` is right: equation (4)" in said and text in said
+    assert line_of(matern, "/ (6 *") in said
+
+
+def test_noise_is_not_explained_and_time_is_kept(golden, tmp_path, monkeypatch):
+    random = np.random.default_rng(0)
+    for case in (case for case in golden.cases if case.operation == "projection"):
+        for name, output in case.outputs.items():
+            value = golden.array(case, output.file)
+            noise = 1 + random.uniform(0.1, 0.9, value.shape) if value.dtype.kind == "f" else 1
+            write_npy(tmp_path / case.name / f"{name}.npy", stored(np.asarray(value * noise, value.dtype)))
+    began = time.process_time()
+    assert report(golden, tmp_path, "projection", seconds=1.0) == ""
+    assert time.process_time() - began < 3.0
+
+
+def test_the_definition_is_as_before(golden, tmp_path, monkeypatch):
+    monkeypatch.setattr(masked_l1, "masked_l1_reverse", lambda d, saved: -RIGHT[4][2](d, saved))
+    before = {name: value for name, value in vars(masked_l1).items() if name != "masked_l1_reverse"}
+    assert line_of(masked_l1, "# (10.1)") in causes(golden, tmp_path, "masked_l1")
+    assert {name: value for name, value in vars(masked_l1).items() if name != "masked_l1_reverse"} == before
+    monkeypatch.undo()
+    assert causes(golden, tmp_path, "masked_l1") == ""
+
+
+def test_the_parts_of_an_operation_are_those_that_the_definition_calls(golden):
+    stages = definition_stages()
+    parts = {}
+    for name, stage in stages.items():
+        case = next(case for case in golden.cases if case.operation == name)
+        given = in_precision(golden.inputs(case), "float64")
+        with np.errstate(all="ignore"):
+            places = executed({"forward": lambda g=given, s=stage, c=case: s.compute(g, c.settings)})
+        parts[name] = {place.name for place in places if not place.is_constant}
+    own = {name: f"{s.function.split('.')[-2]}.{s.function.rpartition('.')[2]}" for name, s in stages.items()}
+    for name in PARTS.keys() & parts.keys():
+        assert {part for part in stages if part != name and own[part] in parts[name]} - {"frequencies"} <= made_of(name)
+        for part in set(PARTS[name]) & parts.keys() - {"exposure", "calibration"}:
+            assert own[part] in parts[name], (name, part)
