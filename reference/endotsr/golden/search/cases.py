@@ -72,12 +72,21 @@ class Answered:
         return all(name in found and self._same(name, np.asarray(found[name])) for name in names)
 
     def _same(self, name: str, value: NDArray) -> bool:
-        got, rule = self.got[name], self.case.outputs[name].compare
-        if value.shape != got.shape or value.dtype.kind == "c":
+        rule = self.case.outputs[name].compare
+        if value.shape != self.got[name].shape or value.dtype.kind == "c":
             return False
+        return self._off(name, value) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
+
+    def _off(self, name: str, value: NDArray) -> int:
+        """Entries of an output that are not those of the port."""
+        got = self.got[name]
         with np.errstate(all="ignore"):
-            off = ~(np.abs(value - got) <= self.unit[name]) & ~(np.isnan(value) & np.isnan(got)) & (value != got)
-        return int(off.sum()) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
+            near = (np.abs(value - got) <= self.unit[name]) | (value == got)
+        return int((~(near | (np.isnan(value) & np.isnan(got)))).sum())
+
+    def wrong(self, names: Sequence[str]) -> int:
+        """Entries of some outputs that a change has to explain."""
+        return sum(self._off(name, self.right[name]) for name in self.refused.intersection(names))
 
     def distance(self, found: Mapping[str, NDArray], names: Sequence[str]) -> NDArray | None:
         """Differences of real outputs from those of the port, in units of their scale; None = they have no number."""

@@ -2,6 +2,9 @@
 
 import ast
 import contextlib
+import json
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -10,9 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from endotsr.golden.judge.format import Case
-from endotsr.golden.judge.store import Golden
-from endotsr.golden.judge.verdict import Report
+from endotsr.errors import InputError
+from endotsr.golden.judge.diagnose import made_of
+from endotsr.golden.judge.format import Precision
+from endotsr.golden.judge.store import Golden, in_precision
+from endotsr.golden.judge.verdict import Report, judge
 from endotsr.golden.search.cases import Answered
 from endotsr.golden.search.numbers import START, best_number, plain_first, said_number
 from endotsr.golden.search.places import Place, Spot, definition_modules, executed, names_in, spots, written
@@ -22,8 +27,11 @@ from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
 
 SECONDS = 8.0  # of computing that a search may take
+START_UP = 60.0  # seconds that a process may take beside its search
+SLOWEST = 10.0  # seconds that a second of computing may take on a busy machine
 LATEST = 1000  # a spot of which it is not known what it reaches
 ENOUGH = 40  # equal explanations after which the search ends
+TELLING = 8  # wrong entries from which any number is believed, and outputs whose gradients are wrong otherwise
 MOST_LINES = 3  # of the source that are named where all explain the outputs equally
 MOST_VALUES = 64  # of an expression, that are looked at
 WHOLE = {
@@ -57,8 +65,9 @@ class Live(NamedTuple):
 class Search:
     """The search for one operation: its cases, of which the first has the most refused outputs, and what was found."""
 
-    def __init__(self, stage: Stage, answered: Sequence[Answered], known: Sequence[Case], seconds: float) -> None:
-        self.stage, self.cases, self.known, self.end = stage, answered, known, time.process_time() + seconds
+    def __init__(self, stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float) -> None:
+        self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
+        self.golden = golden
         self.hits: list[Hit] = []
         self.tried = 0
         for one in answered:
@@ -66,6 +75,8 @@ class Search:
         first = answered[0]
         real = [name for name in sorted(first.refused) if first.case.outputs[name].dtype == "real"]
         self.real = [name for name in real if name in first.ahead] or real  # that a number is sought by
+        self.wrong = sum(one.wrong(one.ahead + one.back) for one in answered)
+        self.wrong_ahead = sum(one.wrong(one.ahead) for one in answered)
         self.ahead = any(one.refused & set(one.ahead) for one in answered)  # a forward output is refused
         self.back = any(one.refused & set(one.back) for one in answered)
 
@@ -108,7 +119,7 @@ class Search:
         with _installed(install if mode != "forward" else None):
             return {**found, **one.reverse(self.stage, inputs, saved)}
 
-    def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[float], int]:
+    def number(self, at: Callable[[float], Outputs], rest: float) -> tuple[list[tuple[float, bool]], int]:
         """Numbers to try, the plainest first, and how many outputs that passed another number spoils."""
         one = self.cases[0]
 
@@ -120,11 +131,13 @@ class Search:
         late = sum(not one.same(moved, [name]) for name in one.got if name not in one.refused)
         changes = not all(np.array_equal(moved[name], one.right[name]) for name in one.got)
         known = number is not None and abs(number - rest) > START
-        return plain_first(number) if number is not None and known else [], late if changes else LATEST - 1
+        numbers = plain_first(number) if number is not None and known else []
+        numbers = [one for one in numbers if one[1] or self.wrong >= TELLING]
+        return numbers, late if changes else LATEST - 1
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
         """Keep a change that fits."""
-        if whole:
+        if whole and (whole != "forward" or self.wrong_ahead >= TELLING):
             if spot and not self.ahead and spot.place.phases == {"forward"}:
                 rank = (rank[0] + 1, *rank[1:])  # what is refused is computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
@@ -147,24 +160,22 @@ def _installed(install: Install | None) -> Iterator[None]:
             back()
 
 
-def search(stage: Stage, answered: Sequence[Answered], known: Sequence[Case], seconds: float = SECONDS) -> Search:
+def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: float = SECONDS) -> Search:
     """Changes of one operation that explain what a port wrote, best first in `hits`."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        found = Search(stage, answered, known, seconds)
-        _requests(found)
+        found = Search(stage, answered, golden, seconds)
         calls: dict[str, Callable[[], Any]] = {
             "forward": lambda: [one.forward(stage, one.inputs, one.settings) for one in answered],
             "reverse": lambda: [one.reverse(stage, one.inputs, one.saved) for one in answered],
         }
         places = executed(calls)
-        for constants in (False, True):
-            live = _numbers(found, [place for place in places if place.is_constant == constants])
-            for texts, rank in ((_texts, 1), (_names, 2)):
-                lines = {hit.where for hit in found.hits if hit.rank[:2] < (0, 2)}
-                for one in live:  # once something is found, the rest of its line is tried
-                    if not lines or one.spot.place.where(one.spot.node) in lines:
-                        _try(found, one, texts(one), rank)
+        inner = _inner(stage.name, golden)
+        glue = [place for place in places if inner and not place.is_constant and place.name not in inner]
+        _places(found, glue)
+        _requests(found)
+        _places(found, [place for place in places if not place.is_constant and place not in glue])
+        _places(found, [place for place in places if place.is_constant])
     for module in definition_modules():
         for name in ("_knob", "_seen"):
             module.__dict__.pop(name, None)
@@ -172,9 +183,33 @@ def search(stage: Stage, answered: Sequence[Answered], known: Sequence[Case], se
     return found
 
 
+def _inner(operation: str, golden: Golden) -> set[str]:
+    """Functions of the definition that the parts of an operation execute; these parts are right."""
+    stages = definition_stages()
+    parts = made_of(operation) & stages.keys()
+    cases = {case.operation: case for case in golden.cases if case.operation in parts}
+    calls = {
+        part: lambda part=part: stages[part].compute(
+            in_precision(golden.inputs(cases[part]), "float64"), cases[part].settings
+        )
+        for part in parts & cases.keys()
+    }
+    return {place.name for place in executed(calls)}
+
+
+def _places(search: Search, places: Sequence[Place]) -> None:
+    """Changes of some places: numbers, then other texts, then other names."""
+    live = _numbers(search, places)
+    for texts, rank in ((_texts, 1), (_names, 2)):
+        lines = {hit.where for hit in search.hits if hit.rank[:2] < (0, 2)}
+        for one in live:  # once something is found, the rest of its line is tried
+            if not lines or one.spot.place.where(one.spot.node) in lines:
+                _try(search, one, texts(one), rank)
+
+
 def _requests(search: Search) -> None:
     """Settings and inputs that are taken otherwise; where a setting is a number, also the one that fits best."""
-    for request in other_requests([one.case for one in search.cases], search.known):
+    for request in other_requests([one.case for one in search.cases], search.golden.cases):
         if search.over:
             return
         with contextlib.suppress(Exception):
@@ -187,7 +222,7 @@ def _best_fixed(search: Search, at: Callable[[float], Request], rest: float) -> 
     if search.hits:
         return []
     numbers, _ = search.number(lambda value: search.outputs(None, "both", at(value)), rest)
-    return [at(value) for value in numbers]
+    return [at(value) for value, _ in numbers]
 
 
 def _numbers(search: Search, places: Sequence[Place]) -> list[Live]:
@@ -236,12 +271,12 @@ def _solved(search: Search, spot: Spot, mode: str, values: list[Any]) -> int:
 
             numbers, spoils = search.number(at, rest)
             late = min(late, spoils)
-            for value in numbers:
+            for value, plain in numbers:
                 spot.place.module.__dict__["_knob"] = value
                 if whole := search.fits(install, mode):
                     rank = 2 if isinstance(spot.node, ast.Constant) else 3
                     said = _replaced(spot, mode, said_number(spot.node, rest, value))
-                    search.note(whole, said, spot, 3 if value == numbers[-1] != 0 else 1, rank)
+                    search.note(whole, said, spot, 1 if plain else 3, rank)
                     break
     return late
 
@@ -272,23 +307,37 @@ def _replaced(spot: Spot, mode: str, new: str) -> str:
     return f"`{new}` where `{ast.unparse(spot.node)}` is right{side}"
 
 
-def explained(golden: Golden, report: Report, outputs: Path, operation: str, seconds: float = SECONDS) -> Search | None:
-    """The search for the mistake of an operation; None where the definition does not compute it, or nothing is left."""
+def explained(
+    golden: Golden, outputs: Path, precision: Precision, level: int, operation: str, seconds: float
+) -> Search:
+    """The search for the mistake of an operation, of which an output is refused.
+
+    Raises: InputError for one that the definition does not compute, or of which nothing that could be read is refused.
+    """
     stage = definition_stages().get(operation)
-    cases = {case.name: case for case in golden.cases if case.operation == operation}
-    judged = [r for r in report.cases if r.name in cases and r.status != "not ported"]
-    answered = [Answered(golden, cases[r.name], r, outputs, report.precision) for r in judged]
+    cases = [case for case in golden.cases if case.operation == operation and case.level <= level]
+    reports = judge(golden._replace(cases=cases), outputs, precision, level=min(level, 4)).cases
+    answered = [Answered(golden, *pair, outputs, precision) for pair in zip(cases, reports)]
     answered = [one for one in answered if one.got]
     answered.sort(key=lambda one: (-len(one.refused), -sum(one.got[name].size for name in one.refused)))
     if stage is None or not answered or not answered[0].refused:
-        return None
-    return search(stage, answered, golden.cases, seconds)
+        raise InputError(f"{operation}: nothing to explain")
+    return search(stage, answered, golden, seconds)
 
 
 def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECONDS) -> None:
-    """Write into a report what a search for the mistake of its first wrong operation finds."""
-    found = explained(golden, report, outputs, report.first_wrong, seconds) if report.first_wrong else None
-    report.causes = sentences(found) if found else []
+    """Write into a report what a search for the mistake of its first wrong operation finds.
+
+    It runs in a process of its own: a change may ask for more memory than there is, or call a library wrongly.
+    """
+    if not report.first_wrong:
+        return
+    words = [golden.folder, outputs, report.precision, report.asked_level, report.first_wrong, seconds]
+    limit = START_UP + SLOWEST * seconds
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        done = subprocess.run([sys.executable, "-m", "endotsr.golden.search", *map(str, words)],
+                              capture_output=True, timeout=limit, check=False)  # fmt: skip
+        report.causes = json.loads(done.stdout) if done.returncode == 0 else []
 
 
 def sentences(search: Search) -> list[str]:

@@ -40,14 +40,14 @@ def best_number(off: Callable[[float], NDArray | None], rest: float, before: NDA
     return k if np.linalg.norm(now) < LEFT * size else None
 
 
-def plain_first(number: float) -> list[float]:
-    """Numbers of the method or of few digits that are near, the nearest first, and the number itself last."""
+def plain_first(number: float) -> list[tuple[float, bool]]:
+    """Numbers that are near, each with whether it is one of the method or of few digits; the number itself is last."""
     if abs(number) < 1e-9:
-        return [0.0]
+        return [(0.0, True)]
     known = [sign * value for value in KNOWN.values() for sign in (1, -1)] + [round(number * 12) / 12]
-    known += [float(f"{number:.{digits}g}") for digits in (1, 2, 3, 4)]
+    known += [float(f"{number:.{digits}g}") for digits in (1, 2)]
     near = [value for value in dict.fromkeys(known) if value != number and abs(value - number) <= 1e-3 * abs(number)]
-    return [*sorted(near, key=lambda value: abs(value - number))[:3], number]
+    return [*((value, True) for value in sorted(near, key=lambda value: abs(value - number))[:3]), (number, False)]
 
 
 def said_number(node: ast.expr | ast.stmt, rest: float, value: float) -> str:

@@ -129,6 +129,8 @@ def spots(place: Place) -> list[Spot]:
         for holder in ast.walk(statement):
             for field, value in ast.iter_fields(holder):
                 stored = isinstance(holder, ast.Subscript) and isinstance(holder.ctx, ast.Store)
+                if isinstance(holder, ast.Call) and ast.unparse(holder.func) == "type":
+                    continue  # another type would be called with arrays
                 if field in ("func", "annotation", "targets") or (stored and field == "value"):
                     continue
                 for index, node in enumerate(value) if isinstance(value, list) else ((None, value),):
@@ -157,7 +159,12 @@ def names_in(place: Place) -> list[str]:
     nodes = list(ast.walk(place.statement))
     own |= {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     return sorted(
-        own | {ast.unparse(n) for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}
+        own
+        | {
+            ast.unparse(n)
+            for n in nodes
+            if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.value.id != "np"
+        }
     )
 
 

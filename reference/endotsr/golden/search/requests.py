@@ -49,7 +49,7 @@ def value_at(settings: Any, path: Sequence[str]) -> Any:
     return settings
 
 
-def with_value(settings: Settings, path: Sequence[str], value: Any) -> dict[str, Any]:
+def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
     """The settings with another value."""
     if len(path) == 1:
         return {**settings, path[0]: value}

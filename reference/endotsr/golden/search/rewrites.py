@@ -114,6 +114,8 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
         if name in ("mean", "sum") and not arguments:
             yield f"np.mean(({owner})[({owner}) != 0])"
     yield from arguments
+    if name == "exp":
+        yield f"1 + ({arguments[0]})"
     rest = ast.unparse(node)[len(function) :]
     yield from (function[: -len(name)] + pair.split()[1] + rest for pair in TWINS if pair.split()[0] == name)
     words = [ast.unparse(word) for word in node.keywords]

@@ -1,0 +1,37 @@
+"""The process of a search: `python -m endotsr.golden.search GOLDEN OUTPUTS PRECISION LEVEL OPERATION SECONDS`.
+
+Prints the sentences as JSON; ends with code 1 where there is nothing to explain.
+"""
+
+import contextlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from endotsr.errors import InputError
+from endotsr.golden.judge.store import read_golden
+from endotsr.golden.search.find import explained, sentences
+
+MOST_MEMORY = 4 << 30  # bytes, where the system can limit them
+
+
+def main(words: list[str]) -> int:
+    """One search."""
+    folder, outputs, precision, level, operation, seconds = words
+    given: Any = precision
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    golden = read_golden(Path(folder), verify=False)
+    try:
+        found = explained(golden, Path(outputs), given, int(level), operation, float(seconds))
+    except InputError:
+        return 1
+    print(json.dumps(sentences(found)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
