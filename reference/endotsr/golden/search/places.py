@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 ROOM = "endotsr.definition"
 EQUATION = re.compile(r"\((B?M?\d+b?)\)")  # in the docstring of a function
+WHOLE_FILE = re.compile(r"Equation \((B?M?\d+b?)\)")  # at the start of the docstring of a file
 STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a line
 
 
@@ -72,7 +73,7 @@ class Place:
         """Equation and line of a node of the statement."""
         line = getattr(node, "lineno", self.statement.lineno)
         text = ast.get_docstring(self.statement) if isinstance(self.statement, ast.FunctionDef) else ""
-        found = EQUATION.search(text or "") or EQUATION.search(ast.get_docstring(syntax(self.module)) or "")
+        found = EQUATION.search(text or "") or WHOLE_FILE.match(ast.get_docstring(syntax(self.module)) or "")
         step = STEP.search(self.lines[line - 1])
         equation = f"equation ({found[1]}), " if found else ""
         return f"{equation}{f'step {step[1]}, ' if step else ''}definition/{self.file.name}:{line}"
