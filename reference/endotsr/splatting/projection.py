@@ -18,7 +18,13 @@ from endotsr.splatting.camera import Camera, CameraGrads
 from endotsr.splatting.camera_model import Pinhole, intrinsics_of
 from endotsr.splatting.covariance import Shape
 from endotsr.splatting.projection_formulas import Rules, WorldToCamera
-from endotsr.splatting.projection_kernels import WITH_POSE, WITHOUT_POSE, project_kernel, project_reverse_kernel
+from endotsr.splatting.projection_kernels import (
+    WITH_POSE,
+    WITHOUT_POSE,
+    ScreenGrads,
+    project_kernel,
+    project_reverse_kernel,
+)
 from endotsr.splatting.settings import RasterSettings
 
 POSES_PER_SUM = 256  # Gaussians whose pose gradients are added up together
@@ -137,7 +143,7 @@ def projection_reverse_footprint(
     parallel_for(
         project_reverse_kernel, n,
         saved.position, saved.shape.rotation.reshape(9, n), saved.shape.scale, saved.lens, saved.pose, saved.rules,
-        saved.projected.visible, saved.projected.determinant, d_mean2d, d_footprint, d_depth, d_out,
+        saved.projected.visible, saved.projected.determinant, ScreenGrads(d_mean2d, d_footprint, d_depth), d_out,
     )  # fmt: skip
     d_camera = None
     if pose_gradient:

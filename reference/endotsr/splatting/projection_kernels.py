@@ -3,8 +3,11 @@
 A Gaussian that is not drawn is computed with harmless numbers (z = 1, determinant 1) and then set to zero.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.groups import GROUP, column, keep_where, write_group
 from endotsr.kernels.jit import jit
 from endotsr.kernels.vectors import local_array
@@ -15,6 +18,14 @@ WITHOUT_POSE, WITH_POSE = 15, 27  # gradients by position 3, scale 3, rotation 9
 RESULTS, GRADIENTS = PROJECTED * GROUP, WITH_POSE * GROUP
 
 _U64 = np.uint64  # no index may count from the end
+
+
+class ScreenGrads(NamedTuple):
+    """Gradients of the loss by what the projection puts on the screen."""
+
+    d_mean2d: FloatArray  # (2, N)
+    d_footprint: FloatArray  # (3, N) by A, m, r
+    d_depth: FloatArray  # (N,)
 
 
 def _project(first, stop, position, rotation, scale, lens, pose, rules, out, visible):
@@ -34,11 +45,9 @@ def _project(first, stop, position, rotation, scale, lens, pose, rules, out, vis
             visible[_U64(start + item)] = results[_U64((PROJECTED - 1) * GROUP + item)] > zero
 
 
-def _project_reverse(
-    first, stop, position, rotation, scale, lens, pose, rules, visible, determinant, d_mean2d, d_footprint, d_depth,
-    d_out,
-):  # fmt: skip
+def _project_reverse(first, stop, position, rotation, scale, lens, pose, rules, visible, determinant, d_screen, d_out):
     """`d_out` (15, N): gradients by position, scale, rotation; (27, N): and the terms of that by the pose."""
+    d_mean2d, d_footprint, d_depth = d_screen
     results = local_array(GRADIENTS, position)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)

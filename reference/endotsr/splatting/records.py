@@ -5,6 +5,8 @@ r = 1/c: a sum of squares, so that q >= 0 always and a needle keeps its digits (
 per Gaussian occupies one or two cache lines (float64: two or three). Its gradient record has 10 numbers.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,12 +84,22 @@ def pack_records(
     return out
 
 
+class FootprintGrads(NamedTuple):
+    """Gradients of the drawn Gaussians; zero where unseen."""
+
+    d_mean2d: FloatArray  # (2, N)
+    d_footprint: FloatArray  # (3, N) by A, m, r
+    d_logit: FloatArray  # (N,)
+    d_colour: FloatArray  # (3, N)
+    d_depth: FloatArray  # (N,)
+
+
 def _gather(
     first, stop,
-    order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth,
-    d_mean2d, d_footprint, d_logit, d_colour, d_depth,
+    order, records, pair_starts, slots, pair_gradients, determinant, opacity_logit, conic_epsilon, keep_depth, out,
 ):  # fmt: skip
     """Add the pair gradients of each Gaussian in tile order and turn the sums into gradients of its parameters."""
+    d_mean2d, d_footprint, d_logit, d_colour, d_depth = out
     real = records.dtype.type
     half, one, zero, largest = real(0.5), real(1), real(0), real(700)
     total = np.empty(GRADIENT, records.dtype)
@@ -129,17 +141,14 @@ def gather_footprint_gradients(
     *,
     conic_epsilon: float,
     keep_depth: bool,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> FootprintGrads:
     """As `gather_gradients`, but by A, m, r of the footprint (3, N) in place of covariance2d."""
     n, dtype = determinant.size, records.dtype
-    out = (
-        np.zeros((2, n), dtype), np.zeros((3, n), dtype), np.zeros(n, dtype), np.zeros((3, n), dtype),
-        np.zeros(n, dtype),
-    )  # fmt: skip
+    out = FootprintGrads(*(np.zeros(shape, dtype) for shape in ((2, n), (3, n), n, (3, n), n)))
     parallel_for(
         _gather_kernel, order.size,
         order, records, lists.pair_starts, lists.slots, pair_gradients, determinant, opacity_logit,
-        dtype.type(conic_epsilon), keep_depth, *out,
+        dtype.type(conic_epsilon), keep_depth, out,
     )  # fmt: skip
     return out
 

@@ -7,6 +7,7 @@ same order: the results are equal bit by bit (tested).
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,16 @@ from endotsr.fitting.adam import AdamState, Rate, adam_row, check_layout, step_f
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.jit import jit
 from endotsr.kernels.threads import parallel_for
+
+
+class RowStep(NamedTuple):
+    """What `adam_row` needs, in float64."""
+
+    rate: float  # learning rate, divided by the bias correction of the first moment
+    root: float  # inverse root of the bias correction of the second moment
+    beta1: float
+    beta2: float
+    epsilon: float
 
 
 def coefficients_adam_step(
@@ -51,12 +62,13 @@ def coefficients_adam_step(
     state.step[name] += 1
     rate, root = step_factors(state.step[name], learning_rate, beta1, beta2)
     inputs = (np.ascontiguousarray(d_sums, dtype), np.ascontiguousarray(atoms, dtype), factors)
-    settings = (rate, root, float(beta1), float(beta2), float(epsilon))
-    parallel_for(_step_kernel, axes * count, *inputs, parameter, first, second, *settings)
+    settings = RowStep(rate, root, float(beta1), float(beta2), float(epsilon))
+    parallel_for(_step_kernel, axes * count, *inputs, parameter, first, second, settings)
 
 
-def _step(first_row, last_row, d_sums, atoms, factors, parameter, first, second, rate, root, beta1, beta2, epsilon):
+def _step(first_row, last_row, d_sums, atoms, factors, parameter, first, second, settings):
     """Each task owns one (axis, atom) row."""
+    rate, root, beta1, beta2, epsilon = settings
     count, n = parameter.shape[1:]
     gradient = np.empty(GAUSSIANS_PER_PIECE, parameter.dtype)
     for row in range(first_row, last_row):

@@ -286,12 +286,18 @@ def _new_sums(like):
     )  # fmt: skip
 
 
+class PictureGrads(NamedTuple):
+    """Gradients of the loss by what compositing draws."""
+
+    d_colour: FloatArray  # (3, H, W)
+    d_depth: FloatArray  # (H, W)
+    d_opacity: FloatArray  # (H, W); no rows when the loss does not depend on the opacity image
+
+
 def _blend_reverse(
-    first_tile, last_tile,
-    records, starts, ranks, limits, colour, depth, transmittance, d_colour, d_depth, d_opacity,
-    pair_gradients,
+    first_tile, last_tile, records, starts, ranks, limits, colour, depth, transmittance, d_picture, pair_gradients
 ):  # fmt: skip
-    """`d_opacity` has no rows when the loss does not depend on the opacity image."""
+    d_colour, d_depth, d_opacity = d_picture
     real = records.dtype.type
     half, zero = real(0.5), real(0)
     stop, alpha_max = limits[1], limits[2]
@@ -362,6 +368,6 @@ def composite_blocks_reverse(
     parallel_for(
         _blend_reverse_kernel, saved.lists.starts.size - 1,
         saved.records, saved.lists.starts, saved.lists.ranks, saved.limits, saved.out.colour,
-        saved.out.depth, saved.out.transmittance, d_colour, d_depth, extra, pair_gradients,
+        saved.out.depth, saved.out.transmittance, PictureGrads(d_colour, d_depth, extra), pair_gradients,
     )  # fmt: skip
     return pair_gradients
