@@ -41,7 +41,7 @@ COST = "sweep_cost.json"  # by docs/results/sweep_cost.py
 RUNS = "pulling*.json"  # records of single runs, by docs/results/record.py
 
 
-def read(folder: Path) -> dict[str, dict[str, Any] | None]:
+def read(folder: Path) -> dict[str, Any]:
     """The ablations by name; None where there is no result yet. Raises: InputError for a file that cannot be read."""
     found = {name: folder / file for name, file in FILES.items()}
     return {
@@ -49,9 +49,10 @@ def read(folder: Path) -> dict[str, dict[str, Any] | None]:
     }
 
 
-def compared(record: dict[str, Any]) -> dict[str, Any]:
+def compared(record: Any) -> Any:
     """The record of an ablation with the differences that `COMPARISONS` asks of its runs."""
-    again = ablation_record([{**row, "status": FINISHED} for row in record["rows"]], record["command"])
+    rows: Any = [{**row, "status": FINISHED} for row in record["rows"]]
+    again = ablation_record(rows, record["command"])
     return {**record, "levels": again["levels"], "increments": again["increments"]}
 
 

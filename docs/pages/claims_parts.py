@@ -43,7 +43,7 @@ PROTOCOLS = (  # what is held out, what is compared, split of the ablation
     ("The end of the clip held out", "A+S+L - base", "end"),
 )
 PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)
-Record = dict[str, Any]
+Record = Any  # what a file of docs/results holds
 
 
 def verdicts(found: Record | None, runs: list[Record]) -> str:

@@ -21,6 +21,7 @@ from endotsr.evaluation.evaluate import evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.fitting.compile_ahead import rehearse
 from endotsr.fitting.model import render_at, spectral_from, with_corrected_cameras
+from endotsr.fitting.records import LogEntry
 from endotsr.fitting.state import TrainingState, new_training, workshop
 from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.files import write_json
@@ -149,7 +150,7 @@ def run_configuration(
     began, away = time.monotonic(), 0.0
     state = new_training(sequence, config)
 
-    def on_iteration(entry: dict[str, Any]) -> None:
+    def on_iteration(entry: LogEntry) -> None:
         nonlocal away
         step()
         if entry["iteration"] in stops:

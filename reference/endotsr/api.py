@@ -40,12 +40,13 @@ from endotsr.config import (
 )
 from endotsr.errors import InputError
 from endotsr.fitting.model import corrected_cameras, render_at
+from endotsr.fitting.records import LogEntry
 from endotsr.runs import folder as run_folders
 from endotsr.runs import sources
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
-from endotsr.runs.records import new_record
+from endotsr.runs.records import ResumedEntry, RunRecord, new_record
 from endotsr.sequences.record import SequenceRecord, nearest_frame, record_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
@@ -54,13 +55,14 @@ from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.toml import read_toml
 
 if TYPE_CHECKING:
+    from endotsr.evaluation.records import EvaluationRecord
     from endotsr.export.scene import MovingScene
     from endotsr.fitting.state import TrainingState
     from endotsr.windows.run import WindowedRun
 
 Component = Literal["appearance", "spectral_motion"]
 COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
-OnIteration = Callable[[dict[str, Any]], object]
+OnIteration = Callable[[LogEntry], object]
 OnRun = Callable[["Run"], object]
 OnMessage = Callable[[str], object]
 
@@ -188,7 +190,7 @@ def train(
 
 def _called_for(
     sequence: Sequence, config: Config, effects: str, sections: Mapping[str, Mapping[str, Any]], say: OnMessage
-) -> tuple[Config, dict[str, Any]]:
+) -> tuple[Config, RunRecord]:
     """The settings that the clip calls for, and verdicts and plan for the record; with "everything", as they are."""
     if effects not in ("everything", "auto"):
         raise InputError(f"train: effects = {effects!r} is not allowed; allowed: everything, auto")
@@ -197,10 +199,10 @@ def _called_for(
     from endotsr.effects.auto import planned_settings
 
     explicit = frozenset(f"{section}.{key}" for section, values in sections.items() for key in values)
-    config, lines, found = planned_settings(sequence, config, explicit)
+    config, lines, effects_found = planned_settings(sequence, config, explicit)
     for line in lines:
         say(line)
-    return config, found
+    return config, {"effects": effects_found}
 
 
 def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: float | None = None) -> dict[str, Any]:
@@ -248,9 +250,9 @@ class Run:
     """A model with its settings, its log and the sequence it was trained on. Made by `train` and `open_run`."""
 
     config: Config  # all settings
-    record: dict[str, Any]  # what run.json holds: versions, machine, input hashes, status, seconds
+    record: RunRecord  # what run.json holds: versions, machine, input hashes, status, seconds
     sequence_record: SequenceRecord  # sequence.json: times, names, split, cameras
-    log: list[dict[str, Any]]  # one entry an iteration, as the lines of log.jsonl
+    log: list[LogEntry]  # one entry an iteration, as the lines of log.jsonl
     model: Model  # Gaussians, spectral constants, settings and iteration: all that rendering reads
     _source: str  # where the sequence is; "" = where the record says
     _folder: run_folders.RunFolder | None = None  # of an opened run: what the next two are read from at their first use
@@ -360,7 +362,7 @@ class Run:
 
         return export(self._scene(), Path(path), Times(tuple(times)), GAUSSIANS)
 
-    def evaluate(self, *, lpips: str | Path | None = None) -> dict[str, Any]:
+    def evaluate(self, *, lpips: str | Path | None = None) -> "EvaluationRecord":
         """Metrics of the held-out frames beside those of training frames and of baselines that need no model.
 
         lpips     AlexNet LPIPS weights (.npz); without them the LPIPS values are None
@@ -373,9 +375,9 @@ class Run:
         from endotsr.evaluation.run import measure_model
 
         weights = load_lpips_weights(None if lpips is None else Path(lpips))
-        sequence, about = self.sequence, self.record["input"]
+        sequence, about = self.sequence, self.record.get("input", {})
         simulator = checked(about.get("simulator", {}), SimulatorSettings, "run.json", "input.simulator.")
-        truth = sources.true_positions_of(self._source or str(about["source"]), simulator, self.config, sequence)
+        truth = sources.true_positions_of(self._source or str(about.get("source")), simulator, self.config, sequence)
         return measure_model(self.model, sequence, weights, truth)[0]
 
     def resume(
@@ -392,15 +394,15 @@ class Run:
         state, sequence = self._training(), self.sequence
         threads = use_threads(self.config.training.threads)
         if 0 < state.iteration < self.config.training.iterations:
-            entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
+            entry: ResumedEntry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
             self.record["resumed"] = [*self.record.get("resumed", []), entry]
         self.record["threads"], before = threads, self.record.get("seconds") or 0.0
         began = last = clock.monotonic()
 
-        def each(entry: dict[str, Any]) -> None:
+        def each(entry: LogEntry) -> None:
             nonlocal last
             tick = clock.monotonic()
-            self.log.append(entry | {"seconds": round(tick - last, 5)})
+            self.log.append({**entry, "seconds": round(tick - last, 5)})
             last = tick
             if on_iteration is not None:
                 on_iteration(self.log[-1])
@@ -455,7 +457,7 @@ class Run:
             state = self._state = load_training(self._folder, self.config)
         return state
 
-    def _reached(self, state: "TrainingState") -> dict[str, Any]:
+    def _reached(self, state: "TrainingState") -> RunRecord:
         finished = state.iteration >= self.config.training.iterations
         return {
             "status": "finished" if finished else "interrupted",

@@ -159,7 +159,7 @@ def test_the_record_is_json_and_names_the_plan():
         "model.deformation = false (was true)" in line for line in lines
     )
     assert finite(record) == msgspec.json.decode(msgspec.json.encode(finite(record)))
-    assert record["effects"]["plan"] == plan_record(planned("noise")[0])
+    assert record["plan"] == plan_record(planned("noise")[0])
 
 
 def test_masks_without_an_excluded_pixel_are_remarked():

@@ -31,7 +31,8 @@ from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.model import Model
 from endotsr.scene.parameters import Pose, exposure_of, trained
 from endotsr.sequences.record import record_of
-from endotsr.simulator.settings import Brightening, GainDrift, Highlights, SimulatorSettings, with_effects
+from endotsr.simulator.sections import Brightening, GainDrift, Highlights
+from endotsr.simulator.settings import SimulatorSettings, with_effects
 from endotsr.simulator.simulate import simulate
 
 GAIN = np.array([1.0, 0.97, 0.75, 0.8, 0.85, 1.0, 0.7, 0.75, 0.8, 0.95, 0.8, 0.7])  # of the frames, known

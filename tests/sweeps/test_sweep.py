@@ -122,7 +122,7 @@ def test_a_run_that_was_killed_before_its_last_record_is_finished_without_traini
     metrics["run"]["iteration"] = 21
     metrics["held_out"]["mean"]["psnr_tissue"] = 1.0
     (run.path / "metrics.json").write_text(json.dumps(metrics))
-    run.update(status="running")
+    run.update({"status": "running"})
     made = []
 
     def make(job):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
@@ -10,6 +10,10 @@ from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.sweep import Place, check_place, ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
+
+if TYPE_CHECKING:
+    from endotsr.sweeps.row import AblationRecord
+    from endotsr.sweeps.sweep import Rows
 
 
 @dataclass
@@ -71,15 +75,15 @@ def run(words: list[str]) -> int:
     refuse_unwritable(options.json)
     if options.out is None:
         raise InputError("ablate: --out DIR is missing: the folder of the sweep")
-    spec, record = spec_of(spec_data(options), "ablate", Path.cwd()), {}
+    spec = spec_of(spec_data(options), "ablate", Path.cwd())
+    records: list[AblationRecord] = []  # the latest, once there are rows
     command = ["endotsr", "ablate", *map(without_folders, words)]
 
-    def on_rows(rows: list[dict[str, Any]]) -> None:
-        nonlocal record
+    def on_rows(rows: "Rows") -> None:
         assert options.out is not None
-        record = write_ablation(options.out, rows, command)
+        records[:] = [write_ablation(options.out, rows, command)]
         if options.json is not None:
-            write_json(options.json, record)
+            write_json(options.json, records[0])
 
     if options.collect:
         from endotsr.sweeps.sweep import Inputs, planned
@@ -88,10 +92,10 @@ def run(words: list[str]) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
         plan = planned(spec, options.out, Inputs(keep=False), retry=False)
         on_rows(list(plan.rows.values()))
-        print(ablation_markdown(record))
+        print(ablation_markdown(records[0]))
         return 0
     rows = run_spec(spec, options.out, place, options.retry, on_rows)
-    print(ablation_markdown(record))
+    print(ablation_markdown(records[0]))
     return ended(rows, options.out)
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
@@ -15,6 +15,7 @@ from endotsr.runs.folder import RunFolder, open_run
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from endotsr.evaluation.records import EvaluationRecord, LabelledMeans, RunEvaluation
     from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.render import RenderOut
@@ -112,7 +113,7 @@ def _compare(options: EvaluateOptions) -> int:
     return 0
 
 
-def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
+def _run(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "EvaluationRecord":
     """Metrics of the run, written to its folder."""
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence
@@ -127,7 +128,7 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
 
         if options.measures or published:
             raise InputError(f"evaluate: --measures and --paper-row are for a run without windows, not {options.run}")
-        return evaluate_windows(options.run, options.lpips, options.sequence)
+        return cast("EvaluationRecord", evaluate_windows(options.run, options.lpips, options.sequence))
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
     sequence = load_run_sequence(folder, options.sequence)
@@ -142,7 +143,7 @@ def _run(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dic
     )
 
 
-def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -> dict[str, Any]:
+def _pictures(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.pictures import find_pictures, measure_pictures
@@ -153,7 +154,8 @@ def _pictures(options: EvaluateOptions, published: tuple[dict[str, Any], ...]) -
     sequence = shown_sequence("evaluate", options.run, options.sequence, options.settings)
     found = find_pictures(options.pictures, sequence)
     print(f"{options.pictures}: {len(found.files)} pictures, paired {found.pairing}")
-    metrics = measure_pictures(found, sequence, options.label, weights) | {"published": list(published)}
+    metrics = measure_pictures(found, sequence, options.label, weights)
+    metrics["published"] = list(published)
     print(held_out_table(metrics))
     return metrics
 
@@ -162,12 +164,12 @@ def evaluate_run(
     folder: RunFolder,
     sequence: "Sequence",
     lpips: Path | None = None,
-    published: tuple[dict[str, Any], ...] = (),
+    published: tuple["LabelledMeans", ...] = (),
     *,
     view: bool = True,
     measures: tuple[str, ...] = (),
     source: str | None = None,
-) -> dict[str, Any]:
+) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
     measures   names of `evaluation.measures.MEASURES`
@@ -196,7 +198,7 @@ def _write(
     folder: RunFolder,
     model: "Model",
     sequence: "Sequence",
-    metrics: dict[str, Any],
+    metrics: "RunEvaluation",
     held_out: "Mapping[int, RenderOut]",
     view: bool,
 ) -> None:

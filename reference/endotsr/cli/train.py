@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import (
@@ -20,6 +20,7 @@ from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
+from endotsr.runs.records import RunRecord
 from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
@@ -200,18 +201,19 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     config, schedule_note = of_length(config, len(sequence.train_index), schedule_note)
     if options.minutes is not None:
         config, schedule_note = _of_minutes(options, sequence, config)
-    found: dict[str, Any] = {}
+    found: RunRecord = {}
     lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
     if options.effects == "auto":
-        config, lines, found = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
+        config, lines, effects = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
+        found["effects"] = effects
     _say_settings(config, schedule_note)
     _say_sequence(source, sequence)
     for line in lines:
         print(line)
     print("starting", flush=True)
     shown = _progress(RunFolder(options.out), sequence, config)
-    record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads) | found
-    return train_new_run(options.out, record, sequence, config, shown), sequence
+    record = start_record(["endotsr", "train", *words], source, sequence, config, SimulatorSettings(), threads)
+    return train_new_run(options.out, {**record, **found}, sequence, config, shown), sequence
 
 
 def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> tuple[Config, str]:

@@ -14,12 +14,12 @@ def planned_settings(
     """The settings that the clip calls for.
 
     explicit   keys that were given on the command line or in a file, which the plan leaves alone
-    returns    the settings; lines that say every change, its reason, and what was left alone; and {"effects": verdicts
-               and plan} for the record of a run
+    returns    the settings; lines that say every change, its reason, and what was left alone; and verdicts and
+               plan, `effects` of run.json
     """
     inspection = inspect_sequence(sequence)
     plan = make_plan(inspection, config, explicit)
     settings, lines = apply_plan(plan, config)
     head = "effects: auto" if lines else "effects: auto; the clip calls for everything that the settings have"
-    record = {"effects": inspection_record(inspection) | {"plan": plan_record(plan)}}
+    record = inspection_record(inspection) | {"plan": plan_record(plan)}
     return settings, [head, *(f"  {line}" for line in lines)], record

@@ -5,11 +5,12 @@ first method on the same frame, so that frames that are difficult for both cance
 frames: it says how the mean would vary with the choice of frames of this clip, and nothing about other clips.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.evaluation.records import EvaluationRecord, FrameMetrics, RunEvaluation
 from endotsr.kernels.arrays import FloatArray
 
 RESAMPLES = 9999
@@ -21,7 +22,7 @@ class Method(NamedTuple):
     """The held-out frames of one method."""
 
     label: str
-    per_frame: list[dict[str, Any]]  # entries of metrics.json: frame, name, time, metrics
+    per_frame: list[FrameMetrics]  # entries of metrics.json: frame, name, time, metrics
     digests: dict[str, str]  # array -> SHA-256 of the frames and masks it was measured on; empty if unknown
 
 
@@ -44,14 +45,14 @@ class Row(NamedTuple):
     difference: PairedDifference | None  # None for the first method, and without a common frame
 
 
-def methods_of(metrics: dict[str, Any], label: str, where: object, baselines: bool = False) -> list[Method]:
+def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: bool = False) -> list[Method]:
     """The method of one metrics.json, and the baselines in it if they are asked for.
 
     where   the file, for messages
     Raises: InputError if the dictionary is none of `endotsr evaluate`.
     """
     try:
-        about = metrics["pictures"] if "pictures" in metrics else metrics["run"]["input"]
+        about: Any = metrics["pictures"] if "pictures" in metrics else cast(RunEvaluation, metrics)["run"]["input"]
         digests = {name: str(about["arrays_sha256"][name]) for name in ("images", "masks")}
         rows = {label: metrics["held_out"]["per_frame"]}
         if baselines:

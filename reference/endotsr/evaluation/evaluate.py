@@ -11,7 +11,7 @@ count them.
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from endotsr.evaluation.baselines import BASELINES, unit_image
 from endotsr.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
 from endotsr.evaluation.metrics import image_metrics, mean_metrics
+from endotsr.evaluation.records import EvaluationRecord, FrameMetrics, FramesMeasured, LabelledFrames, Means
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
 RenderFrame = Callable[[int], FloatArray]
-Metrics = dict[str, float | None]
 
 FORMAT = 1  # of metrics.json; raised when a key changes its name or meaning
 LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "minus_one_one"}  # protocol value first
@@ -34,12 +34,12 @@ EVERY_TRAINING_FRAME = 6  # of the training frames reported beside the held-out 
 class Evaluation:
     """Metrics of some frames. Values are finite floats or None."""
 
-    per_frame: tuple[dict[str, Any], ...]  # {"frame", "name", "time", metric: value ...}
-    mean: Metrics  # over the frames that have a value; None if none has
+    per_frame: tuple[FrameMetrics, ...]  # {"frame", "name", "time", metric: value ...}
+    mean: Means  # over the frames that have a value; None if none has
     excluded: dict[str, int]  # metric -> frames without a value, where there are any
     not_finite: int  # values that were computed and are not finite
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> FramesMeasured:
         """Keys `mean`, `per_frame`, `excluded`, `not_finite`, ready for JSON."""
         return {
             "mean": self.mean,
@@ -68,14 +68,19 @@ def evaluate_frames(
         values.append({key: _finite(value) for key, value in found.items()})
         bad += sum(values[-1][key] is None and found[key] is not None for key in found)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        rows.append(about | values[-1])
+        rows.append(cast(FrameMetrics, about | values[-1]))
     summary = mean_metrics(values)
     keys = list(values[0]) if values else []
     excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
     return Evaluation(tuple(rows), {key: summary[key] for key in keys}, excluded, bad)
 
 
-def left_out(evaluation: dict[str, Any]) -> list[str]:
+def labelled(label: str, measured: FramesMeasured) -> LabelledFrames:
+    """The same with a label."""
+    return {"label": label, **measured}
+
+
+def left_out(evaluation: EvaluationRecord) -> list[str]:
     """Names of the held-out frames without a tissue PSNR, which the means leave out: frames without tissue."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
@@ -83,7 +88,7 @@ def left_out(evaluation: dict[str, Any]) -> list[str]:
 
 def baseline_table(
     sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, LabelledFrames]:
     """The four predictions without a model, measured like a model.
 
     indices   frames to predict; default: all held-out frames
@@ -91,7 +96,7 @@ def baseline_table(
     """
     wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
     return {
-        name: {"label": label} | evaluate_frames(sequence, wanted, make(sequence), lpips_weights).as_dict()
+        name: labelled(label, evaluate_frames(sequence, wanted, make(sequence), lpips_weights).as_dict())
         for name, (label, make) in BASELINES.items()
     }
 
@@ -106,7 +111,7 @@ def evaluate_model(
     render_frame: RenderFrame,
     lpips_weights: LpipsWeights | None = None,
     training: Iterable[int] | None = None,
-) -> dict[str, Any]:
+) -> EvaluationRecord:
     """The content of metrics.json on the renders of a sequence.
 
     training   frames whose PSNR is reported beside the held-out one; default `training_sample`. LPIPS is not computed
@@ -137,7 +142,7 @@ def evaluate_model(
     }
 
 
-def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Metrics:
+def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weights: LpipsWeights | None) -> Means:
     """Both LPIPS values of the pictures with excluded pixels 0, the render clipped; None without weights."""
     if weights is None:
         return dict.fromkeys(LPIPS_KEYS)
@@ -145,7 +150,7 @@ def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weigh
     return {key: lpips(shown, wanted, weights, how) for key, how in LPIPS_KEYS.items()}
 
 
-def _difference(inside: Metrics, outside: Metrics) -> Metrics:
+def _difference(inside: Means, outside: Means) -> Means:
     return {key: _minus(value, outside.get(key)) for key, value in inside.items()}
 
 

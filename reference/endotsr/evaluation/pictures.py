@@ -8,7 +8,7 @@ that baseline to the last digit. What the compression of a video loses counts as
 
 import hashlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.evaluation.evaluate import FORMAT, baseline_table, evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights, lpips_obstacle
+from endotsr.evaluation.records import EvaluationRecord
 from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.opencv import read_png
 from endotsr.sequences.files import frame_numbers, shortened
@@ -179,7 +180,7 @@ def _read_array(file: Path) -> Array:
 
 def measure_pictures(
     pictures: Pictures, sequence: Sequence, label: str = "", weights: LpipsWeights | None = None
-) -> dict[str, Any]:
+) -> EvaluationRecord:
     """The dictionary of metrics.json for a folder of pictures.
 
     label     name of the method; default: the name of the folder

@@ -4,17 +4,18 @@ In: a sequence with its given poses, and with those that the model sees it by. O
 common motion of all cameras counts too, although it changes no picture.
 """
 
-from typing import Any
+from typing import cast
 
 import numpy as np
 
+from endotsr.evaluation.records import PosePart
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, backproject, camera_centre, degrees_between, project
 
 POINTS = 8  # along each side of the picture
 
 
-def pose_change(given: Sequence, seen: Sequence) -> dict[str, Any] | None:
+def pose_change(given: Sequence, seen: Sequence) -> PosePart | None:
     """Mean change of the training cameras; None if both are the same sequence.
 
     returns  `degrees` between the rotations, `scene_units` between the optical centres, `pixels` between the places of
@@ -24,7 +25,8 @@ def pose_change(given: Sequence, seen: Sequence) -> dict[str, Any] | None:
         return None
     rows = [_change(given, int(i), seen.cameras[i]) for i in given.train_index]
     names = ("degrees", "scene_units", "pixels")
-    return dict(zip(names, np.mean(rows, axis=0).tolist(), strict=True)) | {"unit": given.unit}
+    means = dict(zip(names, np.mean(rows, axis=0).tolist(), strict=True))
+    return cast(PosePart, means | {"unit": given.unit})
 
 
 def _change(sequence: Sequence, index: int, seen: Camera) -> tuple[float, float, float]:

@@ -7,26 +7,35 @@ Writes nothing.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
-from typing import Any
+from typing import cast
 
 import msgspec
 
 from endotsr.evaluation.baselines import neighbours
-from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
+from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model, labelled
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.measures import measured
 from endotsr.evaluation.poses import pose_change
+from endotsr.evaluation.records import (
+    EvaluationRecord,
+    LabelledFrames,
+    LabelledMeans,
+    Means,
+    MotionPart,
+    RunEvaluation,
+    RunPart,
+)
 from endotsr.evaluation.trajectories import TruePositions, trajectory_error
 from endotsr.fitting.model import render_at, with_corrected_cameras, without
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder
 from endotsr.runs.model import Model, load_model
-from endotsr.runs.records import REPORTED
+from endotsr.runs.records import REPORTED, RunRecord
 from endotsr.runs.sources import run_source, true_positions_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 
-PUBLISHED = {
+PUBLISHED: dict[str, LabelledMeans] = {
     "pulling": {
         "label": "Endo-TSR as published, EndoNeRF pulling",
         "psnr_full": 39.34,
@@ -67,11 +76,11 @@ class Renders(Mapping[int, RenderOut]):
 def measure_run(
     model: Model,
     sequence: Sequence,
-    record: dict[str, Any],
+    record: RunRecord,
     weights: LpipsWeights | None = None,
-    published: tuple[dict[str, Any], ...] = (),
+    published: tuple[LabelledMeans, ...] = (),
     true_positions: TruePositions | None = None,
-) -> tuple[dict[str, Any], Mapping[int, RenderOut]]:
+) -> tuple[RunEvaluation, Mapping[int, RenderOut]]:
     """metrics.json of a run, and the renders of the held-out frames by frame number.
 
     record          run.json of the run
@@ -79,7 +88,8 @@ def measure_run(
     published       rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
     true_positions  of a simulated sequence: the motion is measured too
     """
-    metrics, held_out = measure_model(model, sequence, weights, true_positions)
+    found, held_out = measure_model(model, sequence, weights, true_positions)
+    metrics = cast(RunEvaluation, found)
     metrics["published"] = list(published)
     metrics["run"] = about_run(record, model)
     return metrics, held_out
@@ -91,9 +101,9 @@ def measure_folder(
     source: str,
     *,
     weights: LpipsWeights | None = None,
-    published: tuple[dict[str, Any], ...] = (),
+    published: tuple[LabelledMeans, ...] = (),
     measures: tuple[str, ...] = (),
-) -> tuple[Model, dict[str, Any], Mapping[int, RenderOut]]:
+) -> tuple[Model, RunEvaluation, Mapping[int, RenderOut]]:
     """The model of the latest checkpoint of a run, and what `measure_run` returns for it.
 
     source    where the sequence is now
@@ -112,7 +122,7 @@ def measure_model(
     sequence: Sequence,
     weights: LpipsWeights | None = None,
     true_positions: TruePositions | None = None,
-) -> tuple[dict[str, Any], Mapping[int, RenderOut]]:
+) -> tuple[EvaluationRecord, Mapping[int, RenderOut]]:
     """The part of metrics.json that needs no run folder, and the renders of the held-out frames.
 
     returns  the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at the
@@ -135,7 +145,7 @@ def measure_model(
     metrics = evaluate_model(sequence, colour, weights)
     metrics["cross_fade"] = _cross_fade(sequence, colour, weights)
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
-    metrics["trajectories"] = None if motion is None else motion._asdict() | {"unit": sequence.unit}
+    metrics["trajectories"] = None if motion is None else cast(MotionPart, motion._asdict() | {"unit": sequence.unit})
     metrics["pose_correction"] = pose_change(given, sequence)
     metrics["components"] = _components(model, sequence, render, metrics["held_out"]["mean"])
     return metrics, held_out
@@ -143,7 +153,7 @@ def measure_model(
 
 def _cross_fade(
     sequence: Sequence, render: Callable[[int], FloatArray], weights: LpipsWeights | None
-) -> dict[str, Any]:
+) -> LabelledFrames:
     """Held-out metrics of the blend of the model's own renders at the two neighbouring training times.
 
     A model that is no better than this has fitted its training frames, and its motion carries nothing between them.
@@ -154,12 +164,12 @@ def _cross_fade(
         before, after = render(near.before), render(near.after)
         return before + before.dtype.type(near.fraction) * (after - before)
 
-    return {"label": CROSS_FADE} | evaluate_frames(sequence, sequence.test_index, blend, weights).as_dict()
+    return labelled(CROSS_FADE, evaluate_frames(sequence, sequence.test_index, blend, weights).as_dict())
 
 
-def _components(model: Model, sequence: Sequence, render: Render, full: dict[str, Any]) -> list[dict[str, Any]]:
+def _components(model: Model, sequence: Sequence, render: Render, full: Means) -> list[LabelledMeans]:
     """Held-out means with one spectral component taken out of the trained model, for those it has."""
-    rows = [{"label": "the whole model", **full}]
+    rows = [cast(LabelledMeans, {"label": "the whole model", **full})]
     arrays = {
         "appearance": model.gaussians.appearance_coefficients,
         "spectral_motion": model.gaussians.motion_coefficients,
@@ -167,11 +177,11 @@ def _components(model: Model, sequence: Sequence, render: Render, full: dict[str
     for name, label in COMPONENTS.items():
         if arrays[name] is not None:
             partial = evaluate_frames(sequence, sequence.test_index, lambda i, n=name: render(i, n).colour)
-            rows.append({"label": f"rendered without {label}", **partial.mean})
+            rows.append(cast(LabelledMeans, {"label": f"rendered without {label}", **partial.mean}))
     return rows
 
 
-def about_run(record: dict[str, Any], model: Model) -> dict[str, Any]:
+def about_run(record: RunRecord, model: Model) -> RunPart:
     """What the numbers belong to: enough for metrics.json to stand alone."""
     about = {
         "iteration": model.iteration,
@@ -179,4 +189,5 @@ def about_run(record: dict[str, Any], model: Model) -> dict[str, Any]:
         "status": record.get("status"),
         "gaussians": model.gaussians.count,
     }
-    return about | {key: record.get(key) for key in (*KEPT, "input")} | {"settings": msgspec.to_builtins(model.config)}
+    kept = {key: record.get(key) for key in (*KEPT, "input")}
+    return cast(RunPart, about | kept | {"settings": msgspec.to_builtins(model.config)})

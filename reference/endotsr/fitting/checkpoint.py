@@ -17,7 +17,7 @@ import os
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState
 from endotsr.fitting.checkpoint_values import check_numbers, check_shapes
+from endotsr.fitting.records import CheckpointHeader, Description, RngState
 from endotsr.scene.density_control import DensityStatistics
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, trained
@@ -52,9 +53,9 @@ class Checkpoint(NamedTuple):
     gaussians: Gaussians
     adam: AdamState
     iteration: int
-    rng_state: dict[str, Any]  # of the bit generator, see `restore_rng`
+    rng_state: RngState  # of the bit generator, see `restore_rng`
     statistics: DensityStatistics
-    header: dict[str, Any]  # entries of the caller: configuration, history
+    header: CheckpointHeader  # entries of the caller: configuration, history
     frames: FrameParameters | None = None  # None if the model has no parameters of frames
 
 
@@ -68,9 +69,9 @@ def save_checkpoint(
     gaussians: Gaussians,
     adam: AdamState,
     iteration: int,
-    rng_state: dict[str, Any],
+    rng_state: RngState,
     statistics: DensityStatistics,
-    header: dict[str, Any],
+    header: CheckpointHeader,
     frames: FrameParameters | None = None,
 ) -> None:
     """Write atomically; `rng_state` is `rng.bit_generator.state`, `header` any JSON-able dictionary.
@@ -80,7 +81,7 @@ def save_checkpoint(
     """
     path = Path(path)
     entries = _entries(gaussians, adam, statistics, frames)
-    description = {
+    description: Description = {
         "format": FORMAT,
         "version": VERSION,
         "iteration": int(iteration),
@@ -204,7 +205,7 @@ def _read(path: Path, file: NpzFile, key: str) -> NDArray:
         raise DamagedCheckpoint(f"{path}: {key}: cannot be read: {error}") from None
 
 
-def _read_header(path: Path, file: NpzFile) -> dict[str, Any]:
+def _read_header(path: Path, file: NpzFile) -> Description:
     description = parsed(_read(path, file, HEADER).tobytes(), f"{path}: {HEADER}: not JSON")
     if not isinstance(description, dict) or description.get("format") != FORMAT:
         raise DamagedCheckpoint(f"{path}: {HEADER}: not a checkpoint of this program")
@@ -218,24 +219,24 @@ def _read_header(path: Path, file: NpzFile) -> dict[str, Any]:
     for key, count in {"iteration": description["iteration"], **description["steps"]}.items():
         if not isinstance(count, int) or isinstance(count, bool) or not 0 <= count <= MOST_ITERATIONS:
             raise DamagedCheckpoint(f"{path}: {HEADER}: {key} is no number of iterations")
-    return READERS[version](description)
+    return READERS[version](cast(Description, description))
 
 
-def _of_version_1(description: dict[str, Any]) -> dict[str, Any]:
+def _of_version_1(description: Description) -> Description:
     """Version 1 has no SHA-256 of the arrays; None stands for one that is not known."""
     listed = {k: [*v, None] if isinstance(v, list) else v for k, v in description["arrays"].items()}
-    return description | {"arrays": listed}
+    return {**description, "arrays": listed}
 
 
-def _of_version_2(description: dict[str, Any]) -> dict[str, Any]:
+def _of_version_2(description: Description) -> Description:
     return description
 
 
-READERS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _of_version_1, VERSION: _of_version_2}
+READERS: dict[int, Callable[[Description], Description]] = {1: _of_version_1, VERSION: _of_version_2}
 """Version -> the header of that version in the form of the present one."""
 
 
-def _read_entries(path: Path, file: NpzFile, listed: dict[str, Any]) -> dict[str, NDArray]:
+def _read_entries(path: Path, file: NpzFile, listed: dict[str, list]) -> dict[str, NDArray]:
     foreign = set(file.names) - set(listed) - {HEADER}
     if foreign:
         raise DamagedCheckpoint(f"{path}: {min(foreign)}: not listed in the header")
@@ -252,7 +253,7 @@ def _read_entries(path: Path, file: NpzFile, listed: dict[str, Any]) -> dict[str
     return entries
 
 
-def _assemble(path: Path, description: dict[str, Any], entries: dict[str, NDArray]) -> Checkpoint:
+def _assemble(path: Path, description: Description, entries: dict[str, NDArray]) -> Checkpoint:
     groups = _grouped(path, entries)
     first, second, steps = groups["first"], groups["second"], description["steps"]
     if not first.keys() == second.keys() == steps.keys():
@@ -291,7 +292,7 @@ def _grouped(path: Path, entries: dict[str, NDArray]) -> dict[str, dict[str, NDA
     return groups
 
 
-def restore_rng(state: dict[str, Any]) -> np.random.Generator:
+def restore_rng(state: RngState) -> np.random.Generator:
     """The generator in the stored state (PCG64, as made by `np.random.default_rng`)."""
     generator = np.random.default_rng()
     try:

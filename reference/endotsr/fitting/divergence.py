@@ -8,10 +8,10 @@ squares of eleven numbers a Gaussian, and every hundred iterations the distances
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from endotsr.fitting.records import LogEntry, RngState
 from endotsr.kernels.arrays import FloatArray
 from endotsr.scene.gaussians import Gaussians
 
@@ -29,10 +29,10 @@ ADVICE = (
 class Diverged(FloatingPointError):
     """An iteration whose loss or gradient is not finite. No parameter was changed by it."""
 
-    def __init__(self, iteration: int, frame: int, term: str, found: str, rng_state: Mapping[str, Any]) -> None:
+    def __init__(self, iteration: int, frame: int, term: str, found: str, rng_state: RngState) -> None:
         super().__init__(f"iteration {iteration}, frame {frame}: {term} is {found}")
         self.iteration, self.frame, self.term = iteration, frame, term
-        self.rng_state = dict(rng_state)  # before the iteration: with it the iteration can be repeated
+        self.rng_state = rng_state  # before the iteration: with it the iteration can be repeated
 
 
 def not_finite(gradients: Mapping[str, FloatArray | None]) -> tuple[str, str] | None:
@@ -61,7 +61,7 @@ class DivergenceWatch:
         self._lowest = math.inf
         self._said: set[str] = set()
 
-    def see(self, entry: Mapping[str, Any], gaussians: Gaussians) -> str:
+    def see(self, entry: LogEntry, gaussians: Gaussians) -> str:
         """The line to say after the iteration of this log entry; empty if there is none."""
         self._recent.append(entry.get(WATCHED_TERM, entry["loss"]))
         if entry["iteration"] % WINDOW or len(self._recent) < WINDOW:

@@ -4,11 +4,12 @@ In: the random generator, the sequence and the training settings. Out: one `View
 Gaussians; it changes the generator only.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from endotsr.config import TrainingConfig
+from endotsr.fitting.records import RngState
 from endotsr.sequences.sequence import Sequence
 
 
@@ -32,12 +33,12 @@ class Drawn(NamedTuple):
     """A view, and the state that the generator had before it was drawn."""
 
     view: View
-    rng_state: dict[str, Any]
+    rng_state: RngState
 
 
 def drawn_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> Drawn:
     """The view of `draw_view`, with the state of the generator from which it is drawn again."""
-    before = dict(rng.bit_generator.state)
+    before = cast(RngState, dict(rng.bit_generator.state))
     return Drawn(draw_view(rng, sequence, training), before)
 
 

@@ -8,7 +8,7 @@ computes no gradient.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -20,6 +20,7 @@ from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
 from endotsr.fitting.moments import Moments
 from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
+from endotsr.fitting.records import CheckpointHeader, RngState
 from endotsr.fitting.sampling import Drawn, View
 from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
 from endotsr.losses.masked_ssim import stored_target
@@ -51,9 +52,9 @@ class TrainingState:
     drawn: Drawn | None = None  # the next view, drawn for `ahead`; a checkpoint holds the generator before it
 
     @property
-    def rng_state(self) -> dict[str, Any]:
+    def rng_state(self) -> RngState:
         """The state of the generator before the next view is drawn."""
-        return dict(self.rng.bit_generator.state) if self.drawn is None else self.drawn.rng_state
+        return cast(RngState, dict(self.rng.bit_generator.state)) if self.drawn is None else self.drawn.rng_state
 
 
 @dataclass
@@ -173,7 +174,7 @@ def save_state(path: Path, state: TrainingState, config: Config, sequence: str |
         check_state(state)
     except ValueError as error:
         raise FloatingPointError(f"iteration {state.iteration}: {error}; the last checkpoint is kept") from None
-    header = {
+    header: CheckpointHeader = {
         "config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "sequence": sequence,
         "coarse": state.coarse,
     }  # fmt: skip

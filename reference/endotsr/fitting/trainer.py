@@ -7,7 +7,7 @@ step. No result depends on the number of threads.
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -30,6 +30,7 @@ from endotsr.fitting.model import (
     scene_reverse,
 )
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
+from endotsr.fitting.records import LogEntry, RngState
 from endotsr.fitting.sampling import View, drawn_view
 from endotsr.fitting.schedules import (
     active_degree,
@@ -53,7 +54,7 @@ from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, render_forward, render_reverse
 
-OnIteration = Callable[[dict[str, Any]], None]
+OnIteration = Callable[[LogEntry], None]
 
 WATCHED_GRADIENTS = ("d_position", "d_log_scale", "d_quaternion", "d_opacity_logit")
 PSNR_EVERY = 10  # iterations between two training PSNRs in the log, since each costs a pass over the image
@@ -111,7 +112,7 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
     return calibrate_on(state.gaussians, shop.spectral, sequence, base, state.frames).lambda_lap
 
 
-def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> dict[str, Any]:
+def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> LogEntry:
     """One iteration; returns its log entry."""
     config, iteration = shop.config, state.iteration + 1
     if residuals_activate(iteration, config):
@@ -224,7 +225,7 @@ def _control_density(state: TrainingState, shop: Workshop, iteration: int) -> No
 
 
 def _refuse_not_finite(
-    iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: dict[str, Any]
+    iteration: int, view: View, loss: ImageLoss, penalty: float | None, d_scene: RenderGrads, rng_state: RngState
 ) -> None:
     """Raise `Diverged` for the first loss term or gradient that is not finite, before a parameter is changed."""
     terms = {**loss.terms, "matern_penalty": penalty or 0.0, "loss": loss.loss}
@@ -243,11 +244,11 @@ def _log_entry(
     targets: Targets,
     state: TrainingState,
     config: Config,
-) -> dict[str, Any]:
+) -> LogEntry:
     """The log entry of an iteration."""
     total = float(loss.loss) + config.loss.lambda_msp * (penalty or 0.0)
     terms = {name: float(value) for name, value in loss.terms.items()}
-    entry: dict[str, Any] = {"iteration": iteration, "frame": view.index, "loss": total, **terms}
+    entry = cast(LogEntry, {"iteration": iteration, "frame": view.index, "loss": total, **terms})
     if penalty is not None:
         entry["matern_penalty"] = penalty
     if iteration % PSNR_EVERY == 0 or iteration == 1:

@@ -8,17 +8,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.evaluation.records import EvaluationRecord
+from endotsr.fitting.records import LogEntry
 from endotsr.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import parsed
 
-LogEntries = list[dict[str, Any]]
+LogEntries = list[LogEntry]
 
 LARGEST_LOG = 1 << 30  # bytes: several million iterations
 
@@ -45,16 +47,16 @@ def read_log(path: Path) -> LogEntries:
         except InputError:
             continue
         if isinstance(entry, dict) and isinstance(entry.get("iteration", 0), int):
-            entries.append(entry)
+            entries.append(cast(LogEntry, entry))
     return entries
 
 
 def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(iterations, values) of the entries that hold a finite number under `key`, both (n,)."""
     pairs = [
-        (entry.get("iteration", position + 1), entry[key])
+        (entry.get("iteration", position + 1), value)
         for position, entry in enumerate(log)
-        if isinstance(entry.get(key), int | float) and math.isfinite(entry[key])
+        if isinstance(value := entry.get(key), int | float) and math.isfinite(value)
     ]
     table = np.array(pairs, np.float64).reshape(-1, 2)
     return table[:, 0], table[:, 1]
@@ -69,9 +71,8 @@ def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     return (sums[stop] - sums[start]) / (stop - start)
 
 
-def charts(log: LogEntries, evaluation: dict[str, Any] | None = None) -> list[Chart]:
+def charts(log: LogEntries, evaluation: EvaluationRecord | None = None) -> list[Chart]:
     """All charts the given data allows: loss, PSNR, loss terms, Gaussians."""
-    evaluation = evaluation or {}
     found = []
     if series(log, "loss")[0].size:
         found.append(Chart("Loss", lambda axes, theme: _draw_loss(axes, theme, log)))
@@ -84,7 +85,7 @@ def charts(log: LogEntries, evaluation: dict[str, Any] | None = None) -> list[Ch
     return found
 
 
-def frame_chart(evaluation: dict[str, Any], key: str) -> Chart | None:
+def frame_chart(evaluation: EvaluationRecord | None, key: str) -> Chart | None:
     """Held-out PSNR of the model and of the interpolating baselines, frame by frame; None without frames."""
     lines = frame_lines(evaluation, key)
     if not lines:
@@ -92,11 +93,12 @@ def frame_chart(evaluation: dict[str, Any], key: str) -> Chart | None:
     return Chart("Held-out PSNR by frame, tissue, dB", lambda axes, theme: _draw_frames(axes, theme, lines), "frame")
 
 
-def frame_lines(evaluation: dict[str, Any], key: str) -> list[tuple[str, NDArray, NDArray]]:
+def frame_lines(evaluation: EvaluationRecord | None, key: str) -> list[tuple[str, NDArray, NDArray]]:
     """(name, frame numbers, values) of the model and the two strongest kinds of baseline, null values left out."""
-    sources = [("Model", (evaluation.get("held_out") or {}).get("per_frame"))]
+    baselines = (evaluation or {}).get("baselines") or {}
+    sources = [("Model", ((evaluation or {}).get("held_out") or {}).get("per_frame"))]
     for name, label in (("two_neighbours", "Two neighbours"), ("flow_interpolation", "Optical flow")):
-        sources.append((label, ((evaluation.get("baselines") or {}).get(name) or {}).get("per_frame")))
+        sources.append((label, (baselines.get(name) or {}).get("per_frame")))
     lines = []
     for label, rows in sources:
         pairs = [(row["frame"], row[key]) for row in rows or [] if row.get(key) is not None]
@@ -114,7 +116,7 @@ def chart_png(chart: Chart, theme: str, width: float = 4.4, height: float = 2.75
     return encoded(figure, "png", dots, transparent=True)
 
 
-def curves_png(log: LogEntries, evaluation: dict[str, Any] | None = None) -> bytes | None:
+def curves_png(log: LogEntries, evaluation: EvaluationRecord | None = None) -> bytes | None:
     """All charts in one PNG on white, for the run folder; None if there is nothing to draw."""
     found = charts(log, evaluation)
     if not found:
@@ -152,7 +154,9 @@ def _draw_loss(axes: Any, theme: Theme, log: LogEntries) -> None:
 def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     for position, key in enumerate(TERMS):
         positive = [
-            {**entry, key: value} for entry in log if (value := minimised(entry, key)) is not None and value > 0
+            cast(LogEntry, {**entry, key: value})
+            for entry in log
+            if (value := minimised(entry, key)) is not None and value > 0
         ]
         if positive:  # a weight that is still zero cannot be drawn on a logarithmic axis
             label = "1 − ssim" if key == "ssim" else key
@@ -160,7 +164,7 @@ def _draw_terms(axes: Any, theme: Theme, log: LogEntries) -> None:
     _log_scale(axes, log, TERMS)
 
 
-def minimised(entry: dict[str, Any], key: str) -> float | None:
+def minimised(entry: LogEntry, key: str) -> float | None:
     """The value that is minimised: the log holds SSIM itself."""
     value = entry.get(key)
     if not isinstance(value, int | float):
@@ -179,11 +183,11 @@ def _log_scale(axes: Any, log: LogEntries, keys: tuple[str, ...]) -> None:
         axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _draw_psnr(axes: Any, theme: Theme, log: LogEntries, evaluation: dict[str, Any]) -> None:
+def _draw_psnr(axes: Any, theme: Theme, log: LogEntries, evaluation: EvaluationRecord | None) -> None:
     _curve(axes, log, "psnr", theme.colours[0], "training view")
     levels = (("held_out", "held-out frames, end", "--", 1), ("training", "training frames, end", ":", 2))
     for key, label, dashes, colour in levels:
-        value = ((evaluation.get(key) or {}).get("mean") or {}).get("psnr_full")
+        value = (((evaluation or {}).get(key) or {}).get("mean") or {}).get("psnr_full")
         if value is not None:
             axes.axhline(
                 value, color=theme.colours[colour], linestyle=dashes, linewidth=1.4, label=f"{label} {value:.2f}"

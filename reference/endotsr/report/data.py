@@ -1,11 +1,13 @@
 """The input of a report: plain arrays, dictionaries and text. This module handles no file, picture or HTML."""
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.evaluation.records import EvaluationRecord, FrameMetrics, LabelledMeans
+from endotsr.fitting.records import LogEntry
 from endotsr.kernels.arrays import FloatArray
 
 # key in metrics.json, heading, decimals, +1 if larger is better and -1 if smaller is
@@ -20,6 +22,8 @@ COLUMNS = (
     ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
 )
 DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # shown without unfolding anything
+
+Facts = dict[str, str | int | float | None]  # label -> value
 
 
 class Preview(NamedTuple):
@@ -43,7 +47,7 @@ class FramePictures:
     truth: FloatArray  # (3, H, W) display units [0, 1]
     mask: NDArray[np.bool_]  # (H, W) True = tissue
     depth: FloatArray | None = None  # (H, W) rendered depth, scene units; <= 0 = none
-    metrics: dict[str, Any] = field(default_factory=dict)  # the frame's entry of metrics.json
+    metrics: FrameMetrics | None = None  # the frame's entry of metrics.json
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,12 @@ class ReportData:
     """The contents of the page. Every part but the title may be empty and is then left out."""
 
     title: str
-    evaluation: dict[str, Any] = field(default_factory=dict)  # metrics.json, see evaluate.py
-    log: list[dict[str, Any]] = field(default_factory=list)  # log.jsonl
+    evaluation: EvaluationRecord = field(default_factory=lambda: cast(EvaluationRecord, {}))  # metrics.json
+    log: list[LogEntry] = field(default_factory=list)  # log.jsonl
     frames: tuple[FramePictures, ...] = ()
-    reference_rows: tuple[dict[str, Any], ...] = ()  # published figures: {"label": ..., metric key: value}
+    reference_rows: tuple[LabelledMeans, ...] = ()  # published figures
     components: tuple[FreeTable, ...] = ()
-    facts: dict[str, Any] = field(default_factory=dict)  # label -> value: sequence, seed, machine, time, memory ...
+    facts: Facts = field(default_factory=dict)  # sequence, seed, machine, time, memory ...
     configuration: str = ""  # TOML
     versions: dict[str, str] = field(default_factory=dict)
     input_hashes: dict[str, str] = field(default_factory=dict)  # file -> SHA-256

@@ -10,12 +10,13 @@ import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.evaluation.metrics import psnr_tissue
 from endotsr.fitting.model import camera_at, render_at, spectral_from
+from endotsr.fitting.records import LogEntry
 from endotsr.report import parts
 from endotsr.report.curves import read_log
 from endotsr.report.figures import bytes_image
@@ -43,7 +44,7 @@ class LivePage:
         self._frame = int(frames[len(frames) // 2])
         self._kind = "held-out" if len(sequence.test_index) else "training"
         self._spectral = spectral_from(config.model, sequence.times[sequence.train_index])
-        self._log: list[dict[str, Any]] = []
+        self._log: list[LogEntry] = []
         self._psnr = ChartCurve(f"{self._kind} frame {self._frame}", [], [])
         self._due = 0.0
 
@@ -54,7 +55,7 @@ class LivePage:
         self._write("running", None, picture=False)
         self._due = 0.0
 
-    def update(self, entry: dict[str, Any], left: Callable[[], str | None]) -> None:
+    def update(self, entry: LogEntry, left: Callable[[], str | None]) -> None:
         """An iteration has ended. entry: its line of the log; left: tells the time left, None = not known yet."""
         self._log.append(_kept(entry))
         if time.monotonic() >= self._due:
@@ -115,7 +116,7 @@ class LivePage:
         """Loss, and PSNR of the training views and of the frame, over the iterations."""
         loss, views = (
             ChartCurve(label, [e["iteration"] for e in self._log if e.get(key) is not None],
-                  [e[key] for e in self._log if e.get(key) is not None])
+                  [float(v) for e in self._log if (v := e.get(key)) is not None])
             for key, label in (("loss", "loss"), ("psnr", "training views"))
         )  # fmt: skip
         charts = (
@@ -136,9 +137,9 @@ def _replace(folder: Path, page: str) -> None:
     replace_file(folder / LIVE_PAGE, lambda temporary: temporary.write_text(page, encoding="utf-8", newline="\n"))
 
 
-def _kept(entry: dict[str, Any]) -> dict[str, Any]:
+def _kept(entry: LogEntry) -> LogEntry:
     """The keys of a line of the log that the page shows."""
-    return {key: entry[key] for key in KEPT if key in entry}
+    return cast(LogEntry, {key: entry.get(key) for key in KEPT if key in entry})
 
 
 def _advice(status: str, folder: Path) -> str:

@@ -9,10 +9,11 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from endotsr.config import config_to_toml
 from endotsr.errors import InputError
+from endotsr.evaluation.records import FrameMetrics, RunEvaluation
+from endotsr.fitting.records import LogEntry
 from endotsr.opencv import write_png
 from endotsr.report.curves import curves_png, read_log
 from endotsr.report.data import FramePictures, Preview, ReportData
@@ -33,7 +34,7 @@ MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the
 def write_evaluation(
     folder: RunFolder,
     sequence: Sequence,
-    metrics: dict[str, Any],
+    metrics: RunEvaluation,
     held_out: Mapping[int, RenderOut],
     preview: Preview | None = None,
     viewer: str = "",
@@ -86,11 +87,12 @@ def _link(source: Path, target: Path) -> None:
 def _report_data(
     folder: RunFolder,
     sequence: Sequence,
-    metrics: dict[str, Any],
+    metrics: RunEvaluation,
     held_out: Mapping[int, RenderOut],
-    log: list[dict[str, Any]],
+    log: list[LogEntry],
 ) -> ReportData:
-    record = folder.record()
+    run = metrics["run"]
+    about = run["input"]
     rows = {row["frame"]: row for row in metrics["held_out"]["per_frame"]}
     frames = tuple(
         FramePictures(
@@ -106,22 +108,26 @@ def _report_data(
         for i in sorted(worst_first(rows)[:MOST_SHOWN])
     )
     return ReportData(
-        title=f"{Path(record['input']['source']).name}: {folder.path.absolute().name}",
+        title=f"{Path(about.get('source', '')).name}: {folder.path.absolute().name}",
         evaluation=metrics,
         log=log,
         frames=frames,
-        reference_rows=tuple(metrics["published"]),
+        reference_rows=tuple(metrics.get("published", ())),
         components=(component_table(metrics),),
         facts=facts(metrics),
         configuration=config_to_toml(folder.config()),
-        versions=record["versions"],
-        input_hashes=record["input"].get("files_sha256") or record["input"]["arrays_sha256"],
-        notes=tuple(record["input"]["notes"]),
+        versions=run["versions"],
+        input_hashes=about.get("files_sha256") or about.get("arrays_sha256", {}),
+        notes=tuple(about.get("notes", ())),
         depth_unit=sequence.unit,
     )
 
 
-def worst_first(rows: dict[int, dict[str, Any]]) -> list[int]:
+def worst_first(rows: dict[int, FrameMetrics]) -> list[int]:
     """Frame numbers, the lowest `psnr_tissue` first; a frame without a value, whose render is not finite, is worst."""
-    values = {frame: row["psnr_tissue"] for frame, row in rows.items()}
-    return sorted(values, key=lambda i: -math.inf if values[i] is None or math.isnan(values[i]) else values[i])
+
+    def order(frame: int) -> float:
+        value = rows[frame].get("psnr_tissue")
+        return -math.inf if value is None or math.isnan(value) else value
+
+    return sorted(rows, key=order)

@@ -1,10 +1,12 @@
 """The sections of the report, top to bottom; each is a function of the data and is empty when its data is missing."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from endotsr.evaluation.evaluate import left_out
+from endotsr.evaluation.records import Means
 from endotsr.report import curves, figures
 from endotsr.report import parts as parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
@@ -12,14 +14,15 @@ from endotsr.report.run_text import pose_sentence, trajectory_sentence
 from endotsr.report.tables import html_table
 
 Column = tuple[str, str, int, int]  # of COLUMNS
+MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
 OPENED_FRAMES = 3  # the worst frames are shown unfolded
 
 
-def _mean(data: ReportData, key: str) -> dict[str, Any]:
+def _mean(data: ReportData, key: str) -> Means:
     return (data.evaluation.get(key) or {}).get("mean") or {}
 
 
-def _baseline_rows(data: ReportData) -> list[tuple[str, dict[str, Any]]]:
+def _baseline_rows(data: ReportData) -> list[tuple[str, Means]]:
     baselines = data.evaluation.get("baselines") or {}
     return [(row.get("label", name), row.get("mean") or {}) for name, row in baselines.items()]
 
@@ -60,7 +63,7 @@ def _verdict(data: ReportData) -> str:
     """One sentence: the tissue PSNR of the model above or below the best baseline."""
     ours = _mean(data, "held_out").get("psnr_tissue")
     means = _baseline_rows(data)
-    rows = [(label, float(mean["psnr_tissue"])) for label, mean in means if mean.get("psnr_tissue") is not None]
+    rows = [(label, value) for label, mean in means if (value := mean.get("psnr_tissue")) is not None]
     if ours is None or not rows or len(rows) < len(means):
         return ""  # a baseline without a value may be a perfect one
     label, best = max(rows, key=lambda row: row[1])
@@ -88,7 +91,7 @@ def moving(data: ReportData) -> str:
 
 def held_out(data: ReportData) -> str:
     """The table of held-out metrics: model, baselines, published rows; values of 8 bits are folded."""
-    rows: list[tuple[str, dict[str, Any], str]] = []
+    rows: list[MetricsRow] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
     if faded := data.evaluation.get("cross_fade"):
@@ -107,7 +110,7 @@ def held_out(data: ReportData) -> str:
     return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
 
 
-def _held_out_table(rows: list[tuple[str, dict[str, Any], str]], columns: list[Column]) -> str:
+def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
     best = {key: _best(rows, key, sign) for key, _, _, sign in columns}
     cells = [
         [
@@ -119,7 +122,7 @@ def _held_out_table(rows: list[tuple[str, dict[str, Any], str]], columns: list[C
     return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
 
 
-def _eight_bit(rows: list[tuple[str, dict[str, Any], str]], columns: list[Column]) -> str:
+def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
     """The columns of pictures rounded to 8 bits, folded; they differ from the others in the second decimal."""
     rounded = [c for c in columns if c not in DECIDING]
     if not rounded or len(rounded) == len(columns):
@@ -129,7 +132,7 @@ def _eight_bit(rows: list[tuple[str, dict[str, Any], str]], columns: list[Column
     return parts.details(summary, _held_out_table(measured, rounded))
 
 
-def _best(rows: list[tuple[str, dict[str, Any], str]], key: str, sign: int) -> float | None:
+def _best(rows: list[MetricsRow], key: str, sign: int) -> float | None:
     values = [row[key] for _, row, kind in rows if kind != "reference" and row.get(key) is not None]
     return max(values, key=lambda v: sign * v) if len(values) > 1 else None
 
@@ -255,8 +258,8 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
         cells.append(f"<div>{whole}<span>{label}</span></div><div>{inset}<span>4×</span></div>")
     shown = [f"t = {frame.time:.3f}"]
     for key, before, digits, after in (("psnr_tissue", "tissue", 2, " dB"), ("ssim_tissue", "SSIM", 4, "")):
-        if frame.metrics.get(key) is not None:
-            shown.append(f"{before} {parts.number(frame.metrics[key], digits)}{after}")
+        if (value := (frame.metrics or {}).get(key)) is not None:
+            shown.append(f"{before} {parts.number(value, digits)}{after}")
     facts = " · ".join([*shown, parts.text(frame.name)])
     summary = f"Frame {frame.index}<small>{facts}</small>"
     return parts.details(summary, f'<div class="views">{"".join(cells)}</div>', opened)

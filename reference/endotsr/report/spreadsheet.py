@@ -10,12 +10,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from endotsr.evaluation.compare import Row
+from endotsr.evaluation.records import EvaluationRecord
 
 FRAME = ("frame", "name", "time")
 COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_better", "frames")
 
 
-def frames_csv(metrics: dict[str, Any], label: str) -> str:
+def frames_csv(metrics: EvaluationRecord, label: str) -> str:
     """Every held-out frame of a method and of the baselines beside it.
 
     metrics   dictionary of metrics.json

@@ -4,12 +4,13 @@ The file has the form of a checkpoint; its header names iteration, frame and ter
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from endotsr.config import Config
 from endotsr.fitting.divergence import Diverged
+from endotsr.fitting.records import CheckpointHeader, LogEntry
 from endotsr.runs.folder import RunFolder, open_run
 
 if TYPE_CHECKING:
@@ -24,7 +25,11 @@ def save_diverged(folder: RunFolder, state: "TrainingState", error: Diverged, co
     from endotsr.fitting.checkpoint import save_checkpoint
 
     about = {"iteration": error.iteration, "frame": error.frame, "term": error.term}
-    header = {"config": msgspec.to_builtins(config), "lambda_lap": state.lambda_lap, "diverged": about}
+    header: CheckpointHeader = {
+        "config": msgspec.to_builtins(config),
+        "lambda_lap": state.lambda_lap,
+        "diverged": about,
+    }
     path = folder.path / NAME
     path.unlink(missing_ok=True)
     save_checkpoint(
@@ -33,7 +38,7 @@ def save_diverged(folder: RunFolder, state: "TrainingState", error: Diverged, co
     return path
 
 
-def repeat_iteration(run: str | Path, sequence: "Sequence | None" = None) -> dict[str, Any]:
+def repeat_iteration(run: str | Path, sequence: "Sequence | None" = None) -> LogEntry:
     """Repeat the iteration that stopped a run, from its diverged.npz: the same error is raised again.
 
     run        run folder

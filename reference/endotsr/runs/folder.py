@@ -20,14 +20,14 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import msgspec
 
 from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
 from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, replacing_folder, write_json
-from endotsr.runs.records import check_run_record
+from endotsr.runs.records import RunRecord, checked_run_record
 from endotsr.sequences.record import SequenceRecord, read_sequence_record
 
 
@@ -65,12 +65,10 @@ class RunFolder:
         """The resolved settings of the run: its length is `training.iterations`, in runs of earlier versions too."""
         return with_fixed_length(load_config(self.path / "config.toml"))
 
-    def record(self, *needed: str) -> dict[str, Any]:
+    def record(self, *needed: str) -> RunRecord:
         """run.json, read anew and checked. Raises InputError if a `needed` key (`input.source`) is missing."""
         path = self.path / "run.json"
-        record = read_json(path, needed)
-        check_run_record(record, path)
-        return record
+        return checked_run_record(read_json(path, needed), path)
 
     def sequence_record(self) -> SequenceRecord:
         """sequence.json, read anew and checked. Raises InputError as `checked_record`."""
@@ -97,9 +95,9 @@ class RunFolder:
                 folder = file.is_dir() and not file.is_symlink()
                 shutil.rmtree(file) if folder else file.unlink(missing_ok=True)
 
-    def update(self, **entries: Any) -> None:
+    def update(self, entries: RunRecord) -> None:
         """Replace or add entries of run.json."""
-        write_json(self.path / "run.json", self.record() | entries)
+        write_json(self.path / "run.json", {**self.record(), **entries})
 
 
 def lock_taken(file: IO[bytes]) -> bool:
@@ -128,7 +126,7 @@ def refuse_existing(path: Path) -> None:
     refuse_folder(path)
 
 
-def create_run(path: Path, config: Config, record: dict[str, Any], sequence_record: SequenceRecord) -> RunFolder:
+def create_run(path: Path, config: Config, record: RunRecord, sequence_record: SequenceRecord) -> RunFolder:
     """A new run folder, filled beside its final name and then renamed: it never exists half-written.
 
     Raises:  InputError if `path` exists or the file system refuses (nothing stays behind).

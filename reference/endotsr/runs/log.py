@@ -4,9 +4,10 @@ import contextlib
 import json
 import os
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, cast
 
 from endotsr.errors import InputError
+from endotsr.fitting.records import LogEntry
 from endotsr.runs.files import finite, refuse_link
 from endotsr.untrusted.json import integer, number, parsed
 
@@ -36,7 +37,7 @@ class RunLog:
                 file.truncate(end)
         return end
 
-    def append(self, entry: dict[str, Any]) -> None:
+    def append(self, entry: LogEntry) -> None:
         """One line, flushed. On an error of the file system the log keeps its last whole line."""
         line = (json.dumps(finite(entry), separators=(", ", ": ")) + "\n").encode()
         try:
@@ -70,16 +71,16 @@ def last_entry(path: Path) -> dict[str, Any]:
     return next((entry for line in reversed(lines) if (entry := _entry(line)) is not None), {})
 
 
-def _entry(line: bytes) -> dict[str, Any] | None:
+def _entry(line: bytes) -> LogEntry | None:
     with contextlib.suppress(InputError):
         entry = parsed(line, "log.jsonl")
         if line.endswith(b"\n") and isinstance(entry, dict):
             integer(entry.get("iteration"), "iteration")
-            return entry
+            return cast(LogEntry, entry)
     return None
 
 
-def _seconds(entry: dict[str, Any]) -> float:
+def _seconds(entry: LogEntry) -> float:
     """The seconds of a line; 0 where they are missing or no number."""
     with contextlib.suppress(InputError):
         return number(entry.get("seconds"), "seconds", low=0.0)

@@ -6,10 +6,21 @@ import importlib.metadata
 import platform
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from endotsr import __version__
 from endotsr.kernels.machine import memory_of_machine, usable_cores
+from endotsr.untrusted.json import Count, Text
+
+
+class MachinePart(TypedDict, total=False):
+    """`machine` of run.json and of other results."""
+
+    processor: Text
+    cores: Count
+    memory_bytes: Count | None
+    system: Text
+
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless")
 
@@ -23,7 +34,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def machine() -> dict[str, Any]:
+def machine() -> MachinePart:
     """Processor, cores this process may use, memory and system, as far as the system reports them."""
     processor = platform.processor() or platform.machine()
     with contextlib.suppress(OSError):

@@ -17,6 +17,7 @@ from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.runs.files import warn
 from endotsr.runs.folder import RunFolder
+from endotsr.runs.records import RunRecord
 
 if TYPE_CHECKING:
     from endotsr.fitting.checkpoint import Checkpoint
@@ -105,7 +106,7 @@ def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", boo
     return checkpoint, bool(note)
 
 
-def sequence_fingerprint(record: dict[str, Any]) -> str | None:
+def sequence_fingerprint(record: RunRecord) -> str | None:
     """SHA-256 over the hashes of the pictures, times and cameras in run.json; None where it holds none."""
     hashes = record.get("input", {}).get("arrays_sha256")
     return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest() if hashes else None

@@ -5,64 +5,80 @@ Every key that is there must have the type and the range below. A key may be mis
 """
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict, cast
 
 import msgspec
 
 from endotsr.config import Config
-from endotsr.runs.machine import machine, now, versions
+from endotsr.runs.machine import MachinePart, machine, now, versions
 from endotsr.untrusted.json import Count, Fraction, Side, Text, typed
 
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 
 
-class _Part(msgspec.Struct, kw_only=True):
-    """Part of a record; keys that are not listed are left alone."""
-
-
-class InputPart(_Part, kw_only=True):
+class InputPart(TypedDict, total=False):
     """`input` of run.json."""
 
-    source: Text | msgspec.UnsetType = msgspec.UNSET
-    frames: Count | msgspec.UnsetType = msgspec.UNSET
-    width: Side | msgspec.UnsetType = msgspec.UNSET
-    height: Side | msgspec.UnsetType = msgspec.UNSET
-    training_frames: Count | msgspec.UnsetType = msgspec.UNSET
-    held_out_frames: Count | msgspec.UnsetType = msgspec.UNSET
-    tissue_fraction: Fraction | msgspec.UnsetType = msgspec.UNSET
-    static_camera: bool | msgspec.UnsetType = msgspec.UNSET
-    notes: list[Text] = []
-    arrays_sha256: dict[Text, Text] = {}
-    files_sha256: dict[Text, Text] = {}
-    simulator: dict[str, Any] = {}
+    source: Text
+    frames: Count
+    width: Side
+    height: Side
+    training_frames: Count
+    held_out_frames: Count
+    tissue_fraction: Fraction
+    static_camera: bool
+    notes: list[Text]
+    arrays_sha256: dict[Text, Text]
+    files_sha256: dict[Text, Text]
+    simulator: dict[str, Any]
 
 
-class MachinePart(_Part, kw_only=True):
-    """`machine` of run.json."""
+class ResumedEntry(TypedDict, total=False):
+    """One entry of `resumed`."""
 
-    processor: Text | msgspec.UnsetType = msgspec.UNSET
-    cores: Count | msgspec.UnsetType = msgspec.UNSET
-    memory_bytes: Count | None = None
-    system: Text | msgspec.UnsetType = msgspec.UNSET
+    after_iteration: Count
+    started: Text
+    threads: Count
 
 
-class RunRecord(_Part, kw_only=True):
+class ExtendedEntry(TypedDict, total=False):
+    """One entry of `extended`."""
+
+    iterations: Count
+    before: Count
+    time: Text
+
+
+class StartPart(TypedDict, total=False):
+    """`start` of a run that began with the state of another one."""
+
+    configuration: Text  # of a sweep, and its iteration
+    iteration: Count
+    carried_from: Text  # window
+    shared_frames: Count
+    iterations_saved: Count
+
+
+class RunRecord(TypedDict, total=False):
     """run.json."""
 
-    status: Text | None = None
-    command: list[Text] = []
-    started: Text | None = None
-    finished: Text | None = None
-    seconds: Seconds = 0.0
-    iterations_done: Count | None = None
-    lambda_lap: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | None = None
-    peak_memory_bytes: Count | None = None
-    seed: Count | None = None
-    threads: Count | None = None
-    versions: dict[Text, Text] = {}
-    machine: MachinePart = msgspec.field(default_factory=MachinePart)
-    input: InputPart = msgspec.field(default_factory=InputPart)
-    resumed: list[dict[str, Any]] = []
+    status: Text | None
+    command: list[Text]
+    started: Text | None
+    finished: Text | None
+    seconds: Seconds
+    iterations_done: Count | None
+    lambda_lap: Annotated[float, msgspec.Meta(ge=0, le=1e30)] | None
+    peak_memory_bytes: Count | None
+    seed: Count | None
+    threads: Count | None
+    versions: dict[Text, Text]
+    machine: MachinePart
+    input: InputPart
+    resumed: list[ResumedEntry]
+    extended: list[ExtendedEntry]
+    start: StartPart
+    effects: dict[str, Any]  # verdicts and plan of `--effects auto`
 
 
 REPORTED = (
@@ -73,7 +89,7 @@ REPORTED = (
 """Keys of run.json that a report needs."""
 
 
-def new_record(command: list[str], config: Config, threads: int, source: dict[str, Any]) -> dict[str, Any]:
+def new_record(command: list[str], config: Config, threads: int, source: InputPart) -> RunRecord:
     """The entries of run.json at the start of a run.
 
     command   command line of the run, one string a word
@@ -98,6 +114,7 @@ def new_record(command: list[str], config: Config, threads: int, source: dict[st
     }
 
 
-def check_run_record(record: dict[str, Any], path: Path) -> None:
-    """Raises InputError naming file and key if run.json holds a value of another type or range."""
+def checked_run_record(record: dict[str, Any], path: Path) -> RunRecord:
+    """The record that run.json holds. Raises InputError naming file and key for a value of another type or range."""
     typed(record, RunRecord, path)
+    return cast(RunRecord, record)  # with the keys of other versions, which are kept

@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -12,6 +12,7 @@ from endotsr.config import Config, checked
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_inside
 from endotsr.runs.folder import RunFolder
+from endotsr.runs.records import InputPart
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
@@ -60,9 +61,9 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
     return checked(msgspec.to_builtins(simulator) | changes, SimulatorSettings, "command line", "simulator.")
 
 
-def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> dict[str, Any]:
+def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> InputPart:
     """Record of the input for run.json: shape, split, notes of the reader, hashes of the arrays and of the files."""
-    record = {
+    record: InputPart = {
         "source": source if source in (SIMULATED, IN_MEMORY) else str(Path(source).resolve()),
         "frames": sequence.count,
         "width": sequence.width,
@@ -114,10 +115,10 @@ def check_same_input(run: RunFolder, sequence: Sequence, source: str) -> None:
 
 def run_source(folder: RunFolder) -> tuple[str, SimulatorSettings]:
     """Source and simulator settings of the sequence of a run. Raises InputError if run.json lacks them."""
-    record = folder.record("input.source", "input.arrays_sha256")["input"]
+    record = folder.record("input.source", "input.arrays_sha256").get("input", {})
     where = str(folder.path / "run.json")
     simulator = checked(record.get("simulator", {}), SimulatorSettings, where, "input.simulator.")
-    return str(record["source"]), simulator
+    return str(record.get("source")), simulator
 
 
 def refuse_inside_data(out: Path, folder: RunFolder) -> None:

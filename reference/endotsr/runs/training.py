@@ -12,18 +12,19 @@ takes long, they are as rare as `LARGEST_FRACTION` demands. No result depends on
 import contextlib
 import shutil
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
 from endotsr.config import Config, config_to_toml
 from endotsr.errors import InputError
 from endotsr.fitting.divergence import Diverged
+from endotsr.fitting.records import LogEntry
 from endotsr.runs.files import os_error_line, replace_file
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
-from endotsr.runs.records import new_record
+from endotsr.runs.records import ExtendedEntry, ResumedEntry, RunRecord, new_record
 from endotsr.runs.stopping import finishing, stop_asked
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Observer(Protocol):
     def begin(self, state: "TrainingState") -> None:
         """The training begins with `state`, which it changes in place; an observer changes nothing in it."""
 
-    def update(self, entry: dict[str, Any]) -> None:
+    def update(self, entry: LogEntry) -> None:
         """The log entry of one iteration."""
 
     def say(self, message: str) -> None:
@@ -61,7 +62,7 @@ class Observer(Protocol):
 
 def start_record(
     command: list[str], source: str, sequence: "Sequence", config: Config, simulator: "SimulatorSettings", threads: int
-) -> dict[str, Any]:
+) -> RunRecord:
     """run.json at the start of a run."""
     from endotsr.runs.sources import input_record
 
@@ -70,7 +71,7 @@ def start_record(
 
 
 def train_new_run(
-    out: "Path", record: dict[str, Any], sequence: "Sequence", config: Config, observer: Observer
+    out: "Path", record: RunRecord, sequence: "Sequence", config: Config, observer: Observer
 ) -> RunFolder:
     """A new run folder, trained to the end. A folder that got no checkpoint is removed; errors as in `train_run`."""
     from endotsr.fitting.state import new_training
@@ -102,8 +103,8 @@ def resume_run(folder: RunFolder, sequence: "Sequence", threads: int, observer: 
         planned = config.training.iterations
         observer.say(f"resuming {folder.path} after iteration {state.iteration} of {planned}")
         if state.iteration < planned:
-            entry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
-            folder.update(status="running", resumed=[*folder.record().get("resumed", []), entry])
+            entry: ResumedEntry = {"after_iteration": state.iteration, "started": now(), "threads": threads}
+            folder.update({"status": "running", "resumed": [*folder.record().get("resumed", []), entry]})
             train_run(folder, state, sequence, config, observer)
 
 
@@ -125,8 +126,8 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
         replace_file(
             folder.path / "config.toml", lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n")
         )
-        entry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
-        folder.update(extended=[*folder.record().get("extended", []), entry])
+        entry: ExtendedEntry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
+        folder.update({"extended": [*folder.record().get("extended", []), entry]})
 
 
 def train_run(
@@ -184,10 +185,10 @@ class _Recorder:
         self._saved = state.iteration if folder.has_checkpoint else None
         self._between_iterations = False  # whether the run was stopped after a whole iteration
 
-    def on_iteration(self, entry: dict[str, Any]) -> None:
+    def on_iteration(self, entry: LogEntry) -> None:
         """Log one iteration. Raises KeyboardInterrupt after a signal."""
         tick = time.monotonic()
-        self.log.append(entry | {"seconds": round(tick - self._last_tick, 5)})
+        self.log.append({**entry, "seconds": round(tick - self._last_tick, 5)})
         self._last_tick = tick
         self._observer.update(entry)
         if stop_asked():
@@ -206,12 +207,13 @@ class _Recorder:
         save_training(self._folder, state, self._config)
         self._saved, self._saved_at = state.iteration, time.monotonic()
         self._saving_took = self._saved_at - began
-        self._folder.update(iterations_done=self._saved, lambda_lap=state.lambda_lap, **self._costs())
+        self._folder.update({"iterations_done": self._saved, "lambda_lap": state.lambda_lap, **self._costs()})
 
     def finish(self, last: "TrainingState") -> None:
         """Save the last state and mark the run as finished."""
         self.on_checkpoint(last)
-        self._folder.update(status="finished", finished=now(), iterations_done=last.iteration, **self._costs())
+        ended: RunRecord = {"status": "finished", "finished": now(), "iterations_done": last.iteration}
+        self._folder.update({**ended, **self._costs()})
 
     def stop(self, error: BaseException, state: "TrainingState") -> BaseException:
         """Save the state if possible and mark the run; returns the error that says how to continue it."""
@@ -247,8 +249,8 @@ class _Recorder:
 
     def _mark(self, status: str) -> None:
         with contextlib.suppress(OSError, InputError):  # a full disk cannot hold this record either
-            self._folder.update(status=status)
+            self._folder.update({"status": status})
 
-    def _costs(self) -> dict[str, Any]:
+    def _costs(self) -> RunRecord:
         seconds = self._seconds_before + time.monotonic() - self._began
         return {"seconds": round(seconds, 2), "peak_memory_bytes": peak_memory_bytes()}

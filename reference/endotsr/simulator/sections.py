@@ -11,22 +11,32 @@ import msgspec
 from endotsr.config import Fraction, NonNegative, Positive, PositiveCount, Section
 
 
-class Breathing(Section, frozen=True, kw_only=True):
-    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
+class Effect(Section, frozen=True, kw_only=True):
+    """An effect that is off unless it is asked for."""
+
+    on: bool = False
+    """switch"""
+
+
+class ActiveEffect(Effect, frozen=True, kw_only=True):
+    """An effect that is on unless it is switched off."""
 
     on: bool = True
     """switch"""
+
+
+class Breathing(ActiveEffect, frozen=True, kw_only=True):
+    """Every breath lifts the whole tissue towards the camera and shifts it, unevenly."""
+
     amplitude: NonNegative = 2.5
     """largest displacement, mm"""
     cycles: Positive = 1.5
     """breaths per sequence"""
 
 
-class Pulsation(Section, frozen=True, kw_only=True):
+class Pulsation(ActiveEffect, frozen=True, kw_only=True):
     """A round region beats; the beat has two harmonics."""
 
-    on: bool = True
-    """switch"""
     amplitude: NonNegative = 0.7
     """scale of the displacement, mm (the beat reaches 1.2 times this)"""
     cycles: Positive = 5.0
@@ -35,11 +45,9 @@ class Pulsation(Section, frozen=True, kw_only=True):
     """Gaussian radius of the region, mm"""
 
 
-class Pull(Section, frozen=True, kw_only=True):
+class Pull(ActiveEffect, frozen=True, kw_only=True):
     """A spot is pulled sideways and towards the camera, held, and released."""
 
-    on: bool = True
-    """switch"""
     amplitude: NonNegative = 5.0
     """displacement of the spot while it is held, mm"""
     width: Positive = 11.0
@@ -50,22 +58,18 @@ class Pull(Section, frozen=True, kw_only=True):
     """normalised time at which the tissue is back"""
 
 
-class GainDrift(Section, frozen=True, kw_only=True):
+class GainDrift(ActiveEffect, frozen=True, kw_only=True):
     """The gain of the camera drifts, red and blue slightly apart (white balance)."""
 
-    on: bool = True
-    """switch"""
     amplitude: Fraction = 0.15
     """relative change of the gain, linear light"""
     cycles: Positive = 1.0
     """cycles per sequence"""
 
 
-class Brightening(Section, frozen=True, kw_only=True):
+class Brightening(ActiveEffect, frozen=True, kw_only=True):
     """A region of the tissue itself grows paler and recovers (as under pressure)."""
 
-    on: bool = True
-    """switch"""
     amplitude: NonNegative = 0.6
     """relative change at its centre, linear light"""
     cycles: Positive = 2.0
@@ -74,22 +78,18 @@ class Brightening(Section, frozen=True, kw_only=True):
     """Gaussian radius, mm"""
 
 
-class Highlights(Section, frozen=True, kw_only=True):
+class Highlights(ActiveEffect, frozen=True, kw_only=True):
     """Mirror reflections of the light on the wet surface."""
 
-    on: bool = True
-    """switch"""
     strength: NonNegative = 1.0
     """brightness, linear light"""
     exponent: Positive = 150.0
     """sharpness"""
 
 
-class Instrument(Section, frozen=True, kw_only=True):
+class Instrument(ActiveEffect, frozen=True, kw_only=True):
     """A grasper in front of the tissue. It is drawn; the mask and the prior depth exclude its pixels."""
 
-    on: bool = True
-    """switch"""
     travel: NonNegative = 0.06
     """radius of the path of its tip, image widths"""
     cycles: Positive = 1.0
@@ -98,42 +98,34 @@ class Instrument(Section, frozen=True, kw_only=True):
     """width of the masked border around the drawn instrument, image widths"""
 
 
-class CameraMotion(Section, frozen=True, kw_only=True):
+class CameraMotion(Effect, frozen=True, kw_only=True):
     """The camera swings around the middle of the tissue; off = one Camera object for all frames."""
 
-    on: bool = False
-    """switch"""
     amplitude: NonNegative = 3.0
     """largest sideways shift of the camera, mm"""
     cycles: Positive = 1.0
     """cycles per sequence"""
 
 
-class SensorNoise(Section, frozen=True, kw_only=True):
+class SensorNoise(ActiveEffect, frozen=True, kw_only=True):
     """Sensor noise in the picture."""
 
-    on: bool = True
-    """switch"""
     sigma: NonNegative = 0.01
     """standard deviation, display units [0, 1]"""
 
 
-class DepthErrors(Section, frozen=True, kw_only=True):
+class DepthErrors(Effect, frozen=True, kw_only=True):
     """Errors of stereo matching in the prior depth. The true depth is stored separately and stays exact."""
 
-    on: bool = False
-    """switch"""
     sigma: NonNegative = 0.5
     """standard deviation, mm"""
     strip: Fraction = 0.07
     """columns without depth at the left, image widths"""
 
 
-class Cutting(Section, frozen=True, kw_only=True):
+class Cutting(Effect, frozen=True, kw_only=True):
     """A blade runs along a line; behind it the tissue parts, and a wound that was inside before becomes visible."""
 
-    on: bool = False
-    """switch"""
     opening: Positive = 4.0
     """largest width of the slit, mm"""
     length: Positive = 18.0
@@ -148,11 +140,9 @@ class Cutting(Section, frozen=True, kw_only=True):
     """normalised time at which the slit has its full length and width"""
 
 
-class Bleeding(Section, frozen=True, kw_only=True):
+class Bleeding(Effect, frozen=True, kw_only=True):
     """Blood spreads from a spot of the tissue and covers it."""
 
-    on: bool = False
-    """switch"""
     radius: Positive = 6.0
     """mean radius at the end of the sequence, mm"""
     opacity: Fraction = 0.9
@@ -161,11 +151,9 @@ class Bleeding(Section, frozen=True, kw_only=True):
     """normalised time at which the bleeding begins"""
 
 
-class Smoke(Section, frozen=True, kw_only=True):
+class Smoke(Effect, frozen=True, kw_only=True):
     """Smoke between camera and tissue: it replaces a fraction of the light of a pixel by grey, and drifts."""
 
-    on: bool = False
-    """switch"""
     density: Fraction = 0.6
     """fraction of the light that the densest smoke replaces"""
     size: Positive = 0.16
@@ -178,11 +166,9 @@ class Smoke(Section, frozen=True, kw_only=True):
     """normalised time at which it has gone"""
 
 
-class SecondLight(Section, frozen=True, kw_only=True):
+class SecondLight(Effect, frozen=True, kw_only=True):
     """A second lamp, at a fixed place beside the camera of frame 0."""
 
-    on: bool = False
-    """switch"""
     strength: NonNegative = 0.5
     """brightness, relative to the lamp at the camera"""
     right: float = -30.0
@@ -191,51 +177,41 @@ class SecondLight(Section, frozen=True, kw_only=True):
     """place below the camera, mm"""
 
 
-class AutoExposure(Section, frozen=True, kw_only=True):
+class AutoExposure(Effect, frozen=True, kw_only=True):
     """The automatic exposure of the camera jumps: between two steps the gain is constant."""
 
-    on: bool = False
-    """switch"""
     amplitude: Fraction = 0.25
     """largest relative change of the gain, linear light"""
     steps: PositiveCount = 3
     """number of jumps, evenly spaced"""
 
 
-class Vignetting(Section, frozen=True, kw_only=True):
+class Vignetting(Effect, frozen=True, kw_only=True):
     """The lens darkens the picture towards its corners."""
 
-    on: bool = False
-    """switch"""
     amplitude: Fraction = 0.4
     """fraction of the light that is lost in the corners"""
 
 
-class MotionBlur(Section, frozen=True, kw_only=True):
+class MotionBlur(Effect, frozen=True, kw_only=True):
     """The picture is the mean over the time for which the shutter is open, centred on the time of the frame."""
 
-    on: bool = False
-    """switch"""
     shutter: Fraction = 0.5
     """fraction of the frame interval for which the shutter is open"""
     samples: Annotated[int, msgspec.Meta(ge=2, le=64)] = 5
     """moments of the exposure that are averaged"""
 
 
-class MoreInstruments(Section, frozen=True, kw_only=True):
+class MoreInstruments(Effect, frozen=True, kw_only=True):
     """Further graspers, which enter from other sides; travel, cycles and margin are those of `instrument`."""
 
-    on: bool = False
-    """switch"""
     count: Annotated[int, msgspec.Meta(ge=1, le=2)] = 1
     """number of further graspers"""
 
 
-class Shadows(Section, frozen=True, kw_only=True):
+class Shadows(Effect, frozen=True, kw_only=True):
     """The instruments throw shadows, because no lamp is exactly at the camera."""
 
-    on: bool = False
-    """switch"""
     strength: Fraction = 0.6
     """fraction of the light of a lamp that the shadow takes away"""
     offset: float = 5.0
@@ -244,19 +220,15 @@ class Shadows(Section, frozen=True, kw_only=True):
     """Gaussian radius of the edge of the shadow, image widths"""
 
 
-class Stereo(Section, frozen=True, kw_only=True):
+class Stereo(Effect, frozen=True, kw_only=True):
     """A second camera to the right. What it does not see, a strip at the left, has no prior depth and is excluded."""
 
-    on: bool = False
-    """switch"""
     baseline: Positive = 4.0
     """distance of the two cameras, mm"""
 
 
-class DepthRounding(Section, frozen=True, kw_only=True):
+class DepthRounding(Effect, frozen=True, kw_only=True):
     """The prior depth is rounded as in the files of a sequence folder."""
 
-    on: bool = False
-    """switch"""
     step: Positive = 1.0
     """step, mm"""

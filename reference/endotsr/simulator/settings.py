@@ -10,29 +10,7 @@ import msgspec
 
 from endotsr.config import Count, NonNegative, Positive, Section
 from endotsr.errors import InputError
-from endotsr.simulator.sections import (
-    AutoExposure,
-    Bleeding,
-    Breathing,
-    Brightening,
-    CameraMotion,
-    Cutting,
-    DepthErrors,
-    DepthRounding,
-    GainDrift,
-    Highlights,
-    Instrument,
-    MoreInstruments,
-    MotionBlur,
-    Pull,
-    Pulsation,
-    SecondLight,
-    SensorNoise,
-    Shadows,
-    Smoke,
-    Stereo,
-    Vignetting,
-)
+from endotsr.simulator import sections
 
 Side = Annotated[int, msgspec.Meta(ge=16)]
 FrameCount = Annotated[int, msgspec.Meta(ge=3)]
@@ -57,51 +35,31 @@ class SimulatorSettings(Section, frozen=True, kw_only=True):
     """focal length, image widths"""
     block_length: Count = 0
     """0 = every eighth frame is held out; otherwise the length of contiguous held-out blocks, frames"""
-    breathing: Breathing = Breathing()
-    pulsation: Pulsation = Pulsation()
-    pull: Pull = Pull()
-    exposure: GainDrift = GainDrift()
-    brightening: Brightening = Brightening()
-    highlights: Highlights = Highlights()
-    instrument: Instrument = Instrument()
-    camera_motion: CameraMotion = CameraMotion()
-    noise: SensorNoise = SensorNoise()
-    depth_errors: DepthErrors = DepthErrors()
-    cutting: Cutting = Cutting()
-    bleeding: Bleeding = Bleeding()
-    second_light: SecondLight = SecondLight()
-    more_instruments: MoreInstruments = MoreInstruments()
-    shadows: Shadows = Shadows()
-    smoke: Smoke = Smoke()
-    vignetting: Vignetting = Vignetting()
-    auto_exposure: AutoExposure = AutoExposure()
-    motion_blur: MotionBlur = MotionBlur()
-    stereo: Stereo = Stereo()
-    depth_rounding: DepthRounding = DepthRounding()
+    breathing: sections.Breathing = sections.Breathing()
+    pulsation: sections.Pulsation = sections.Pulsation()
+    pull: sections.Pull = sections.Pull()
+    exposure: sections.GainDrift = sections.GainDrift()
+    brightening: sections.Brightening = sections.Brightening()
+    highlights: sections.Highlights = sections.Highlights()
+    instrument: sections.Instrument = sections.Instrument()
+    camera_motion: sections.CameraMotion = sections.CameraMotion()
+    noise: sections.SensorNoise = sections.SensorNoise()
+    depth_errors: sections.DepthErrors = sections.DepthErrors()
+    cutting: sections.Cutting = sections.Cutting()
+    bleeding: sections.Bleeding = sections.Bleeding()
+    second_light: sections.SecondLight = sections.SecondLight()
+    more_instruments: sections.MoreInstruments = sections.MoreInstruments()
+    shadows: sections.Shadows = sections.Shadows()
+    smoke: sections.Smoke = sections.Smoke()
+    vignetting: sections.Vignetting = sections.Vignetting()
+    auto_exposure: sections.AutoExposure = sections.AutoExposure()
+    motion_blur: sections.MotionBlur = sections.MotionBlur()
+    stereo: sections.Stereo = sections.Stereo()
+    depth_rounding: sections.DepthRounding = sections.DepthRounding()
 
 
-EFFECTS = (
-    "breathing",
-    "pulsation",
-    "pull",
-    "exposure",
-    "brightening",
-    "highlights",
-    "instrument",
-    "camera_motion",
-    "noise",
-    "depth_errors",
-    "cutting",
-    "bleeding",
-    "second_light",
-    "more_instruments",
-    "shadows",
-    "smoke",
-    "vignetting",
-    "auto_exposure",
-    "motion_blur",
-    "stereo",
-    "depth_rounding",
+EFFECTS = tuple(
+    field.name for field in msgspec.structs.fields(SimulatorSettings) if isinstance(field.default, sections.Effect)
 )
 
 
@@ -113,5 +71,5 @@ def with_effects(settings: SimulatorSettings, *names: str) -> SimulatorSettings:
     unknown = set(names) - set(EFFECTS)
     if unknown:
         raise InputError(f"effects: unknown: {', '.join(sorted(unknown))}; allowed: {', '.join(EFFECTS)}")
-    sections = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
-    return msgspec.structs.replace(settings, **sections)
+    switched = {name: msgspec.structs.replace(getattr(settings, name), on=name in names) for name in EFFECTS}
+    return msgspec.structs.replace(settings, **switched)

@@ -9,7 +9,7 @@ from the smallest to the largest difference, which misses the true one in a quar
 """
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from endotsr.errors import InputError
 from endotsr.evaluation.compare import CONFIDENCE, RESAMPLES
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sweeps.execute import FINISHED
+from endotsr.sweeps.row import Level, RunRow
 
 FIXED = " fixed"  # ends the names of configurations that begin with the shared checkpoint, without density control
 NO_PRIOR = "S without prior"
@@ -109,6 +110,14 @@ class Estimate(NamedTuple):
     sequences: int
 
 
+class RunPair(NamedTuple):
+    """Two runs that differ in a component, on the same sequence with the same seed."""
+
+    sequence: str
+    seed: int
+    difference: float
+
+
 class Increment(NamedTuple):
     """A comparison on one split and metric."""
 
@@ -116,10 +125,10 @@ class Increment(NamedTuple):
     split: str
     metric: str
     estimate: Estimate
-    pairs: list[dict[str, Any]]  # sequence, seed and difference of each
+    pairs: list[RunPair]
 
 
-def increments(rows: Iterable[dict[str, Any]], seed: int = 0) -> list[Increment]:
+def increments(rows: Iterable[RunRow], seed: int = 0) -> list[Increment]:
     """Every comparison for which there are finished pairs.
 
     rows     of results.json
@@ -137,7 +146,7 @@ def increments(rows: Iterable[dict[str, Any]], seed: int = 0) -> list[Increment]
     return found
 
 
-def paired(rows: list[dict[str, Any]], comparison: Contrast, split: str, metric: str) -> list[dict[str, Any]]:
+def paired(rows: list[RunRow], comparison: Contrast, split: str, metric: str) -> list[RunPair]:
     """The differences of the runs that have both a partner and a value."""
     with_, without = (
         {(row["sequence"], row["seed"]): row for row in rows if row["split"] == split and row["configuration"] == name}
@@ -149,22 +158,22 @@ def paired(rows: list[dict[str, Any]], comparison: Contrast, split: str, metric:
             continue
         a, b = with_[key], without[key]
         _refuse_other_input(a, b)
-        if a.get(metric) is not None and b.get(metric) is not None:
-            pairs.append({"sequence": key[0], "seed": key[1], "difference": a[metric] - b[metric]})
+        if (gained := a.get(metric)) is not None and (base := b.get(metric)) is not None:
+            pairs.append(RunPair(*key, gained - base))
     return pairs
 
 
-def _refuse_other_input(a: dict[str, Any], b: dict[str, Any]) -> None:
+def _refuse_other_input(a: RunRow, b: RunRow) -> None:
     for key in MATCHED:
         if a.get(key) != b.get(key):
             raise InputError(f"{a['name']} and {b['name']}: differ in {key}; allowed: runs on the same input")
 
 
-def estimate(pairs: list[dict[str, Any]], seed: int = 0) -> Estimate:
+def estimate(pairs: list[RunPair], seed: int = 0) -> Estimate:
     """Mean and median over the seeds of each sequence, averaged over the sequences, with their intervals."""
     groups: dict[str, list[float]] = {}
     for pair in pairs:
-        groups.setdefault(pair["sequence"], []).append(pair["difference"])
+        groups.setdefault(pair.sequence, []).append(pair.difference)
     samples = tuple(np.array(values) for values in groups.values())
     mean, median = (float(np.mean([middle(sample) for sample in samples])) for middle in (np.mean, np.median))
     of_mean, of_median = (_bootstrap(samples, middle, seed) for middle in (np.mean, np.median))
@@ -203,22 +212,22 @@ def _bootstrap(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> Limit
     return float(found.low), float(found.high)
 
 
-def levels(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+def levels(rows: Iterable[RunRow]) -> list[Level]:
     """Mean of every configuration and split for each metric, sequences weighted equally, with its number of runs."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, str], list[RunRow]] = {}
     for row in rows:
         if row["status"] == FINISHED:
             groups.setdefault((row["split"], row["configuration"]), []).append(row)
     found = []
     for (split, configuration), members in groups.items():
         values = {name: _equal_weights(members, name) for name in (*METRICS, "gaussians", "training_psnr_tissue")}
-        found.append({"split": split, "configuration": configuration, "runs": len(members), **values})
+        found.append(cast(Level, {"split": split, "configuration": configuration, "runs": len(members), **values}))
     return found
 
 
-def _equal_weights(rows: list[dict[str, Any]], key: str) -> float | None:
+def _equal_weights(rows: list[RunRow], key: str) -> float | None:
     groups: dict[str, list[float]] = {}
     for row in rows:
-        if row.get(key) is not None:
-            groups.setdefault(row["sequence"], []).append(float(row[key]))
+        if (value := row.get(key)) is not None:
+            groups.setdefault(row["sequence"], []).append(float(value))
     return float(np.mean([np.mean(values) for values in groups.values()])) if groups else None

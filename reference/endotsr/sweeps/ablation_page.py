@@ -4,7 +4,7 @@ In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, wri
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from endotsr.report import style
 from endotsr.report.tables import markdown
@@ -12,6 +12,7 @@ from endotsr.runs.files import replace_file, write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.sweeps.ablation import Increment, increments, levels
 from endotsr.sweeps.execute import FAILED, FINISHED
+from endotsr.sweeps.row import AblationRecord, IncrementRow, RunRow
 
 FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
 FILES = ("ablation.json", "ablation.md", "ablation.png")
@@ -24,7 +25,7 @@ ROW_KEYS = (
 SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
 
 
-def ablation_record(rows: list[dict[str, Any]], command: list[str]) -> dict[str, Any]:
+def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:
     """The content of ablation.json. Raises InputError if two runs of a pair do not have the same input."""
     return {
         "format": FORMAT,
@@ -39,17 +40,22 @@ def ablation_record(rows: list[dict[str, Any]], command: list[str]) -> dict[str,
         },
         "levels": levels(rows),
         "increments": [_increment(found) for found in increments(rows)],
-        "rows": [{key: row[key] for key in ROW_KEYS if key in row} for row in rows if row["status"] == FINISHED],
+        "rows": [_kept(row) for row in rows if row["status"] == FINISHED],
     }
 
 
-def _increment(found: Increment) -> dict[str, Any]:
+def _kept(row: RunRow) -> RunRow:
+    return cast(RunRow, {key: row.get(key) for key in ROW_KEYS if key in row})
+
+
+def _increment(found: Increment) -> IncrementRow:
     c = found.comparison
     about = {"claim": c.claim, "with": c.with_, "without": c.without, "published": c.published}
-    return about | {"split": found.split, "metric": found.metric, **found.estimate._asdict(), "of": found.pairs}
+    numbers = {**found.estimate._asdict(), "of": [pair._asdict() for pair in found.pairs]}
+    return cast(IncrementRow, about | {"split": found.split, "metric": found.metric} | numbers)
 
 
-def write_ablation(out: Path, rows: list[dict[str, Any]], command: list[str]) -> dict[str, Any]:
+def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> AblationRecord:
     """Write the three files in the folder of the sweep; returns the content of ablation.json. Raises OSError."""
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
@@ -60,7 +66,7 @@ def write_ablation(out: Path, rows: list[dict[str, Any]], command: list[str]) ->
     return record
 
 
-def ablation_markdown(record: dict[str, Any]) -> str:
+def ablation_markdown(record: AblationRecord) -> str:
     """Means of the configurations, and the differences with intervals, split by split."""
     runs = record["runs"]
     parts = [f"{runs['finished']} of {runs['planned']} runs finished, {len(runs['failed'])} failed."]
@@ -71,19 +77,19 @@ def ablation_markdown(record: dict[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
-def level_table(record: dict[str, Any], split: str) -> str:
+def level_table(record: AblationRecord, split: str) -> str:
     """Means of the configurations on a split, sequences weighted equally."""
     chosen = [level for level in record["levels"] if level["split"] == split]
-    columns = [column for column in SHOWN if any(level[column[0]] is not None for level in chosen)]
+    columns = [column for column in SHOWN if any(level.get(column[0]) is not None for level in chosen)]
     rows = [
-        [level["configuration"], str(level["runs"]), *(_number(level[key], d) for key, _, d in columns),
-         _number(level["gaussians"], 0)]
+        [level["configuration"], str(level["runs"]), *(_number(level.get(key), d) for key, _, d in columns),
+         _number(level.get("gaussians"), 0)]
         for level in chosen
     ]  # fmt: skip
     return markdown(["configuration", "runs", *(head for _, head, _ in columns), "Gaussians"], rows)
 
 
-def increment_table(record: dict[str, Any], split: str) -> str:
+def increment_table(record: AblationRecord, split: str) -> str:
     """Paired differences on a split: mean with Student's interval and the bootstrap, median, and what is published."""
     rows = []
     for found in record["increments"]:
@@ -102,25 +108,25 @@ def increment_table(record: dict[str, Any], split: str) -> str:
     return markdown(heads, rows)
 
 
-def name_of(found: dict[str, Any]) -> str:
+def name_of(found: IncrementRow) -> str:
     """The name of a difference, marked where the paper does not make it."""
     return found["claim"] + ("" if found["published"] is not None else " (ours)")
 
 
-def interval_text(found: dict[str, Any], of: str, digits: int) -> str:
+def interval_text(found: IncrementRow, of: str, digits: int) -> str:
     """An interval, `of` being student, mean or median: "-0.02 to +0.11"; "-" where one pair has none."""
-    low, high = found[f"{of}_low"], found[f"{of}_high"]
+    low, high = found.get(f"{of}_low"), found.get(f"{of}_high")
     return "-" if low is None or high is None else f"{_signed(low, digits)} to {_signed(high, digits)}"
 
 
-def draw(record: dict[str, Any], path: Path, metric: str = "psnr_full") -> None:
+def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
     """Mean differences with their intervals, one line a comparison, one panel a split; crosses are the paper's."""
     chosen = [found for found in record["increments"] if found["metric"] == metric]
     splits = list(dict.fromkeys(found["split"] for found in chosen))
     count = max(sum(found["split"] == split for found in chosen) for split in splits)
     figure = style.new_figure(4.0 + 3.2 * len(splits), 1.5 + 0.32 * count)
     panels = figure.subplots(1, len(splits), squeeze=False)[0]
-    named: dict[str, Any] = {}  # one entry of the legend a label, whichever panels have it
+    named: dict[str, object] = {}  # one entry of the legend a label, whichever panels have it
     for axes, split in zip(panels, splits, strict=True):
         _panel(axes, [found for found in chosen if found["split"] == split])
         style.name_axes(axes, x="difference of PSNR full, dB", title=f"held out: {split}")
@@ -130,12 +136,12 @@ def draw(record: dict[str, Any], path: Path, metric: str = "psnr_full") -> None:
     style.save(figure, path)
 
 
-def _panel(axes: Any, chosen: list[dict[str, Any]]) -> None:
+def _panel(axes: Any, chosen: list[IncrementRow]) -> None:
     style.plain_axes(axes, grid="x")
     axes.axvline(0.0, color=style.GREY, linewidth=1.0)
     places = range(len(chosen))
     for of, width, label in (("student", 1.2, "95 %, Student"), ("mean", 3.5, "95 %, bootstrap")):
-        limits = [(place, f[f"{of}_low"], f[f"{of}_high"]) for place, f in enumerate(chosen)]
+        limits = [(place, f.get(f"{of}_low"), f.get(f"{of}_high")) for place, f in enumerate(chosen)]
         known = [limit for limit in limits if limit[1] is not None]
         if known:
             axes.hlines(*zip(*known, strict=True), color=style.BLUE, linewidth=width, label=label)

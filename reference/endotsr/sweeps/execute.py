@@ -9,9 +9,10 @@ import errno
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from endotsr.errors import InputError
+from endotsr.fitting.records import LogEntry
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunBusy, RunFolder, create_run, open_run
 from endotsr.runs.machine import now
@@ -47,7 +48,7 @@ class Silent:
     def begin(self, state: "TrainingState") -> None:
         """As `runs.training.Observer`."""
 
-    def update(self, entry: dict[str, Any]) -> None:
+    def update(self, entry: LogEntry) -> None:
         """As `runs.training.Observer`. Raises KeyboardInterrupt if the run is to stop."""
         if self._stop():
             raise KeyboardInterrupt
@@ -143,7 +144,7 @@ def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunF
     return folder
 
 
-def _start_state(job: Job, sequence: Sequence) -> Any:
+def _start_state(job: Job, sequence: Sequence) -> "TrainingState":
     """The state that the run begins with; it is trained by the first run that needs it, while the others wait."""
     from endotsr.fitting.checkpoint import load_checkpoint
     from endotsr.fitting.state import state_from_checkpoint
@@ -181,7 +182,7 @@ def _measured(job: Job, folder: RunFolder, sequence: Sequence) -> None:
     from endotsr.report.run_files import write_evaluation
 
     if folder.record().get("status") != FINISHED:  # killed between the last checkpoint and this record
-        folder.update(status=FINISHED, finished=now())
+        folder.update({"status": FINISHED, "finished": now()})
     if not job.measured or measured_at_the_end(job):
         return
     weights = load_lpips_weights(job.lpips)

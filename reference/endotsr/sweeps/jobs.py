@@ -7,7 +7,7 @@ A job holds all that another process or machine needs to make the run.
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import msgspec
 
@@ -15,6 +15,7 @@ from endotsr.config import Config, lengthened
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
+from endotsr.runs.records import StartPart
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.sweeps.spec import Configuration, Spec, Start, split_name, split_settings
@@ -30,7 +31,7 @@ STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
 class Beginning(Protocol):
     """A state that a run begins with in place of the initialisation, made where the run takes place."""
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> StartPart:
         """`start` of run.json."""
         ...
 

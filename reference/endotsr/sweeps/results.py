@@ -5,7 +5,7 @@ reason of a failed one is kept in results.json alone.
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from endotsr.errors import InputError
 from endotsr.report.spreadsheet import csv_text
@@ -14,6 +14,7 @@ from endotsr.runs.files import read_json, replace_file, write_json
 from endotsr.runs.machine import now
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job
+from endotsr.sweeps.row import RunRow
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
 FILES = ("results.json", "results.csv", "results.md")
@@ -30,14 +31,14 @@ SHOWN = (
 )  # fmt: skip
 
 
-def finished_row(job: Job) -> dict[str, Any]:
+def finished_row(job: Job) -> RunRow:
     """The numbers of a run that is trained and measured. Raises InputError if its metrics.json lacks a key."""
     path = Path(job.folder) / "metrics.json"
     metrics = read_json(path, ("held_out.mean", "training.mean", "run.input.arrays_sha256", "baselines"))
     run, held_out, inside = metrics["run"], metrics["held_out"], metrics["training"]["mean"]
     faded = (metrics.get("cross_fade") or {}).get("mean") or {}
     names = ("psnr_full", "psnr_tissue")
-    return {
+    row = {
         **about(job),
         "status": FINISHED,
         **{name: held_out["mean"].get(name) for name in METRICS},
@@ -59,17 +60,20 @@ def finished_row(job: Job) -> dict[str, Any]:
         "versions": run.get("versions"),
         "machine": run.get("machine"),
     }
+    return cast(RunRow, row)
 
 
-def about(job: Job) -> dict[str, Any]:
+def about(job: Job) -> RunRow:
     """What identifies a run."""
-    return {"name": job.name} | {key: getattr(job, key) for key in ABOUT}
+    return cast(RunRow, {"name": job.name} | {key: getattr(job, key) for key in ABOUT})
 
 
-def open_row(job: Job, outcome: Outcome | None = None) -> dict[str, Any]:
+def open_row(job: Job, outcome: Outcome | None = None) -> RunRow:
     """A run without numbers; failed ones have a reason."""
     failed = outcome is not None and outcome.status == FAILED
-    return about(job) | ({"status": FAILED, "reason": outcome.reason} if failed and outcome else {"status": OPEN})
+    if failed and outcome:
+        return {**about(job), "status": FAILED, "reason": outcome.reason}
+    return {**about(job), "status": OPEN}
 
 
 def failures(out: Path) -> dict[str, str]:
@@ -84,7 +88,7 @@ def failures(out: Path) -> dict[str, str]:
     return {str(row.get("name")): str(row.get("reason", "")) for row in rows}
 
 
-def write_results(out: Path, rows: list[dict[str, Any]]) -> None:
+def write_results(out: Path, rows: list[RunRow]) -> None:
     """results.json, results.csv and results.md, each replaced whole. Raises OSError."""
     write_json(out / FILES[0], {"format": FORMAT, "date": now(), "rows": rows})
     for name, text in zip(FILES[1:], (results_csv(rows), results_markdown(rows) + "\n"), strict=True):
@@ -93,13 +97,13 @@ def write_results(out: Path, rows: list[dict[str, Any]]) -> None:
         )
 
 
-def results_csv(rows: list[dict[str, Any]]) -> str:
+def results_csv(rows: list[RunRow]) -> str:
     """One line a run; an empty cell for a run without the number."""
     columns = ("name", *ABOUT, "status", *METRICS, *BESIDE, *COSTS, "reason")
     return csv_text(columns, ([row.get(name) for name in columns] for row in rows))
 
 
-def results_markdown(rows: list[dict[str, Any]]) -> str:
+def results_markdown(rows: list[RunRow]) -> str:
     """The finished runs as a table, and the failed ones by name with their reasons."""
     finished = [row for row in rows if row["status"] == FINISHED]
     failed = [row for row in rows if row["status"] == FAILED]
@@ -112,7 +116,7 @@ def results_markdown(rows: list[dict[str, Any]]) -> str:
     if finished:
         parts.append(markdown([*ABOUT, *(head for _, head, _ in columns)], cells))
     if failed:
-        parts.append("\n".join(f"- {row['name']}: {row['reason']}".replace("|", "\\|") for row in failed))
+        parts.append("\n".join(f"- {row['name']}: {row.get('reason')}".replace("|", "\\|") for row in failed))
     return "\n\n".join(parts)
 
 

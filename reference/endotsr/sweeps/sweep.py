@@ -10,7 +10,7 @@ machine or of a cluster. Out: the rows of the table, in the order of the spec.
 import contextlib
 from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder
@@ -21,10 +21,11 @@ from endotsr.sweeps.execute import FAILED, FINISHED, Outcome, loaded_sequence
 from endotsr.sweeps.jobs import RUNS, Job, finished_folder, jobs_of
 from endotsr.sweeps.locks import file_lock
 from endotsr.sweeps.results import failures, finished_row, open_row, write_results
+from endotsr.sweeps.row import RunRow
 from endotsr.sweeps.spec import Spec
 
 LOCK = "sweep.lock"
-Rows = list[dict[str, Any]]
+Rows = list[RunRow]
 
 
 class Reporter(Protocol):
@@ -78,7 +79,7 @@ class SweepPlan(NamedTuple):
     """The runs of a sweep and what is left of them."""
 
     jobs: list[Job]
-    rows: dict[str, dict[str, Any]]  # by name of the run
+    rows: dict[str, RunRow]  # by name of the run
     left: list[Job]
     failed: dict[str, str]  # runs that failed before and are not tried again: name -> reason
 
@@ -177,14 +178,14 @@ class Watch:
         return max(steps, 0)
 
 
-def _line(rows: dict[str, dict[str, Any]], job: Job) -> str:
+def _line(rows: dict[str, RunRow], job: Job) -> str:
     row = rows[job.name]
     if row["status"] != FINISHED:
         return f"{row['status']}: {job.name}" + (f": {row['reason']}" if "reason" in row else "")
-    value = row["psnr_tissue"]
+    value = row.get("psnr_tissue")
     shown = "-" if value is None else f"{value:.2f}"
-    return f"{_count(rows)}: {job.name}: PSNR tissue {shown} dB, {row['gaussians']} Gaussians"
+    return f"{_count(rows)}: {job.name}: PSNR tissue {shown} dB, {row.get('gaussians')} Gaussians"
 
 
-def _count(rows: dict[str, dict[str, Any]]) -> str:
+def _count(rows: dict[str, RunRow]) -> str:
     return f"{sum(row['status'] == FINISHED for row in rows.values())} of {len(rows)}"

@@ -27,6 +27,7 @@ from endotsr.fitting.schedules import residuals_active
 from endotsr.fitting.state import fresh_state
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.kernels.gather import gather_columns
+from endotsr.runs.records import StartPart
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.scene.initialisation import activate_residuals, gaussians_at, gaussians_of, training_points
 from endotsr.scene.parameters import FrameParameters, frame_parameters
@@ -54,7 +55,7 @@ class CarriedStart(NamedTuple):
     shared: int  # frames that both have, the first ones of this window
     saved: int  # iterations that a cold start would take more
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> StartPart:
         """`start` of run.json."""
         return {"carried_from": Path(self.folder).name, "shared_frames": self.shared, "iterations_saved": self.saved}
 

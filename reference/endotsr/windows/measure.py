@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from endotsr.evaluation.baselines import BASELINES, unit_image
-from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model
+from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model, labelled
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.metrics import mean_metrics
+from endotsr.evaluation.records import EvaluationRecord, FramesMeasured
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 from endotsr.windows.make import window_cost
@@ -44,7 +45,7 @@ def measure_windows(
     """
     found = [_measured(scene, frames, k, weights) for k in range(len(scene.plan.windows))]
     known = [entry for entry in found if entry is not None]
-    metrics: dict[str, Any] = _joined(known) if known else {"format": FORMAT}
+    metrics: dict[str, Any] = dict(_joined(known)) if known else {"format": FORMAT}
     metrics["windows"] = [
         {"name": window.name, "first": window.first, "end": window.end}
         | window_cost(folder.path)
@@ -59,7 +60,7 @@ def measure_windows(
 
 def _measured(
     scene: WindowedScene, frames: WindowFrames, k: int, weights: LpipsWeights | None
-) -> dict[str, Any] | None:
+) -> EvaluationRecord | None:
     """`evaluate_model` on the frames in which window k has the larger weight; None if none is held out."""
     first, held_out = scene.plan.windows[k].first, {scene.frames[j] for j in scene.record.test_index}
     sequence = frames.of_window(k)
@@ -89,15 +90,15 @@ def _rendered(scene: WindowedScene, g: int) -> FloatArray:
     return scene.render(g / scene.plan.frames, camera).colour
 
 
-def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
+def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
     """The metrics of all windows as those of one sequence: rows one after another, means over all of them."""
     held_out, training = (_joined_rows([part[name] for part in parts]) for name in ("held_out", "training"))
     baselines = {
-        name: {"label": label} | _joined_rows([part["baselines"][name] for part in parts])
+        name: labelled(label, _joined_rows([part["baselines"][name] for part in parts]))
         for name, (label, _) in BASELINES.items()
     }
     gap = {
-        key: None if value is None or held_out["mean"].get(key) is None else value - held_out["mean"][key]
+        key: None if value is None or (other := held_out["mean"].get(key)) is None else value - other
         for key, value in training["mean"].items()
     }
     return {
@@ -118,7 +119,7 @@ def _joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _joined_rows(parts: list[dict[str, Any]]) -> dict[str, Any]:
+def _joined_rows(parts: list[FramesMeasured]) -> FramesMeasured:
     """Evaluations as one: the keys of `Evaluation.as_dict`."""
     rows = [row for part in parts for row in part["per_frame"]]
     keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]

@@ -1,7 +1,7 @@
 """`endotsr evaluate` with several methods: runs and pictures in one table, with paired differences."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from endotsr.cli.parts.shown import ShownSettings, shown_sequence
 from endotsr.errors import InputError
@@ -9,6 +9,7 @@ from endotsr.runs.files import read_json, replace_file, write_json
 from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
+    from endotsr.evaluation.records import EvaluationRecord
     from endotsr.sequences.sequence import Sequence
 
 
@@ -58,17 +59,17 @@ def _named(word: str) -> tuple[str, Path]:
 
 def _metrics(
     label: str, path: Path, asked: Comparison, paths: list[Path], sequence: "Sequence | None"
-) -> tuple[dict[str, Any], "Sequence | None"]:
+) -> tuple["EvaluationRecord", "Sequence | None"]:
     """The metrics of one argument, and the sequence if it had to be read."""
     if (path / "run.json").exists() or is_windowed(path):
         if not (path / "metrics.json").exists():
             raise InputError(f"{path}: not evaluated yet; `endotsr evaluate {path}` writes its metrics.json")
-        return read_json(path / "metrics.json"), sequence
+        return cast("EvaluationRecord", read_json(path / "metrics.json")), sequence
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.pictures import find_pictures, is_video, measure_pictures
 
     if not path.is_dir() and not is_video(path):
-        return read_json(path), sequence
+        return cast("EvaluationRecord", read_json(path)), sequence
 
     if sequence is None:
         run = next((p for p in paths if (p / "run.json").exists()), None) if asked.sequence is None else None

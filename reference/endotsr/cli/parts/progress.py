@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from endotsr.config import Config
+from endotsr.fitting.records import LogEntry
 from endotsr.report.words import duration
 from endotsr.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
 
@@ -58,7 +59,7 @@ class Progress:
                 bar_format=BAR,
             )
 
-    def update(self, entry: dict[str, Any]) -> None:
+    def update(self, entry: LogEntry) -> None:
         """Show the log entry of one iteration."""
         for name, memory in MEMORY.items():
             value = entry.get(name)
@@ -101,12 +102,12 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
 
-    def _state(self, entry: dict[str, Any], left: str | None) -> str:
+    def _state(self, entry: LogEntry, left: str | None) -> str:
         shown = f"loss {self._means.get('loss', float('nan')):.4f}, PSNR {self._means.get('psnr', float('nan')):.2f} dB"
         time_left = "time left not known yet" if left is None else f"{left} left"
         return f"{shown}, {entry.get('gaussians', 0)} Gaussians, {time_left}"
 
-    def _standing(self, entry: dict[str, Any]) -> Standing:
+    def _standing(self, entry: LogEntry) -> Standing:
         coarse = self._training is not None and self._training.coarse
         return Standing(entry["iteration"], entry.get("gaussians", 0), coarse)
 

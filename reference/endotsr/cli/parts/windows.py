@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.sweep import Place, check_place
@@ -13,6 +13,7 @@ from endotsr.runs.files import refuse_inside, write_json
 from endotsr.runs.sources import SIMULATED
 
 if TYPE_CHECKING:
+    from endotsr.evaluation.records import EvaluationRecord
     from endotsr.sweeps.execute import Outcome
     from endotsr.sweeps.jobs import Job
 
@@ -101,7 +102,7 @@ def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = 
     for row in metrics["windows"]:
         print(_row(row))
     if "held_out" in metrics:
-        print(held_out_table(metrics))
+        print(held_out_table(cast("EvaluationRecord", metrics)))
     print(_seam_line(metrics["seams"]))
     for gap in metrics["left_out"]:
         print(f"left out: frames {gap['first']}:{gap['end']}: {gap['reason']}")

@@ -1,0 +1,135 @@
+"""The parts of metrics.json. Every number is finite; a metric without a value is None."""
+
+from typing import Any, NotRequired, Required, TypedDict
+
+from endotsr.runs.machine import MachinePart
+from endotsr.runs.records import InputPart
+
+Means = dict[str, float | None]  # metric -> value
+
+
+class MetricValues(TypedDict, total=False):
+    """Every metric; PSNR in dB."""
+
+    psnr_full: float | None
+    psnr_tissue: float | None
+    psnr_full_8bit: float | None
+    psnr_tissue_8bit: float | None
+    ssim_full: float | None
+    ssim_tissue: float | None
+    lpips: float | None
+    lpips_symmetric: float | None
+
+
+class LabelledMeans(MetricValues, total=False):
+    """Metrics with a label."""
+
+    label: Required[str]
+
+
+class FrameMetrics(MetricValues, total=False):
+    """One frame; every metric beside its number, name and time."""
+
+    frame: Required[int]
+    name: Required[str]
+    time: Required[float]
+
+
+class FramesMeasured(TypedDict):
+    """Some frames."""
+
+    mean: Means  # over the frames that have a value
+    per_frame: list[FrameMetrics]
+    excluded: dict[str, int]  # metric -> frames without a value, where there are any
+    not_finite: int  # values that were computed and are not finite
+
+
+class LabelledFrames(FramesMeasured):
+    """Some frames of a prediction without a model, or of the blend of renders."""
+
+    label: str
+
+
+class FramesPart(TypedDict):
+    """`frames` of metrics.json."""
+
+    total: int
+    training: int
+    held_out: list[int]
+    training_sample: list[int]
+    tissue_fraction: float
+
+
+class MotionPart(TypedDict):
+    """`trajectories` of metrics.json: the error of the motion beside the motion itself."""
+
+    scene_units: float
+    pixels: float
+    motion_scene_units: float
+    motion_pixels: float
+    unit: str
+
+
+class PosePart(TypedDict):
+    """`pose_correction` of metrics.json: means over the training cameras."""
+
+    degrees: float
+    scene_units: float
+    pixels: float
+    unit: str
+
+
+class RunPart(TypedDict):
+    """`run` of metrics.json: what the numbers belong to."""
+
+    iteration: int
+    iterations_planned: int
+    status: str | None
+    gaussians: int
+    seed: int | None
+    threads: int | None
+    started: str | None
+    finished: str | None
+    seconds: float | None
+    peak_memory_bytes: int | None
+    lambda_lap: float | None
+    versions: dict[str, str]
+    machine: MachinePart
+    input: InputPart
+    settings: dict[str, Any]
+
+
+class PicturesPart(TypedDict):
+    """`pictures` of metrics.json: the folder that was measured in place of a run."""
+
+    folder: str
+    pairing: str
+    arrays_sha256: dict[str, str]
+    files: dict[str, str]  # file of every frame
+
+
+class EvaluationRecord(TypedDict):
+    """metrics.json: of a model or of pictures (with `label`)."""
+
+    format: int
+    frames: FramesPart
+    held_out: FramesMeasured
+    training: FramesMeasured
+    temporal_gap: NotRequired[Means]
+    published: NotRequired[list[LabelledMeans]]
+    components: NotRequired[list[LabelledMeans]]  # with one residual left out
+    baselines: dict[str, LabelledFrames]
+    lpips_reason: str | None  # None when LPIPS was computed
+    not_finite: int
+    cross_fade: NotRequired[LabelledFrames]
+    trajectories: NotRequired[MotionPart | None]
+    pose_correction: NotRequired[PosePart | None]
+    measures: NotRequired[dict[str, dict[str, Any]]]
+    label: NotRequired[str]
+    pictures: NotRequired[PicturesPart]
+
+
+class RunEvaluation(EvaluationRecord):
+    """metrics.json of a run."""
+
+    run: RunPart
