@@ -3,6 +3,7 @@
 from typing import Any
 
 from tradeoff_dials import OMITTED
+from tradeoff_presets import judge_presets
 from tradeoff_training_text import best_by_time, gain_by_minute, summary, training_rows
 
 from endotsr.report.tables import markdown
@@ -86,7 +87,7 @@ def _seconds(scene: dict[str, Any], point: dict[str, Any]) -> float:
 def preset_lines(result: dict[str, Any]) -> list[str]:
     """Status of each preset: on the front, or dominated by other settings and kept for a reason."""
     lines = []
-    for name, verdict in result["preset_verdicts"].items():
+    for name, verdict in judge_presets(result["points"], result["presets"]).items():
         better, reason = verdict["dominated_by"], verdict["reason"]
         if not better:
             lines.append(f"`{name}`: nothing measured dominates it.")

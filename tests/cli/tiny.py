@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
-from endotsr.sequences.endonerf import write_endonerf
 from endotsr.simulator.folder import write_sequence
 from endotsr.simulator.scenes import IN_FILES, effects_on
 from endotsr.simulator.settings import SimulatorSettings, with_effects

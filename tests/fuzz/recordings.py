@@ -120,7 +120,7 @@ def rig_seeds() -> list[bytes]:
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.sequences.calibration import read_rig as read
+    from endotsr.sequences.calibrations.stereo_ini import read_rig as read
 
     return read(path)
 

@@ -11,6 +11,7 @@ from common_folder import moving, written
 from test_stereo_depth import slanted_pair, stereo_folder
 
 from data_folder import data_folder
+from endonerf_writer import write_endonerf
 from endotsr.cli.main import main
 from endotsr.config import PAPER, SequenceConfig, config_from_dict
 from endotsr.errors import InputError
@@ -18,7 +19,6 @@ from endotsr.opencv import read_png, write_png
 from endotsr.sequences.checks.check import check_sequence
 from endotsr.sequences.checks.cost import Standing, estimated_cost, work_left
 from endotsr.sequences.checks.guard import MOST, SAID_ALREADY
-from endotsr.sequences.endonerf import write_endonerf
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.layouts import read_sequence
 from endotsr.sequences.sequence_file import FILE_NAME

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from data_folder import data_folder
+from endonerf_writer import write_endonerf
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.sequences.depth_files import clip_depth
-from endotsr.sequences.endonerf import input_hashes, read_endonerf, write_endonerf
+from endotsr.sequences.endonerf import input_hashes, read_endonerf
 from endotsr.sequences.files import check_pairing
 from synthetic_folder import FOCAL, identity_rows, write_synthetic_folder
 

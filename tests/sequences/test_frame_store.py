@@ -7,12 +7,13 @@ import msgspec
 import numpy as np
 import pytest
 
+from endonerf_writer import write_endonerf
 from endotsr.config import DEMO, SequenceConfig
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
 from endotsr.kernels.memory import ASSUMED, Kept, bytes_of, memory_limit
 from endotsr.scene.gaussians import arrays
-from endotsr.sequences.endonerf import read_endonerf, write_endonerf
+from endotsr.sequences.endonerf import read_endonerf
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate

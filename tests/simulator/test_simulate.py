@@ -6,9 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
+from endonerf_writer import write_endonerf
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.sequences.endonerf import read_endonerf, write_endonerf
+from endotsr.sequences.endonerf import read_endonerf
 from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.simulator.sections import Breathing, Pull
 from endotsr.simulator.slit import parting

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
+from tradeoff_presets import KEPT, dominates, judge_presets
 
-from endotsr.tradeoff.front import KEPT, Ranked, dominates, judge_presets, non_dominated
+from endotsr.tradeoff.front import Ranked, non_dominated
 from endotsr.tradeoff.study import run_study
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
@@ -42,7 +43,7 @@ def test_no_preset_is_dominated_without_a_reason(result):
 
 def test_listed_reasons_are_needed(result):
     """A preset that nothing dominates needs no excuse."""
-    verdicts = result["preset_verdicts"]
+    verdicts = judge_presets(result["points"], result["presets"])
     assert {name for name, v in verdicts.items() if v["dominated_by"]} == set(KEPT)
     assert all(v["reason"] is None for v in verdicts.values() if not v["dominated_by"])
 

@@ -16,7 +16,7 @@ class LogEntry(TypedDict, total=False):
     matern_penalty: float
     laplacian: float
     psnr: float | None  # dB, over the tissue of the view; None for a perfect render or without tissue
-    gaussians: int
+    gaussians: Required[int]
     seconds: float
 
 

@@ -1,4 +1,4 @@
-"""Reading and writing EndoNeRF folders.
+"""Reading EndoNeRF folders.
 
     images/*.png     RGB, or *.jpg                    poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
     depth/*.png      z in millimetres, 0 = none; .npy and .tiff too
@@ -12,17 +12,15 @@ an `InputError` of one line that names file, frame and reason. This module does 
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.opencv import write_png
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.assemble import assemble, check_percentiles
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
-from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows, rows_from_cameras
+from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows
 from endotsr.sequences.read_frames import FrameFiles
 from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
@@ -124,27 +122,3 @@ def input_hashes(folder: Path, config: SequenceConfig) -> dict[str, str]:
     """SHA-256 (hex) of every file that `read_endonerf` reads with this configuration, by path inside the folder."""
     files = select_files(folder, config)
     return hash_files(Path(folder), [*files.images, *files.masks, *files.depth, files.poses])
-
-
-def write_endonerf(sequence: Sequence, folder: Path) -> None:
-    """Write a sequence in this layout: images, depth as 16-bit whole millimetres, masks with white = excluded, poses.
-
-    Depth is rounded, to no less than 1 where there is depth. Names become 000000.png, 000001.png, ...
-    Raises:  InputError if the folder already holds images, a depth exceeds 65535, or a camera does not fit the format.
-    """
-    folder = Path(folder)
-    if (folder / "images").exists():
-        raise InputError(f"{folder}: already holds a sequence (images/)")
-    if sequence.depth.max() > 65535:
-        frame = int(sequence.depth.reshape(sequence.count, -1).max(axis=1).argmax())
-        raise InputError(f"{folder}: frame {frame}: depth {sequence.depth.max():g} does not fit into 16 bits")
-    rows = rows_from_cameras(sequence.cameras, sequence.depth.reshape(sequence.count, -1).max(axis=1))
-    for name in ("images", "masks", "depth"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    np.save(folder / "poses_bounds.npy", rows)
-    for i in range(sequence.count):
-        depth = sequence.depth[i]
-        millimetres = np.where(depth > 0, np.maximum(np.rint(depth), 1), 0).astype(np.uint16)
-        write_png(folder / "images" / f"{i:06d}.png", sequence.images[i].transpose(1, 2, 0))
-        write_png(folder / "masks" / f"{i:06d}.png", np.where(sequence.masks[i], 0, 255).astype(np.uint8))
-        write_png(folder / "depth" / f"{i:06d}.png", millimetres)

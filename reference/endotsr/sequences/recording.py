@@ -20,7 +20,6 @@ from endotsr.kernels.arrays import FloatArray
 Picture = NDArray[np.uint8]  # (H, W, 3) RGB
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
-UNITS = (*MILLIMETRES, ARBITRARY)
 
 
 class Lens(NamedTuple):

@@ -89,7 +89,6 @@ COMPARISONS = (
     Contrast("L, fixed count", f"L{FIXED}", f"base{FIXED}"),
     Contrast("all three, fixed count", f"A+S+L{FIXED}", f"base{FIXED}"),
 )  # fmt: skip
-STEPS = COMPARISONS[:3]  # of the paper's cumulative ablation
 
 
 Limits = tuple[float | None, float | None]  # lower and upper

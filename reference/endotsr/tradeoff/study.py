@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.runs.machine import dated
-from endotsr.tradeoff.front import Ranked, judge_presets, non_dominated
+from endotsr.tradeoff.front import Ranked, non_dominated
 from endotsr.tradeoff.measure import Prepared, RenderedFrame, errors, frame, prepare, seconds, terms
 from endotsr.tradeoff.results import FORMAT
 from endotsr.tradeoff.scenes import StudyScene
@@ -97,7 +97,6 @@ def run_study(
         "points": points,
         "joint": plan.joint,
         "presets": plan.presets,
-        "preset_verdicts": judge_presets(points, plan.presets),
         "fronts": {cost: _front(points, {*plan.joint, *plan.presets.values()}, cost) for cost in COSTS},
         "repeats": repeats,
     }

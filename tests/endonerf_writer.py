@@ -1,0 +1,34 @@
+"""A sequence in memory as a folder in the layout of EndoNeRF, for tests that need files."""
+
+from pathlib import Path
+
+import numpy as np
+
+from endotsr.errors import InputError
+from endotsr.opencv import write_png
+from endotsr.sequences.poses import rows_from_cameras
+from endotsr.sequences.sequence import Sequence
+
+
+def write_endonerf(sequence: Sequence, folder: Path) -> None:
+    """Write a sequence in this layout: images, depth as 16-bit whole millimetres, masks with white = excluded, poses.
+
+    Depth is rounded, to no less than 1 where there is depth. Names become 000000.png, 000001.png, ...
+    Raises:  InputError if the folder already holds images, a depth exceeds 65535, or a camera does not fit the format.
+    """
+    folder = Path(folder)
+    if (folder / "images").exists():
+        raise InputError(f"{folder}: already holds a sequence (images/)")
+    if sequence.depth.max() > 65535:
+        frame = int(sequence.depth.reshape(sequence.count, -1).max(axis=1).argmax())
+        raise InputError(f"{folder}: frame {frame}: depth {sequence.depth.max():g} does not fit into 16 bits")
+    rows = rows_from_cameras(sequence.cameras, sequence.depth.reshape(sequence.count, -1).max(axis=1))
+    for name in ("images", "masks", "depth"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    np.save(folder / "poses_bounds.npy", rows)
+    for i in range(sequence.count):
+        depth = sequence.depth[i]
+        millimetres = np.where(depth > 0, np.maximum(np.rint(depth), 1), 0).astype(np.uint16)
+        write_png(folder / "images" / f"{i:06d}.png", sequence.images[i].transpose(1, 2, 0))
+        write_png(folder / "masks" / f"{i:06d}.png", np.where(sequence.masks[i], 0, 255).astype(np.uint8))
+        write_png(folder / "depth" / f"{i:06d}.png", millimetres)
