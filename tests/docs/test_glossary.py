@@ -46,7 +46,10 @@ RESERVED = {
     "band": {"definition", "equations", "stages"},
     "bands": {"definition", "equations", "fitting", "stages"},
     "door": {"golden"},
+    "bridged": {"fitting"},
 }
+# Modules of `fitting` that name moments, which are Adam's; a time between two frames is a bridged time.
+ADAM = {"adam.py", "checkpoint_values.py", "deformation.py"}
 # Whole identifiers: the same letters are right inside `lambda_msp`, `lambda_lap` and `g_lap`.
 FORBIDDEN_NAMES = {
     "msp": "matern_penalty",
@@ -198,3 +201,12 @@ def test_every_class_that_the_glossary_names_exists():
                if isinstance(n, ast.ClassDef)}  # fmt: skip
     named = {name for name in QUOTED.findall(rules) if re.fullmatch(r"([A-Z][a-z]+)+", name)}
     assert {"Frame", "Sequence", "Pose"} <= named <= classes
+
+
+def test_moments_of_a_fit_are_those_of_adam():
+    named = set()
+    for file in (PACKAGE / "fitting").rglob("*.py"):
+        found = identifiers(ast.parse(file.read_text(encoding="utf-8")))
+        if any({"moment", "moments"} & set(name.lower().split("_")) for name in found):
+            named.add(file.name)
+    assert named == ADAM

@@ -59,8 +59,8 @@ def test_a_lowered_limit_changes_no_number_of_a_training(folder):
     assert log == same
     for name, array in here.items():
         np.testing.assert_array_equal(array, there[name])
-    assert len(short.parts) + len(short.moments.stored) < len(shop.parts) + len(shop.moments.stored)
-    assert len(short.parts) <= 1 and len(short.moments.stored) <= 1
+    assert len(short.parts) + len(short.bridged.stored) < len(shop.parts) + len(shop.bridged.stored)
+    assert len(short.parts) <= 1 and len(short.bridged.stored) <= 1
 
 
 def test_values_are_dropped_oldest_first_and_made_again():

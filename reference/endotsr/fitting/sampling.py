@@ -13,12 +13,12 @@ from endotsr.fitting.records import RngState
 from endotsr.sequences.sequence import Sequence
 
 
-class Moment(NamedTuple):
-    """A moment between two training frames that follow one another."""
+class BridgedTime(NamedTuple):
+    """A time between two training frames that follow one another."""
 
     earlier: int  # frame number
     later: int  # frame number
-    fraction: float  # where the moment lies between them, in (0, 1)
+    fraction: float  # where the time lies between them, in (0, 1)
 
 
 class View(NamedTuple):
@@ -26,7 +26,7 @@ class View(NamedTuple):
 
     index: int  # frame number, always one of the training frames; the nearest one to a moment
     t: float  # normalised time at which the scene is rendered
-    moment: Moment | None = None  # compared with the target at this moment; None = with the frame
+    bridged: BridgedTime | None = None  # compared with the target at this time; None = with the frame
 
 
 class Drawn(NamedTuple):
@@ -43,21 +43,21 @@ def drawn_view(rng: np.random.Generator, sequence: Sequence, training: TrainingC
 
 
 def draw_view(rng: np.random.Generator, sequence: Sequence, training: TrainingConfig) -> View:
-    """A training frame, uniform with replacement; with the probability `bridge_fraction` a moment between two (B14).
+    """A training frame, uniform with replacement; with the probability `bridge_fraction` a time between two (B14).
 
     Draws: `rng.random()` if views are bridged, then one `rng.integers`.
     """
     if training.bridge_fraction > 0 and rng.random() < training.bridge_fraction:
-        return _draw_moment(rng, sequence)
+        return _draw_bridged(rng, sequence)
     index = int(sequence.train_index[rng.integers(len(sequence.train_index))])
     return View(index, float(sequence.times[index]))
 
 
-def _draw_moment(rng: np.random.Generator, sequence: Sequence) -> View:
-    """One of the moments between the training frames (B14), uniform. Draws one `rng.integers`.
+def _draw_bridged(rng: np.random.Generator, sequence: Sequence) -> View:
+    """One of the bridged times between the training frames (B14), uniform. Draws one `rng.integers`.
 
-    A gap of g frames has the 2 g - 1 moments k / (2 g): a moment at every frame that is missing and half-way between
-    any two frames. So every gap has its fraction of the draws by its length, and every moment has one target.
+    A gap of g frames has the 2 g - 1 times k / (2 g): a time at every frame that is missing and half-way between
+    any two frames. So every gap has its fraction of the draws by its length, and every time has one target.
     """
     train = sequence.train_index
     gaps = np.diff(train)
@@ -65,7 +65,7 @@ def _draw_moment(rng: np.random.Generator, sequence: Sequence) -> View:
     k = int(rng.integers(last[-1])) if last.size else 0
     gap = int(np.searchsorted(last, k, side="right"))
     place = k - (int(last[gap - 1]) if gap else 0) + 1
-    moment = Moment(int(train[gap]), int(train[gap + 1]), place / (2.0 * gaps[gap]))
-    start, end = (float(sequence.times[i]) for i in moment[:2])
-    nearest = moment.later if moment.fraction > 0.5 else moment.earlier
-    return View(nearest, start + moment.fraction * (end - start), moment)
+    bridged = BridgedTime(int(train[gap]), int(train[gap + 1]), place / (2.0 * gaps[gap]))
+    start, end = (float(sequence.times[i]) for i in bridged[:2])
+    nearest = bridged.later if bridged.fraction > 0.5 else bridged.earlier
+    return View(nearest, start + bridged.fraction * (end - start), bridged)

@@ -16,9 +16,9 @@ import numpy as np
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.fitting.adam import AdamState, Rate, adam_state
+from endotsr.fitting.bridged import BridgedTargets
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
-from endotsr.fitting.moments import Moments
 from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
 from endotsr.fitting.records import CheckpointHeader, RngState
 from endotsr.fitting.sampling import Drawn, View
@@ -66,13 +66,13 @@ class Workshop:
     spectral: Spectral
     extent: float
     parts: Kept[int, TargetParts]  # of the targets, by frame, filled at first use
-    moments: Moments  # between the frames, filled at first use
+    bridged: BridgedTargets  # between the frames, filled at first use
     depth: float = 1.0  # median depth of the tissue, scene units; known where poses are corrected
 
     def observed(self, view: View) -> tuple[Targets, Camera]:
         """What the render of a view is compared with, and the camera that it is seen by."""
-        if view.moment is not None:
-            return self.moments.observed(view.moment)
+        if view.bridged is not None:
+            return self.bridged.observed(view.bridged)
         return self.targets_of(view.index), self.sequence.cameras[view.index]
 
     def column(self, view: View) -> int:
@@ -101,9 +101,9 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     limit = memory_limit(config.sequence.memory) / 4
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
-    moments = Moments(sequence, config, Kept(limit))
+    bridged = BridgedTargets(sequence, config, Kept(limit))
     depth = _depth_of_tissue(sequence) if config.model.pose_correction else 1.0
-    return Workshop(sequence, config, spectral, extent, Kept(limit), moments, depth)
+    return Workshop(sequence, config, spectral, extent, Kept(limit), bridged, depth)
 
 
 def _depth_of_tissue(sequence: Sequence) -> float:

@@ -1,4 +1,4 @@
-"""Moments between the training frames: which are drawn, what is kept of them, and that a training uses them."""
+"""Bridged times between the training frames: which are drawn, what is kept of them, and that a training uses them."""
 
 import itertools
 from collections import Counter
@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from endotsr.config import DEMO, TrainingConfig
-from endotsr.fitting import moments as module
-from endotsr.fitting.moments import STEPS, Moments
+from endotsr.fitting import bridged as module
+from endotsr.fitting.bridged import STEPS, BridgedTargets
 from endotsr.fitting.objective import frame_targets
-from endotsr.fitting.sampling import Moment, draw_view
+from endotsr.fitting.sampling import BridgedTime, draw_view
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
 from endotsr.sequences.between import flows_between, frame_between
@@ -27,27 +27,27 @@ def sequence():
     return simulate(SimulatorSettings(frames=11, width=64, height=48)).sequence
 
 
-def test_every_moment_of_every_gap_is_drawn_alike(sequence):
+def test_every_time_of_every_gap_is_drawn_alike(sequence):
     rng = np.random.default_rng(0)
     views = [draw_view(rng, sequence, FLOW) for _ in range(6000)]
-    found = Counter(view.moment for view in views)
+    found = Counter(view.bridged for view in views)
     train = [int(i) for i in sequence.train_index]
-    wanted = {Moment(a, b, k / (2 * (b - a))) for a, b in itertools.pairwise(train) for k in range(1, 2 * (b - a))}
+    wanted = {BridgedTime(a, b, k / (2 * (b - a))) for a, b in itertools.pairwise(train) for k in range(1, 2 * (b - a))}
     assert set(found) == wanted and len(wanted) == 2 * 3 + 6
     assert all(abs(count - 6000 / len(wanted)) < 5 * np.sqrt(6000 / len(wanted)) for count in found.values())
     for view in views[:200]:
-        assert view.moment is not None and view.index in (view.moment.earlier, view.moment.later)
-        assert view.t == pytest.approx((view.moment.earlier + view.moment.fraction * (view.moment.later -
-                                        view.moment.earlier)) / sequence.count)  # fmt: skip
+        assert view.bridged is not None and view.index in (view.bridged.earlier, view.bridged.later)
+        assert view.t == pytest.approx((view.bridged.earlier + view.bridged.fraction * (view.bridged.later -
+                                        view.bridged.earlier)) / sequence.count)  # fmt: skip
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-def test_the_targets_of_a_moment_are_those_of_the_equation(sequence, precision):
+def test_the_targets_of_a_bridged_time_are_those_of_the_equation(sequence, precision):
     config = msgspec.structs.replace(DEMO, training=msgspec.structs.replace(DEMO.training, precision=precision))
     made = frame_between(sequence, 0, 2, 0.75, flows_between(sequence, 0, 2))
     stored = np.divide(np.rint(made.image * STEPS), STEPS, dtype=precision)
     wanted = frame_targets(made._replace(image=stored, depth=made.depth.astype(precision)), config)
-    found, camera = Moments(sequence, config).observed(Moment(0, 2, 0.75))
+    found, camera = BridgedTargets(sequence, config).observed(BridgedTime(0, 2, 0.75))
     assert np.abs(found.image - np.where(made.mask, made.image, 0)).max() <= 0.51 / STEPS
     assert camera == made.camera and found.image.dtype == precision
     for a, b in zip(flat(found), flat(wanted), strict=True):
@@ -69,13 +69,13 @@ def test_the_flows_of_a_gap_are_computed_once(sequence, monkeypatch):
     asked = []
     real = module.flows_between
     monkeypatch.setattr(module, "flows_between", lambda *rest: asked.append(rest[1:]) or real(*rest))
-    kept = Moments(sequence, DEMO)
+    kept = BridgedTargets(sequence, DEMO)
     for fraction in (0.25, 0.5, 0.75, 0.5):
-        kept.observed(Moment(0, 2, fraction))
+        kept.observed(BridgedTime(0, 2, fraction))
     assert asked == [(0, 2)]
 
 
-def test_a_training_compares_with_the_moments(sequence):
+def test_a_training_compares_with_bridged_times(sequence):
     config = msgspec.structs.replace(
         DEMO,
         training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0, iterations=6),
@@ -83,14 +83,14 @@ def test_a_training_compares_with_the_moments(sequence):
     )
     shop, state = workshop(sequence, config), new_training(sequence, config)
     entries = [training_step(state, shop) for _ in range(4)]
-    assert not len(shop.parts) and len(shop.moments.stored)  # no frame was looked at
+    assert not len(shop.parts) and len(shop.bridged.stored)  # no frame was looked at
     assert all(np.isfinite(entry["loss"]) for entry in entries)
 
 
-def test_without_bridges_no_moment_is_made(sequence):
+def test_without_bridges_no_target_is_made(sequence):
     training = msgspec.structs.replace(DEMO.training, bridge_fraction=0.0)
     config = msgspec.structs.replace(DEMO, training=training)
     shop, state = workshop(sequence, config), new_training(sequence, config)
     for _ in range(4):
         training_step(state, shop)
-    assert not len(shop.moments.stored)
+    assert not len(shop.bridged.stored)
