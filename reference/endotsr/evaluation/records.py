@@ -15,6 +15,8 @@ class MetricValues(TypedDict, total=False):
     psnr_tissue: float | None
     psnr_full_8bit: float | None
     psnr_tissue_8bit: float | None
+    ssim_full_8bit: float | None
+    ssim_tissue_8bit: float | None
     ssim_full: float | None
     ssim_tissue: float | None
     lpips: float | None
