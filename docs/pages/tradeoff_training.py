@@ -127,7 +127,7 @@ def measured(
         at = (seen.cameras[index], float(full.times[index]))
         return render_at(state.gaussians, spectral, config, *at, frames=state.frames).colour
 
-    found = evaluate_frames(full, full.test_index, render, weights).mean
+    found = evaluate_frames(full, full.test_index, render, weights)["mean"]
     return {name: found[name] for name in METRICS}
 
 

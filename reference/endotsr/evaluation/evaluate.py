@@ -10,7 +10,6 @@ count them.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -30,28 +29,9 @@ LPIPS_KEYS: dict[str, InputRange] = {"lpips": "zero_one", "lpips_symmetric": "mi
 EVERY_TRAINING_FRAME = 6  # of the training frames reported beside the held-out ones
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """Metrics of some frames. Values are finite floats or None."""
-
-    per_frame: tuple[FrameMetrics, ...]  # {"frame", "name", "time", metric: value ...}
-    mean: Means  # over the frames that have a value; None if none has
-    excluded: dict[str, int]  # metric -> frames without a value, where there are any
-    not_finite: int  # values that were computed and are not finite
-
-    def as_dict(self) -> FramesMeasured:
-        """Keys `mean`, `per_frame`, `excluded`, `not_finite`, ready for JSON."""
-        return {
-            "mean": self.mean,
-            "per_frame": list(self.per_frame),
-            "excluded": self.excluded,
-            "not_finite": self.not_finite,
-        }
-
-
 def evaluate_frames(
     sequence: Sequence, indices: Iterable[int], render_frame: RenderFrame, lpips_weights: LpipsWeights | None = None
-) -> Evaluation:
+) -> FramesMeasured:
     """Metrics of `render_frame(i)` against frame i, for every i of `indices`.
 
     render_frame    frame number -> (3, H, W) display units; values outside [0, 1] are clipped by the metrics
@@ -59,20 +39,28 @@ def evaluate_frames(
 
     Raises   ValueError naming the frame if a render has another shape than the frame
     """
-    rows, values, bad = [], [], 0
+    rows: list[FrameMetrics] = []
+    bad = 0
     for index in (int(i) for i in indices):
         render, truth, mask = np.asarray(render_frame(index)), unit_image(sequence, index), sequence.masks[index]
         if render.shape != truth.shape:
             raise ValueError(f"frame {index}: the render is {render.shape}, the frame {truth.shape}")
         found = image_metrics(render, truth, mask) | _lpips(render, truth, mask, lpips_weights)
-        values.append({key: _finite(value) for key, value in found.items()})
-        bad += sum(values[-1][key] is None and found[key] is not None for key in found)
+        values = {key: _finite(value) for key, value in found.items()}
+        bad += sum(values[key] is None and found[key] is not None for key in found)
         about = {"frame": index, "name": str(sequence.names[index]), "time": float(sequence.times[index])}
-        rows.append(cast(FrameMetrics, about | values[-1]))
-    summary = mean_metrics(values)
-    keys = list(values[0]) if values else []
+        rows.append(cast(FrameMetrics, about | values))
+    return measured_rows(rows, bad)
+
+
+def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
+    """Frames with the means of their metrics; `not_finite` of their values were computed and are not finite."""
+    keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
+    summary = mean_metrics([{key: row.get(key) for key in keys} for row in rows])
     excluded = {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])}
-    return Evaluation(tuple(rows), {key: summary[key] for key in keys}, excluded, bad)
+    return {
+        "mean": {key: summary[key] for key in keys}, "per_frame": rows, "excluded": excluded, "not_finite": not_finite,
+    }  # fmt: skip
 
 
 def labelled(label: str, measured: FramesMeasured) -> LabelledFrames:
@@ -96,7 +84,7 @@ def baseline_table(
     """
     wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
     return {
-        name: labelled(label, evaluate_frames(sequence, wanted, make(sequence), lpips_weights).as_dict())
+        name: labelled(label, evaluate_frames(sequence, wanted, make(sequence), lpips_weights))
         for name, (label, make) in BASELINES.items()
     }
 
@@ -133,12 +121,12 @@ def evaluate_model(
             "training_sample": chosen,
             "tissue_fraction": float(np.mean(sequence.masks)),
         },
-        "held_out": held_out.as_dict(),
-        "training": inside.as_dict(),
-        "temporal_gap": _difference(inside.mean, held_out.mean),
+        "held_out": held_out,
+        "training": inside,
+        "temporal_gap": _difference(inside["mean"], held_out["mean"]),
         "baselines": baselines,
         "lpips_reason": lpips_obstacle(lpips_weights, *sequence.images.shape[2:]),
-        "not_finite": held_out.not_finite + inside.not_finite + sum(b["not_finite"] for b in baselines.values()),
+        "not_finite": held_out["not_finite"] + inside["not_finite"] + sum(b["not_finite"] for b in baselines.values()),
     }
 
 

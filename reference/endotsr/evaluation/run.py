@@ -164,7 +164,7 @@ def _cross_fade(
         before, after = render(near.before), render(near.after)
         return before + before.dtype.type(near.fraction) * (after - before)
 
-    return labelled(CROSS_FADE, evaluate_frames(sequence, sequence.test_index, blend, weights).as_dict())
+    return labelled(CROSS_FADE, evaluate_frames(sequence, sequence.test_index, blend, weights))
 
 
 def _components(model: Model, sequence: Sequence, render: Render, full: Means) -> list[LabelledMeans]:
@@ -177,7 +177,7 @@ def _components(model: Model, sequence: Sequence, render: Render, full: Means) -
     for name, label in COMPONENTS.items():
         if arrays[name] is not None:
             partial = evaluate_frames(sequence, sequence.test_index, lambda i, n=name: render(i, n).colour)
-            rows.append(cast(LabelledMeans, {"label": f"rendered without {label}", **partial.mean}))
+            rows.append(cast(LabelledMeans, {"label": f"rendered without {label}", **partial["mean"]}))
     return rows
 
 

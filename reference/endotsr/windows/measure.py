@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 
 from endotsr.evaluation.baselines import BASELINES, unit_image
-from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model, labelled
+from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model, labelled, measured_rows
 from endotsr.evaluation.lpips import LpipsWeights
-from endotsr.evaluation.metrics import mean_metrics
 from endotsr.evaluation.records import EvaluationRecord, FramesMeasured
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
@@ -120,16 +119,9 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
 
 
 def _joined_rows(parts: list[FramesMeasured]) -> FramesMeasured:
-    """Evaluations as one: the keys of `Evaluation.as_dict`."""
+    """Evaluations as one."""
     rows = [row for part in parts for row in part["per_frame"]]
-    keys = [key for key in (rows[0] if rows else {}) if key not in ("frame", "name", "time")]
-    summary = mean_metrics([{key: row[key] for key in keys} for row in rows]) if rows else {}
-    return {
-        "mean": {key: summary[key] for key in keys},
-        "per_frame": rows,
-        "excluded": {key: int(count) for key in keys if (count := summary[f"{key}_excluded"])},
-        "not_finite": sum(part["not_finite"] for part in parts),
-    }
+    return measured_rows(rows, sum(part["not_finite"] for part in parts))
 
 
 def _seams(scene: WindowedScene, frames: WindowFrames) -> dict[str, Any]:
