@@ -14,6 +14,7 @@ from endotsr.sweeps.ablation import (
     COMPARISONS,
     CONFIGURATIONS,
     FIXED,
+    RunPair,
     ablation_spec,
     estimate,
     increments,
@@ -37,9 +38,7 @@ def open_row(configuration, seed):
 
 
 def pairs(**groups):
-    return [
-        {"sequence": name, "seed": k, "difference": v} for name, values in groups.items() for k, v in enumerate(values)
-    ]
+    return [RunPair(name, k, v) for name, values in groups.items() for k, v in enumerate(values)]
 
 
 def test_a_difference_is_paired_by_seed():
@@ -49,7 +48,7 @@ def test_a_difference_is_paired_by_seed():
     assert found.comparison.claim == "A beside S" and found.comparison.published == 0.29
     assert found.estimate.mean == pytest.approx(0.3) and found.estimate.median == pytest.approx(0.3)
     assert 0.199 <= found.estimate.mean_low < 0.3 < found.estimate.mean_high <= 0.401
-    assert [p["seed"] for p in found.pairs] == [0, 1, 2]
+    assert [p.seed for p in found.pairs] == [0, 1, 2]
 
 
 def test_sequences_have_equal_weights_whatever_their_seeds():
