@@ -17,7 +17,8 @@ from endotsr.runs import files, machine
 from endotsr.runs import folder as runs
 from endotsr.runs.log import RunLog
 from endotsr.sequences.record import SequenceRecord, read_sequence_record, record_of, recorded
-from endotsr.simulator.settings import CameraMotion, SimulatorSettings
+from endotsr.simulator.sections import CameraMotion
+from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 from endotsr.splatting.camera import Camera
 
