@@ -57,18 +57,19 @@ class RunLog:
 
 def last_iteration(path: Path) -> int:
     """The iteration of the last whole line of a log; 0 without one."""
-    return last_entry(path).get("iteration", 0)
+    entry = last_entry(path)
+    return entry["iteration"] if entry else 0
 
 
-def last_entry(path: Path) -> dict[str, Any]:
-    """The last whole line of a log; empty without one. Only the end of the file is read."""
+def last_entry(path: Path) -> LogEntry | None:
+    """The last whole line of a log; None without one. Only the end of the file is read."""
     try:
         with path.open("rb") as file:
             file.seek(max(file.seek(0, os.SEEK_END) - LONGEST_TAIL, 0))
             lines = file.read(LONGEST_TAIL).splitlines(keepends=True)
     except OSError:
-        return {}
-    return next((entry for line in reversed(lines) if (entry := _entry(line)) is not None), {})
+        return None
+    return next((entry for line in reversed(lines) if (entry := _entry(line)) is not None), None)
 
 
 def _entry(line: bytes) -> LogEntry | None:

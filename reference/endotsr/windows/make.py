@@ -135,7 +135,8 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
         shift = window.first - neighbour.first
         beside = window_folder(run, neighbour)
         start = CarriedStart(str(beside), shift, record.shared(k), saved)
-        own = no_larger(shorter, last_entry(beside / "log.jsonl").get("gaussians"))
+        ended = last_entry(beside / "log.jsonl")
+        own = no_larger(shorter, ended["gaussians"] if ended else None)
     return Job(
         window.name, Path(record.source).name, record.source, "", "window", own.training.seed, own, SimulatorSettings(),
         str(folder), start, measured=False,
