@@ -153,8 +153,9 @@ def verdict(start: str) -> str:
     """The verdict of the claim that starts so, from the page of claims. Raises: InputError if there is none."""
     if not start:
         return "-"
-    rows = [line.strip("| ").split(" | ") for line in CLAIMS.read_text(encoding="utf-8").splitlines()]
-    found = [row[3] for row in rows if row[0].startswith(start) and len(row) == 6]
+    verdicts = CLAIMS.read_text(encoding="utf-8").partition("<!-- claims:verdicts:start -->")[2].partition("<!--")[0]
+    rows = [line.strip("| ").split(" | ") for line in verdicts.splitlines()]
+    found = [row[3] for row in rows if row[0].startswith(start)]
     if not found:
         raise InputError(f"docs/claims.md: no verdict on '{start}'")
     return f"{{doc}}`{found[0].split(':')[0]} <claims>`"
