@@ -109,9 +109,7 @@ assert courses["budget", 1][-1] == courses["budget", 3][-1] == 4000
 assert courses["threshold", 3][-1] > 4 * courses["threshold", 1][-1]
 assert set(np.diff(grown(budget, 1, faded=0.0))) == {300}, "equal steps where nothing is pruned"
 room, steps = 3000.0, []
-for left in range(
-    10, 0, -1
-):  # step (20.3), with 50 Gaussians pruned before every densification
+for left in range(10, 0, -1):  # step (20.3): 50 are pruned before every densification
     steps.append(room / left)
     room += 50 - steps[-1]
 np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
@@ -167,7 +165,7 @@ assert (small.height, small.width) == (48, 64) and small.cameras[0].width == 64
 
 
 def smoothness(depth, tissue=True):
-    """(B9) without edges: the squared steps of a picture of tissue, or the total variation of an instrument."""
+    """(B9) without edges: squared steps if all is tissue, else the total variation."""
     mask, edges = np.full(depth.shape, tissue), np.zeros(depth.shape, bool)
     return smoothness_forward(
         depth, np.zeros((3, *depth.shape)), mask, edges, float(not tissue)
