@@ -21,6 +21,7 @@ def cases() -> list[Spec]:
         ("even", "An even number of views: the mean of the middle two", ("calibration_lower_median",)),
         ("dead_view", "A view without photometric gradient is dropped", ("calibration_keeps_dead_view",)),
         ("all_dead", "No valid view: refused, not infinite", ("calibration_of_nothing",)),
+        ("zero_ratio", "A view whose Laplacian gradient is 0 counts with the ratio 0", ()),
     ):  # fmt: skip
         seeds = Seeds("calibration", case)
         views = 4 if case == "even" else 5
@@ -33,6 +34,8 @@ def cases() -> list[Spec]:
             rgb = changed(rgb, 1, 0.0, "view 1 is 0")
         if case == "all_dead":
             rgb = changed(rgb, ..., 0.0, "all 0")
+        if case == "zero_ratio":
+            laplacian = changed(laplacian, 2, 0.0, "view 2 is 0")
         inputs = {"d_photometric": rgb, "d_laplacian": laplacian}
         own = ("lambda_lap",) if case == "all_dead" else ()
         settings = {"gradient_ratio": 0.25}
@@ -66,7 +69,7 @@ WRONG_PORTS = [
         "Ratio of the gradients inverted",
         "g_rgb / g_lap; right: g_lap / g_rgb",
         BOTH,
-        edit(SOURCE, RATIOS, "ratios.append(view.photometric / view.laplacian)"),
+        edit(SOURCE, RATIOS, "ratios.append(view.photometric / max(view.laplacian, 1e-300))"),
     ),
     port(
         "calibration_over_tissue",

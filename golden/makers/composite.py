@@ -49,18 +49,20 @@ def _opaque_exact() -> Spec:
                 ("divide_by_one_minus_alpha",), raster_settings(EXACT), inputs, without=("d_background",))  # fmt: skip
 
 
-def _tile_ends() -> Spec:
-    """Discs whose radius or centre puts the end of their tiles between the right rule and a wrong one."""
-    seeds, (width, height) = Seeds("composite", "tiles"), (48, 20)
+def _tile_case(
+    case: str, title: str, flags: tuple[str, ...], u: list[float], v: list[float], size: list[float]
+) -> Spec:
+    """Three discs in preset legacy, with their centres and the variances of their axes."""
+    seeds, (width, height) = Seeds("composite", case), (48, 20)
     shapes = {
         "d_colour_image": (3, height, width),
         "d_depth_image": (height, width),
         "d_opacity_image": (height, width),
     }
-    size = [99.9, 99.9, 4.0]
+    centres = ", ".join(f"({x:g}, {y:g})" for x, y in zip(u, v, strict=True))
     inputs = {
-        "mean2d": given([[46.75, 47.25, 24.3], [8.2, 11.7, 10.25]], "(46.75, 8.2), (47.25, 11.7), (24.3, 10.25)", "px"),
-        "covariance2d": given([size, [0.0] * 3, size], "a = c = 99.9, 99.9, 4; b = 0", "px^2"),
+        "mean2d": given([u, v], centres, "px"),
+        "covariance2d": given([size, [0.0] * 3, size], f"a = c = {', '.join(f'{a:g}' for a in size)}; b = 0", "px^2"),
         "opacity_logit": logit_of([0.95, 0.9, 0.97]),
         "colour": seeds.uniform("colour", 0.1, 1.0, 3, 3, unit="display"),
         "depth": given([5.0, 4.0, 3.0], "5, 4, 3", "scene unit"),
@@ -68,14 +70,26 @@ def _tile_ends() -> Spec:
         **{name: seeds.uniform(name, -1.0, 1.0, *shape) for name, shape in shapes.items()},
     }
     settings = raster_settings(LEGACY) | {"width": width, "height": height}
-    return Spec("composite", "tiles", "composite", "Where the tiles of a Gaussian end: centre less half a pixel, the "
-                "root at least 0.1", ("tiles_from_the_mean", "tiles_root_without_floor", "tiles_unbounded"),
-                settings, inputs)  # fmt: skip
+    return Spec("composite", case, "composite", title, flags, settings, inputs)
+
+
+def _tile_ends() -> list[Spec]:
+    """Discs whose radius or centre puts the end of their tiles between the right rule and a wrong one.
+
+    3 sqrt(2.458 + sqrt(0.1)) is 4.997: a larger number under the inner root makes the radius 6 in place of 5.
+    """
+    flags = ("tiles_from_the_mean", "tiles_root_without_floor", "tiles_unbounded")
+    ends = "Where the tiles of a Gaussian end: centre less half a pixel, the root at least 0.1"
+    return [
+        _tile_case("tiles", ends, flags, [46.75, 47.25, 24.3], [8.2, 11.7, 10.25], [99.9, 99.9, 4.0]),
+        _tile_case("tile_root", "A disc whose radius is just below 5: no more than 0.1 stands under the root",
+                   ("tiles_unbounded",), [12.0, 30.0, 28.0], [10.2, 9.4, 6.5], [2.458, 9.0, 30.0]),
+    ]  # fmt: skip
 
 
 def cases() -> list[Spec]:
     """The three presets, equal depths, opaque Gaussians, the ends of tiles."""
-    return [*(_preset(name) for name in PRESETS), _equal_depths(), _opaque_exact(), _tile_ends()]
+    return [*(_preset(name) for name in PRESETS), _equal_depths(), _opaque_exact(), *_tile_ends()]
 
 
 # ---- mistakes ----

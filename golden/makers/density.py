@@ -261,6 +261,13 @@ WRONG_PORTS = [
         edit(SOURCE, "astype(np.float64) < bound", "astype(np.float64) <= bound"),
     ),
     port(
+        "candidates_above_the_threshold",
+        "No candidate on the gradient threshold",
+        "> for >=; right: >=",
+        "density",
+        edit(SOURCE, "steepness >= config.gradient_threshold", "steepness > config.gradient_threshold"),
+    ),
+    port(
         "split_at_the_limit",
         "Split on the size limit",
         ">=; right: >",

@@ -43,7 +43,7 @@ def _atoms(
 
 
 def cases() -> list[Spec]:
-    """Frequencies, atoms of one time, and normalised atoms; the last case repeats stamps."""
+    """Frequencies, atoms of one time, and normalised atoms; the last cases repeat stamps and have a slow atom."""
     turns = given([1.0, 2.0, 3.0, 8.0, 16.0], "1, 2, 3, 8, 16", "cycles")
     octaves = given([1.0, 4.0, 16.0], "1, 4, 16", "cycles per sequence")
     repeated = np.arange(16) // np.array([1, 2])[np.arange(16) % 2] / 16
@@ -61,6 +61,9 @@ def cases() -> list[Spec]:
         _atoms("repeated_stamps", given(repeated, "k / 16 for even k, floor(k / 2) / 16 for odd k"),
                given(np.arange(16), "all", "frame"), omegas(3, 5.0), "A stamp that is repeated counts once",
                ("repeated_stamps_counted",), ("times",)),
+        _atoms("slow_atom", stamps(24), train_index(24),
+               given([2.0**-13, 0.5, 4.0], "2^-13, 1/2, 4", "cycles per sequence"),
+               "A sine with an RMS of 2e-4 is alive, the cosine beside it is dead", ()),
     ]  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Family `exposure`: equation (B13), gain and bias of each colour channel of one frame.
 
-Colours, logarithmic gains, biases and a gradient by the exposed colours come in. The gains lie on both sides of 1, and
-colours leave the range [0, 1], so that a clamp shows.
+Colours, logarithmic gains, biases and a gradient by the exposed colours come in. The gains lie on both sides of 1. One
+case has exposed colours below 0 and the other has them above 1, so that a clamp at either end shows.
 """
 
 from makers.making import Seeds, Spec
@@ -11,7 +11,23 @@ OPERATIONS = ("exposure",)
 
 
 def cases() -> list[Spec]:
-    """A generic exposure, with colours below 0 and above 1."""
+    """A generic exposure, with exposed colours below 0, and a bright one, with most of them above 1."""
+    return [_generic(), _bright()]
+
+
+def _bright() -> Spec:
+    seeds = Seeds("exposure", "bright")
+    inputs = {
+        "colour": seeds.uniform("colour", 0.25, 1.75, 3, 5, 7, unit="display"),
+        "log_gain": seeds.uniform("log_gain", -0.125, 0.75, 3),
+        "bias": seeds.uniform("bias", 0.0625, 0.25, 3, unit="display"),
+        "d_exposed": seeds.uniform("d_exposed", -1.0, 1.0, 3, 5, 7),
+    }
+    flags = ("exposure_clamped",)
+    return Spec("exposure", "bright", "exposure", "Exposed colours above 1 stay what they are", flags, {}, inputs)
+
+
+def _generic() -> Spec:
     seeds = Seeds("exposure", "generic")
     inputs = {
         "colour": seeds.uniform("colour", -0.25, 1.25, 3, 6, 8, unit="display"),
@@ -21,7 +37,7 @@ def cases() -> list[Spec]:
     }
     flags = ("gain_not_exponential", "bias_before_gain", "exposure_clamped", "log_gain_gradient_by_gain")
     title = "exp(log_gain) colour + bias, not clamped"
-    return [Spec("exposure", "generic", "exposure", title, flags, {}, inputs)]
+    return Spec("exposure", "generic", "exposure", title, flags, {}, inputs)
 
 
 # ---- mistakes ----

@@ -25,23 +25,26 @@ OPERATIONS = ("appearance", "pose", "composite", "deformation", "density", "trai
 
 
 def _deep_saturation() -> Spec:
-    """Whole columns with |x| from 10 to 30; the gradients that come in are as large as the slopes are small."""
+    """Whole columns with |x| from 20 to 30; the gradients that come in are as large as the slopes are small.
+
+    From 20 on tanh is 1 in both precisions, so that 1 - tanh^2 is 0 in every port.
+    """
     seeds = Seeds("appearance", "deep_saturation")
-    size = np.linspace(10.0, 30.0, 7)
+    size = np.linspace(20.0, 30.0, 7)
     sign = np.where((np.arange(21) % 2).reshape(3, 7) > 0, -1.0, 1.0)
     first = sign * size
     second = seeds.uniform("colour_coefficients", -0.5, 0.5, 3, 7)
     d = seeds.uniform("d_residual", 0.5, 1.0, 3, 7)
     power = np.round(2 * size / np.log(2.0))
     coefficients = given(np.stack([first, second.array], axis=1),
-                         "[:, 0] is 10 + 10 n / 3, negated where 7 c + n is odd; [:, 1] is "
+                         "[:, 0] is 20 + 5 n / 3, negated where 7 c + n is odd; [:, 1] is "
                          + second.recipe)  # fmt: skip
     inputs = {
         "appearance_coefficients": coefficients,
         "phi_bar": given([1.0, 0.25], "1, 1/4"),
-        "d_residual": changed(d, ..., d.array * 2.0**power, "times 2^round(2 |x| / ln 2) with |x| = 10 + 10 n / 3"),
+        "d_residual": changed(d, ..., d.array * 2.0**power, "times 2^round(2 |x| / ln 2) with |x| = 20 + 5 n / 3"),
     }
-    return Spec("appearance", "deep_saturation", "appearance", "Columns with |x| from 10 to 30 keep their derivative",
+    return Spec("appearance", "deep_saturation", "appearance", "Columns with |x| from 20 to 30 keep their derivative",
                 ("tanh_slope_cancels",), {"beta": 0.3}, inputs)  # fmt: skip
 
 

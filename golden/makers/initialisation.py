@@ -60,6 +60,9 @@ def cases() -> list[Spec]:
     long = frames(Seeds("initialisation", "long_clip"), 152, [*range(1, 8), 150, 151])
     kept = long["masks"].array & (np.arange(30).reshape(5, 6) % 7 == 0)
     long["masks"] = given(kept, f"{long['masks'].recipe} and (6 y + x) % 7 = 0")
+    longest = frames(Seeds("initialisation", "clip_of_150"), 150, [1, 2, 3, 5, 149])
+    kept = longest["masks"].array & (np.arange(30).reshape(5, 6) % 7 == 0)
+    longest["masks"] = given(kept, f"{longest['masks'].recipe} and (6 y + x) % 7 = 0")
     flags = ("backprojected_at_corner", "initialised_from_test_frames", "moved_pixels_ignored", "holes_initialised",
              "points_left_in_camera", "mean_distance_for_scale", "neighbours_count_itself",
              "initial_colour_without_y00", "initial_opacity_as_logit")  # fmt: skip
@@ -67,6 +70,7 @@ def cases() -> list[Spec]:
     return [
         spec("frames", "Depth maps of three training frames of six, lifted with their own cameras", flags, short),
         spec("long_clip", "Of 152 frames every second one is visited", ("long_clip_every_frame",), long),
+        spec("clip_of_150", "Of 150 frames every one is visited", (), longest),
         spec("one_point", "A single point: the floor of the scale", ("single_point_without_floor",), one),
     ]  # fmt: skip
 

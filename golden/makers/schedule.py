@@ -155,6 +155,7 @@ WRONG_PORTS = [
         "i - 1; right: i",
         BOTH,
         edit(SOURCE, "(iteration - config.loss.laplacian_from) /", "(iteration - 1 - config.loss.laplacian_from) /"),
+        edit(SOURCE, "iteration >= config.loss.laplacian_full", "iteration > config.loss.laplacian_full"),
     ),
     port(
         "statistics_from_start",

@@ -9,7 +9,17 @@ from pathlib import Path
 import msgspec
 
 from endotsr.errors import InputError
-from endotsr.golden.judge.format import Precision, Request, RequestOutput, Requests, read_struct, to_json
+from endotsr.golden.judge.about import axes_of, page_of
+from endotsr.golden.judge.format import (
+    Case,
+    Precision,
+    Request,
+    RequestInput,
+    RequestOutput,
+    Requests,
+    read_struct,
+    to_json,
+)
 from endotsr.golden.judge.npy import write_npy
 from endotsr.golden.judge.store import Golden
 
@@ -46,15 +56,7 @@ def write_requests(golden: Golden, folder: Path, precision: Precision, level: in
         root = folder / case.family / case.case
         for array in case.inputs.values():
             write_npy(root / array.file, golden.array(case, array.file))
-        outputs = {
-            name: RequestOutput(level=o.level, unit=o.unit, dtype=o.dtype, shape=o.shape)
-            for name, o in case.outputs.items()
-            if o.level <= level
-        }
-        request = Request(
-            family=case.family, case=case.case, operation=case.operation, settings=case.settings,
-            inputs={name: array.file for name, array in case.inputs.items()}, outputs=outputs,
-        )  # fmt: skip
+        request = _request(case, level)
         root.mkdir(parents=True, exist_ok=True)
         (root / "request.json").write_text(to_json(request), encoding="utf-8", newline="\n")
     head = Requests(
@@ -63,6 +65,21 @@ def write_requests(golden: Golden, folder: Path, precision: Precision, level: in
     )  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "requests.json").write_text(to_json(head), encoding="utf-8", newline="\n")
+
+
+def _request(case: Case, level: int) -> Request:
+    """A case without its answers, with the outputs up to a level."""
+    about = {name: RequestInput(unit=a.unit, axes=axes_of(name, len(a.shape))) for name, a in case.inputs.items()}
+    outputs = {
+        name: RequestOutput(level=o.level, unit=o.unit, axes=axes_of(name, len(o.shape)), dtype=o.dtype, shape=o.shape)
+        for name, o in case.outputs.items()
+        if o.level <= level
+    }
+    return Request(
+        family=case.family, case=case.case, operation=case.operation, equation=case.equation,
+        page=page_of(case.equation), settings=case.settings,
+        inputs={name: array.file for name, array in case.inputs.items()}, about=about, outputs=outputs,
+    )  # fmt: skip
 
 
 def refuse_command(command: str) -> None:

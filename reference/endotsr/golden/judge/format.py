@@ -201,11 +201,21 @@ class Manifest(_Strict, frozen=True, kw_only=True):
                 file_name(name, "families")
 
 
+class RequestInput(_Strict, frozen=True, kw_only=True):
+    """What an input is."""
+
+    unit: str
+    """"display / 255": the numbers run to 255, and a colour in display units is the number / 255"""
+    axes: str
+    """names of the axes, from the outside in"""
+
+
 class RequestOutput(_Strict, frozen=True, kw_only=True):
     """What is asked for."""
 
     level: Level
     unit: str
+    axes: str
     dtype: Literal["real", "integer", "boolean"]
     shape: tuple[int, ...]
 
@@ -216,8 +226,13 @@ class Request(_Strict, frozen=True, kw_only=True):
     family: str
     case: str
     operation: str
+    equation: str
+    page: str
+    """of the equation, in the repository"""
     settings: dict[str, Any]
     inputs: dict[str, str]
+    about: dict[str, RequestInput]
+    """what each input is"""
     outputs: dict[str, RequestOutput]
 
     def __post_init__(self) -> None:

@@ -1,0 +1,40 @@
+"""How often the judge recognises a mistake that is on no list: part of docs/guides/port.md, made by
+
+    python docs/pages/unseen.py
+
+The counts are those of `python tests/golden/unseen/by_hand/measure.py --record now`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from effects_parts import machine
+from marks import read_json, write_marked
+
+from endotsr.report.tables import markdown
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "guides" / "port.md"
+FILE = ROOT / "tests" / "golden" / "unseen" / "by_hand" / "record.json"
+MADE_BY = "python tests/golden/unseen/by_hand/measure.py --record now"
+
+
+def fragments(runs: dict[str, Any]) -> dict[str, str]:
+    """The rates of every run of the record, with their intervals."""
+    titles = {"before": "when the set was written", "now": "now"}
+    names = [name for name in titles if name in runs]
+    last = runs[names[-1]]
+    rows = [(what, *(_share(runs[name]["rates"][what]) for name in names)) for what in last["rates"]]
+    table = markdown(("Of mistakes that are on no list", *(titles[name] for name in names)), rows)
+    note = f"Version {last['golden']}, {last['rates']['refused'][1]} mistakes, float64 ({machine(last)})."
+    return {"rates": f"{table}\n\n{note}"}
+
+
+def _share(rate: list[float]) -> str:
+    """Per cent with the interval of 95 %."""
+    good, of, low, high = rate
+    return f"{100 * good / of:.1f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+if __name__ == "__main__":
+    write_marked(PAGE, fragments(read_json(FILE, MADE_BY)), "unseen")
