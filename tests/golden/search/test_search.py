@@ -5,7 +5,16 @@ import time
 import numpy as np
 import pytest
 
-from endotsr.definition import covariance, density_control, dictionary, masked_l1, masked_ssim, matern, motion
+from endotsr.definition import (
+    appearance,
+    covariance,
+    density_control,
+    dictionary,
+    masked_l1,
+    masked_ssim,
+    matern,
+    motion,
+)
 from endotsr.golden.judge.diagnose import PARTS, made_of
 from endotsr.golden.judge.npy import write_npy
 from endotsr.golden.judge.store import golden_folder, in_precision, read_golden
@@ -54,6 +63,7 @@ PATCHED = [
     (matern, "matern_weights"),
     (motion, "motion_forward"),
     (motion, "motion_reverse"),
+    (appearance, "appearance_reverse"),
 ]
 RIGHT = [(module, name, getattr(module, name)) for module, name in PATCHED]
 
@@ -157,6 +167,40 @@ def test_gradients_that_are_wrong_otherwise_are_told(golden, tmp_path, monkeypat
     said = causes(golden, tmp_path, "motion")
     assert line_of(motion, 'np.einsum("dkn,k->dn"') in said and "equation (3)" in said
     assert "every forward output; the gradients of the port are wrong in another way," in said
+
+
+def test_a_mistake_of_some_cases_alone_is_said_to_be_of_these(golden, tmp_path, monkeypatch):
+    """The gradient for 8 frequencies is right, that for 4, in two cases, has the opposite sign."""
+    _, _, reverse = RIGHT[6]
+    monkeypatch.setattr(
+        matern, "matern_penalty_reverse", lambda d, saved: reverse(d, saved) * (1 if saved.rho.size == 8 else -1)
+    )
+    said = causes(golden, tmp_path, "matern")
+    assert "every output of those that are refused; it would be wrong in others that pass" in said
+
+
+def test_what_would_spoil_a_case_that_passes_is_no_explanation_of_two_passes(golden, tmp_path, monkeypatch):
+    """As above, in both passes: the gradients are the derivatives, but the third case is right."""
+    (_, _, forward), (_, _, reverse) = RIGHT[5:7]
+    signs = {4: -1, 8: 1}
+    wrong = lambda c, rho: (signs[rho.size] * forward(c, rho)[0], forward(c, rho)[1])
+    monkeypatch.setattr(matern, "matern_penalty_forward", wrong)
+    monkeypatch.setattr(matern, "matern_penalty_reverse", lambda d, saved: signs[saved.rho.size] * reverse(d, saved))
+    said = causes(golden, tmp_path, "matern")
+    assert "it would be wrong in others that pass" in said and "are the derivatives" not in said
+
+
+def test_a_gradient_that_is_wrong_by_orders_of_magnitude_is_explained(golden, tmp_path, monkeypatch):
+    """A missing 1 / cosh^2 far out, where it is 1e-27."""
+
+    def without_slope(d_residual, saved):
+        a, phi_bar, beta = saved
+        d_x = beta / appearance.Y00 * d_residual
+        return appearance.AppearanceGrads(np.einsum("cn,k->ckn", d_x, phi_bar), np.einsum("cn,ckn->k", d_x, a))
+
+    monkeypatch.setattr(appearance, "appearance_reverse", without_slope)
+    said = causes(golden, tmp_path, "appearance")
+    assert "with `beta / Y00` where `beta / Y00 * (1 / np.cosh(" in said and "every output of its 5 cases" in said
 
 
 def test_a_number_that_fits_few_numbers_is_not_believed(golden, tmp_path):

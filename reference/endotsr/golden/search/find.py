@@ -37,6 +37,7 @@ MOST_VALUES = 64  # of an expression, that are looked at
 WHOLE = {
     "all": "every output",
     "derivative": "every forward output, of which the gradients of the port are the derivatives,",
+    "refused": "every output of those that are refused; it would be wrong in others that pass,",
     "forward": "every forward output; the gradients of the port are wrong in another way,",
 }
 """What a change explains, the most first."""
@@ -75,6 +76,7 @@ class Search:
         first = answered[0]
         real = [name for name in sorted(first.refused) if first.case.outputs[name].dtype == "real"]
         self.real = [name for name in real if name in first.ahead] or real  # that a number is sought by
+        self.refusals = [one.refused for one in answered]
         self.wrong = sum(one.wrong(one.ahead + one.back) for one in answered)
         self.wrong_ahead = sum(one.wrong(one.ahead) for one in answered)
         self.ahead = any(one.refused & set(one.ahead) for one in answered)  # a forward output is refused
@@ -89,23 +91,33 @@ class Search:
         """How much of all cases a change explains: a key of WHOLE, or "" for nothing."""
         self.tried += 1
         gradients: list[bool | None] = []  # of cases whose gradients are not those of the definition with the change
+        spoils = False  # a case that passed
         for one in self.cases:
+            if spoils:
+                break
             inputs, settings = request.ask(one.inputs, one.settings) if request else (one.inputs, one.settings)
             found, saved = one.right, one.saved
             if mode != "reverse":
                 with _installed(install):
                     found, saved = one.forward(self.stage, inputs, settings)
-            if not one.same(request.tell(found) if request else found, one.ahead):
+            same = one.same(request.tell(found) if request else found, one.ahead)
+            if not same and one.refused:
                 return ""
-            if one.back and False not in gradients:
+            if same and one.back and False not in gradients and (one.refused or not gradients):
                 with _installed(install if mode != "forward" else None):
                     back = one.reverse(self.stage, inputs, saved)
-                if not one.same(request.tell(back) if request else back, one.back):
+                same = one.same(request.tell(back) if request else back, one.back)
+                if not same and one.refused:
                     if mode == "reverse" or not self.ahead:
                         return ""
                     with _installed(install):
                         gradients.append(one.is_derivative(self.stage))
-        return "all" if not gradients else "derivative" if True in gradients and False not in gradients else "forward"
+            spoils = spoils or (not same and not one.refused)
+        if gradients and spoils:
+            return ""
+        if gradients:
+            return "derivative" if True in gradients and False not in gradients else "forward"
+        return "refused" if spoils else "all"
 
     def outputs(self, install: Install | None, mode: str, request: Request | None = None) -> Outputs:
         """All outputs of the first case with a change."""
@@ -137,11 +149,12 @@ class Search:
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
         """Keep a change that fits."""
-        if whole and (whole != "forward" or self.wrong_ahead >= TELLING):
+        enough = {"forward": self.wrong_ahead, "refused": self.wrong if sum(map(bool, self.refusals)) > 1 else 0}
+        if whole and enough.get(whole, TELLING) >= TELLING:
             if spot and not self.ahead and spot.place.phases == {"forward"}:
                 rank = (rank[0] + 1, *rank[1:])  # what is refused is computed elsewhere
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
-            self.hits.append(Hit(text, where, function, whole, (int(whole == "forward"), *rank, len(self.hits))))
+            self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
 
     def modes(self, place: Place) -> list[str]:
         """The phases in which a change of a place can make what is refused."""
