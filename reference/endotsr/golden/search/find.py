@@ -76,6 +76,8 @@ class Search:
         first = answered[0]
         real = [name for name in sorted(first.refused) if first.case.outputs[name].dtype == "real"]
         self.real = [name for name in real if name in first.ahead] or real  # that a number is sought by
+        # decisions are refused: other numbers may well make the same ones
+        self.discrete = any(one.case.outputs[name].dtype != "real" for one in answered for name in one.refused)
         self.refusals = [one.refused for one in answered]
         self.wrong = sum(one.wrong(one.ahead + one.back) for one in answered)
         self.wrong_ahead = sum(one.wrong(one.ahead) for one in answered)
@@ -214,7 +216,7 @@ def _places(search: Search, places: Sequence[Place]) -> None:
     """Changes of some places: numbers, then other texts, then other names."""
     live = _numbers(search, places)
     for texts, rank in ((_texts, 1), (_names, 2)):
-        lines = {hit.where for hit in search.hits if hit.rank[:2] < (0, 2)}
+        lines = {hit.where for hit in search.hits if hit.rank[:2] < (0, 2) and not search.discrete}
         for one in live:  # once something is found, the rest of its line is tried
             if not lines or one.spot.place.where(one.spot.node) in lines:
                 _try(search, one, texts(one), rank)
@@ -289,7 +291,7 @@ def _solved(search: Search, spot: Spot, mode: str, values: list[Any]) -> int:
                 if whole := search.fits(install, mode):
                     rank = 2 if isinstance(spot.node, ast.Constant) else 3
                     said = _replaced(spot, mode, said_number(spot.node, rest, value))
-                    search.note(whole, said, spot, 1 if plain else 3, rank)
+                    search.note(whole, said, spot, 1 + search.discrete if plain else 3, rank)
                     break
     return late
 
@@ -306,13 +308,16 @@ def _names(one: Live) -> Iterator[tuple[str, int]]:
 
 
 def _try(search: Search, one: Live, texts: Iterator[tuple[str, int]], rank: int) -> None:
+    less_likely = search.discrete and isinstance(one.spot.node, ast.Constant)
     for text, less in texts:
         if search.over:
             return
         with contextlib.suppress(Exception):
             with written(one.spot, text):
                 install = one.spot.place.compiled()
-            search.note(search.fits(install, one.mode), _replaced(one.spot, one.mode, text), one.spot, rank, less)
+            search.note(
+                search.fits(install, one.mode), _replaced(one.spot, one.mode, text), one.spot, rank, less + less_likely
+            )
 
 
 def _replaced(spot: Spot, mode: str, new: str) -> str:

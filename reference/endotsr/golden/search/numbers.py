@@ -10,6 +10,7 @@ from endotsr.golden.judge.relate import KNOWN, number_text
 
 START = 1e-4  # first step from the number that changes nothing, as a part of it
 STEPS = 6
+NOTHING = 1e-4  # a factor that may be 0, where outputs are rounded to float32
 LEFT = 0.02  # part of the first distance that must not be left
 
 
@@ -47,6 +48,7 @@ def plain_first(number: float) -> list[tuple[float, bool]]:
     known = [sign * value for value in KNOWN.values() for sign in (1, -1)] + [round(number * 12) / 12]
     known += [float(f"{number:.{digits}g}") for digits in (1, 2)]
     near = [value for value in dict.fromkeys(known) if value != number and abs(value - number) <= 1e-3 * abs(number)]
+    near = [0.0] if abs(number) < NOTHING else near
     return [*((value, True) for value in sorted(near, key=lambda value: abs(value - number))[:3]), (number, False)]
 
 

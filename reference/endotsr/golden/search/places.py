@@ -11,7 +11,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 ROOM = "endotsr.definition"
-EQUATION = re.compile(r"\((B?M?\d+b?)\)")  # in the docstring of a function
+EQUATION = re.compile(r"(?:quation|quations|everse of) \((B?M?\d+b?)\)")  # in the docstring of a function
 WHOLE_FILE = re.compile(r"Equation \((B?M?\d+b?)\)")  # at the start of the docstring of a file
 STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a line
 
