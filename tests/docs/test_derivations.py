@@ -7,13 +7,21 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "reference/endotsr"
-OPTIONS = ("sequences/between", "sequences/tracks", "sequences/smaller", "scene/tracked_motion", "fitting/coarse_start")
+OPTIONS = (
+    "sequences/between",
+    "sequences/tracks",
+    "sequences/smaller",
+    "scene/tracked_motion",
+    "fitting/coarse_start",
+    "windows/scene",
+    "windows/carry",
+)
 FILES = [*sorted((SOURCE / "definition").glob("*.py")), *(SOURCE / f"{name}.py" for name in OPTIONS)]
 DEFINITION = "\n".join(file.read_text("utf-8") for file in FILES)
 NOTEBOOKS = {int(f.stem[:2]): f.read_text("utf-8") for f in sorted((ROOT / "notebooks").glob("*.py"))}
 STEP = re.compile(r"^# \*\*\((\d+)\.(\d+)\)", re.MULTILINE)
 CITATION = re.compile(r"\((\d+)\.(\d+)\)")
-DERIVED = [3, 5, 6, 7, 8, 10, 18, 19, 20]
+DERIVED = [3, 5, 6, 7, 8, 10, 18, 19, 20, 21]
 NO_LINE = {
     (5, 7): "says why two forms agree",
     (6, 5): "of the kernel alone: the definition does not go through the footprint",
@@ -25,6 +33,8 @@ NO_LINE = {
     (10, 3): "leads to (10.4) to (10.6)",
     (19, 6): "leads to (19.7)",
     (20, 2): "says what follows from (20.1)",
+    (21, 2): "says what follows from (21.1)",
+    (21, 3): "says what the blend does to independent errors",
 }
 
 

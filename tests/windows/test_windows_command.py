@@ -85,7 +85,7 @@ def test_frames_without_tissue_and_a_cut_are_one_line_each(tmp_path, capsys):
     for line in (
         "left out: frames 30:42: tissue on less than 1% of the pixels\n",
         "window 001: frames 42:72, cold start, behind frame 41, which is left out\n",
-        "window 002: frames 72:104, cold start, cut: the picture changes",
+        "window 002: frames 72:96, cold start, cut: the picture changes",
     ):
         assert said.count(line) == 1, said
     assert said.count("30:42") == said.count("cut:") == 1

@@ -130,7 +130,7 @@ def _canonical(neighbour: Neighbour, frame: int, config: Config, dtype: Any) -> 
     scene, _ = scene_at(model.gaussians, model.spectral, model.config.model, neighbour.times[frame + neighbour.shift])
     harmonics = scene.harmonics.copy()
     if scene.residual is not None:
-        harmonics[0] += scene.residual
+        harmonics[0] += scene.residual  # (21.4)
     start = gaussians_at(scene.position.astype(np.float64), np.zeros((3, model.gaussians.count)), config.model, dtype)
     return start._replace(
         position=np.ascontiguousarray(scene.position, dtype),
@@ -168,10 +168,11 @@ def _with_motion(gaussians: Gaussians, sequence: Sequence, place: int, spectral:
     tracks = follow(sequence, np.full(gaussians.count, place, np.intp), surface)
     position = tracks.position + (gaussians.position - surface)[None].astype(np.float32)
     times = sequence.times[sequence.train_index].astype(np.float64)
-    moving = with_tracked_motion(gaussians, times, position, tracks.followed, spectral.omega, spectral.rho)
+    moving = with_tracked_motion(gaussians, times, position, tracks.followed, spectral.omega, spectral.rho)  # (21.5)
     assert moving.motion_coefficients is not None
     phi = dictionary_forward(float(sequence.times[frame]), spectral.omega)[0].astype(gaussians.position.dtype)
-    return moving._replace(position=gaussians.position - motion_forward(moving.motion_coefficients, phi)[0])
+    at_rest = gaussians.position - motion_forward(moving.motion_coefficients, phi)[0]  # (21.5), (21.6)
+    return moving._replace(position=at_rest)
 
 
 def _surface(position: FloatArray, sequence: Sequence, frame: int) -> FloatArray:

@@ -98,7 +98,7 @@ class WindowedScene(MovingScene):
             return found
         before, after = found
         begin, end = self.plan.windows[after.window].first, self.plan.windows[before.window].end
-        weight = (g - begin) / (end - begin)
+        weight = (g - begin) / (end - begin)  # (21.1)
         return [before._replace(weight=1.0 - weight), after._replace(weight=weight)]
 
     def owner(self, g: float) -> int:
