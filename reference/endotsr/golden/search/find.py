@@ -20,8 +20,8 @@ from endotsr.golden.judge.store import Golden, in_precision
 from endotsr.golden.judge.verdict import Report, judge
 from endotsr.golden.search.cases import Answered
 from endotsr.golden.search.numbers import START, best_number, plain_first, said_number
-from endotsr.golden.search.places import Place, Spot, definition_modules, executed, names_in, spots, written
-from endotsr.golden.search.requests import Request, other_requests
+from endotsr.golden.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
+from endotsr.golden.search.requests import OtherReading, other_requests
 from endotsr.golden.search.rewrites import rewrites, with_number
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
@@ -89,7 +89,7 @@ class Search:
         """Whether time is up, or enough is found."""
         return time.process_time() > self.end or len(self.hits) >= ENOUGH
 
-    def fits(self, install: Install | None, mode: str, request: Request | None = None) -> str:
+    def fits(self, install: Install | None, mode: str, request: OtherReading | None = None) -> str:
         """How much of all cases a change explains: a key of WHOLE, or "" for nothing."""
         self.tried += 1
         gradients: list[bool | None] = []  # of cases whose gradients are not those of the definition with the change
@@ -121,7 +121,7 @@ class Search:
             return "derivative" if True in gradients and False not in gradients else "forward"
         return "refused" if spoils else "all"
 
-    def outputs(self, install: Install | None, mode: str, request: Request | None = None) -> Outputs:
+    def outputs(self, install: Install | None, mode: str, request: OtherReading | None = None) -> Outputs:
         """All outputs of the first case with a change."""
         one = self.cases[0]
         self.tried += 1
@@ -158,7 +158,7 @@ class Search:
             where, function = (spot.place.where(spot.node), spot.place.name) if spot else ("", text)
             self.hits.append(Hit(text, where, function, whole, (int(whole in enough), *rank, len(self.hits))))
 
-    def modes(self, place: Place) -> list[str]:
+    def modes(self, place: Statement) -> list[str]:
         """The phases in which a change of a place can make what is refused."""
         if len(place.phases) == 1:
             return list(place.phases)
@@ -212,7 +212,7 @@ def _inner(operation: str, golden: Golden) -> set[str]:
     return {place.name for place in executed(calls)}
 
 
-def _places(search: Search, places: Sequence[Place]) -> None:
+def _places(search: Search, places: Sequence[Statement]) -> None:
     """Changes of some places: numbers, then other texts, then other names."""
     live = _numbers(search, places)
     for texts, rank in ((_texts, 1), (_names, 2)):
@@ -232,7 +232,7 @@ def _requests(search: Search) -> None:
                 search.note(search.fits(None, "both", one), one.text, None, *one.rank)
 
 
-def _best_fixed(search: Search, at: Callable[[float], Request], rest: float) -> list[Request]:
+def _best_fixed(search: Search, at: Callable[[float], OtherReading], rest: float) -> list[OtherReading]:
     """A setting fixed at the number that fits best, if nothing else was found."""
     if search.hits:
         return []
@@ -240,7 +240,7 @@ def _best_fixed(search: Search, at: Callable[[float], Request], rest: float) -> 
     return [at(value) for value, _ in numbers]
 
 
-def _numbers(search: Search, places: Sequence[Place]) -> list[Live]:
+def _numbers(search: Search, places: Sequence[Statement]) -> list[Live]:
     """Factors, terms and constants of another size; returns the spots that are reached, the most promising first."""
     live: list[Live] = []
     for place in places:

@@ -16,7 +16,7 @@ WHOLE_FILE = re.compile(r"Equation \((B?M?\d+b?)\)")  # at the start of the docs
 STEP = re.compile(r"#.*?(\(\d+\.\d+\)(?:, \(\d+\.\d+\))*)")  # at the end of a line
 
 
-class Place:
+class Statement:
     """A function of the definition, or a constant with the constants that are made of it."""
 
     def __init__(self, module: ModuleType, statement: ast.FunctionDef | ast.Assign, phases: frozenset[str]) -> None:
@@ -82,7 +82,7 @@ class Place:
 class Spot(NamedTuple):
     """All expressions of one text in a place, or one of them, as (node that holds it, field, index in a list)."""
 
-    place: Place
+    place: Statement
     node: ast.expr | ast.stmt
     holders: tuple[tuple[ast.AST, str, int | None], ...]
 
@@ -122,7 +122,7 @@ def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
         getattr(holder, field)[index] = node
 
 
-def spots(place: Place) -> list[Spot]:
+def spots(place: Statement) -> list[Spot]:
     """Every expression that is read in a place, and its statements; what occurs several times also all at once."""
     found: dict[str, list[Spot]] = {}
     body = place.statement.body if isinstance(place.statement, ast.FunctionDef) else [place.statement]
@@ -152,7 +152,7 @@ def _is_read(node: Any) -> bool:
     return not isinstance(node, ast.Tuple | ast.List | ast.Dict | ast.Slice | ast.Lambda | ast.Starred)
 
 
-def names_in(place: Place) -> list[str]:
+def names_in(place: Statement) -> list[str]:
     """Names that a function reads and that are its own, and attributes by what they are read of."""
     if not isinstance(place.statement, ast.FunctionDef):
         return []
@@ -169,7 +169,7 @@ def names_in(place: Place) -> list[str]:
     )
 
 
-def executed(phases: dict[str, Callable[[], Any]]) -> list[Place]:
+def executed(phases: dict[str, Callable[[], Any]]) -> list[Statement]:
     """The places of the definition that run in some calls, by phase, and the constants of their modules."""
     codes: dict[CodeType, set[str]] = {}
     for phase, call in phases.items():
@@ -193,9 +193,9 @@ def executed(phases: dict[str, Callable[[], Any]]) -> list[Place]:
         }
         for statement in syntax(module).body:
             if isinstance(statement, ast.FunctionDef) and statement.name in functions:
-                found.append(Place(module, statement, functions[statement.name]))
+                found.append(Statement(module, statement, functions[statement.name]))
             elif isinstance(statement, ast.Assign) and functions and _is_number(module, statement):
-                found.append(Place(module, statement, frozenset().union(*functions.values())))
+                found.append(Statement(module, statement, frozenset().union(*functions.values())))
     return found
 
 

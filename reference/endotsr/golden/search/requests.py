@@ -14,18 +14,18 @@ MOST_ORDERED = 4  # entries of an axis of which every order is tried
 MOST_SWAPPED = 16  # entries of an axis of which every two are exchanged
 
 
-class Request(NamedTuple):
+class OtherReading(NamedTuple):
     """Another reading of requests, the same for all cases."""
 
     text: str
     rank: tuple[int, int]  # as of the other changes
     ask: Callable[[Inputs, Settings], tuple[Inputs, Settings]]
     tell: Callable[[Outputs], Outputs] = lambda found: found
-    at: "Callable[[float], Request] | None" = None  # the same with another number
+    at: "Callable[[float], OtherReading] | None" = None  # the same with another number
     rest: float = 0.0  # the number of the first case
 
 
-def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[Request]:
+def other_requests(cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
     """Readings of the requests of one operation, settings first."""
     for path in dict.fromkeys(path for case in cases for path in leaves(case.settings)):
         yield from _settings(path, cases, all_cases)
@@ -56,7 +56,7 @@ def with_value(settings: Settings, path: Sequence[str], value: Any) -> Settings:
     return {**settings, path[0]: with_value(settings[path[0]], path[1:], value)}
 
 
-def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[Request]:
+def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[Case]) -> Iterator[OtherReading]:
     """A setting at a fixed value, and a setting changed by a rule."""
     name = ".".join(path)
     seen = [value_at(case.settings, path) for case in cases]
@@ -68,8 +68,8 @@ def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[
         *([True, False] if any(isinstance(v, bool) for v in seen) else []),
     ]
 
-    def fixed_at(value: Any) -> Request:
-        return Request(
+    def fixed_at(value: Any) -> OtherReading:
+        return OtherReading(
             f"{name} fixed at {value!r}", (0, 0), lambda i, s: (i, with_value(s, path, value) if _has(s, path) else s)
         )
 
@@ -86,14 +86,14 @@ def _settings(path: tuple[str, ...], cases: Sequence[Case], all_cases: Sequence[
         rules = {"the opposite of": lambda v: not v}
     for rule, change in rules.items():
         text = f"{rule} {name} in place of {name}"
-        yield Request(text, (0, 1), lambda i, s, c=change: (i, with_value(s, path, c(value_at(s, path)))))
+        yield OtherReading(text, (0, 1), lambda i, s, c=change: (i, with_value(s, path, c(value_at(s, path)))))
 
 
 def _has(settings: Settings, path: Sequence[str]) -> bool:
     return value_at(settings, path) is not None
 
 
-def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[Request]:
+def _inputs(name: str, shape: tuple[int, ...], kind: str) -> Iterator[OtherReading]:
     """An input and its gradient, or a cotangent, in another order; an input of another sign or unit."""
     for axis, size in enumerate(shape):
         if 1 < size <= MOST_ORDERED:
@@ -125,7 +125,7 @@ def _swapped(size: int, a: int, b: int) -> NDArray:
     return order
 
 
-def _ordered(name: str, axis: int, order: NDArray, text: str = "") -> Request:
+def _ordered(name: str, axis: int, order: NDArray, text: str = "") -> OtherReading:
     """One axis in another order."""
     text = text or f"in the order {order.tolist()}"
     return _mapped(
@@ -137,7 +137,7 @@ def _ordered(name: str, axis: int, order: NDArray, text: str = "") -> Request:
 def _mapped(
     name: str, text: str, change: Callable[[NDArray], NDArray], back: Callable[[NDArray], NDArray],
     rank: tuple[int, int] = (0, 2),
-) -> Request:  # fmt: skip
+) -> OtherReading:  # fmt: skip
     """An input changed, and its gradient changed back; of a cotangent, the output."""
     partner = name.removeprefix("d_") if name.startswith("d_") else f"d_{name}"
 
@@ -148,4 +148,4 @@ def _mapped(
         return {**found, partner: back(found[partner])} if partner in found else found
 
     what = f"the output {partner} and its derivative" if name.startswith("d_") else f"the input {name}"
-    return Request(f"{what} {text}", rank, ask, tell)
+    return OtherReading(f"{what} {text}", rank, ask, tell)
