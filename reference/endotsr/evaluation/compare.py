@@ -59,7 +59,8 @@ def methods_of(metrics: EvaluationRecord, label: str, where: object, baselines: 
             rows |= {entry["label"]: entry["per_frame"] for entry in metrics["baselines"].values()}
         methods = [Method(name, list(per_frame), digests) for name, per_frame in rows.items()]
         for method in methods:
-            _frames(method), _about(method)
+            _frames(method)
+            _about(method)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{where}: {error}: allowed: a file that `endotsr evaluate` wrote") from None
     return methods

@@ -152,7 +152,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
     return assemble(files, cameras_of(contents), config, near, Path(folder), notes)
 
 
-def _duration(file: SequenceFile, frames: list[int]) -> float:
+def _duration(file: SequenceFile, frames: range | list[int]) -> float:
     """Seconds from time 0 to time 1 of these frames, n / (n - 1) (s_{n-1} - s_0); 0 where the rate is unknown."""
     if not file.frame_rate or len(frames) < 2:
         return 0.0
