@@ -76,7 +76,7 @@ def _decisions() -> list[Spec]:
              "faint_ones_densified", "split_parent_kept", "children_not_smaller", "children_interleaved",
              "children_inherit_moments", "children_not_turned", "densify_threshold_in_pixels",
              "screen_gradient_without_half",
-             "density_norm_of_sum")  # fmt: skip
+             "density_norm_of_sum", "candidates_above_the_threshold")  # fmt: skip
     return [
         spec("clone_split_prune", "Who is pruned, cloned and split, and in which order the new ones stand", flags),
         spec("maximum", "No room for all: the steepest, equals by index", ("first_candidates_win",), change=tie,
