@@ -5,12 +5,13 @@ import json
 import pytest
 from small_recording import WANTED, Heard, here, settings, trained, write_recording
 
+import endotsr
 from endotsr.errors import InputError
 from endotsr.runs.folder import open_run
 from endotsr.runs.model import load_model
 from endotsr.runs.stopping import signals_stop
 from endotsr.sweeps.execute import Outcome, execute
-from endotsr.windows.make import make_windows, plan_recording, window_folder
+from endotsr.windows.make import make_windows, plan_recording, window_folder, window_length
 from endotsr.windows.plan import Wanted
 from endotsr.windows.record import read_record
 
@@ -91,3 +92,13 @@ def test_a_recording_without_a_window_is_refused(tmp_path):
 def test_a_folder_that_holds_something_is_not_overwritten(recording, cold_run):
     with pytest.raises(InputError, match="exists already"):
         plan_recording(recording, settings(), WANTED, cold_run)
+
+
+@pytest.mark.parametrize("preset, visits, frames, length", [
+    ("demo", 36, 84, 3024), ("demo", 36, 20, 1500), ("sharp", 128, 84, 9344), ("demo", 5, 400, 2000),
+    ("demo", 0, 84, 1500),
+])  # fmt: skip
+def test_a_window_of_many_frames_has_its_least_iterations_per_frame(preset, visits, frames, length):
+    """Also beyond 64 frames, where the length of a clip grows more slowly; given visits and lengths are kept."""
+    config = endotsr.make_config(preset, training={"visits_per_frame": visits})
+    assert window_length(config, frames).training.iterations == length

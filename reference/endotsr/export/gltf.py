@@ -20,11 +20,11 @@ from endotsr.export.ply import point_vertices
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.runs.files import replace_file
+from endotsr.sequences.record import UNKNOWN_RATE
 
 LARGEST = 1 << 32  # bytes: a .glb states its length in 32 bits
 FLOAT, SHORT = 5126, 5123  # types of numbers, as glTF names them
 HALF_TURN = [1.0, 0.0, 0.0, 0.0]  # about x: quaternion x y z w
-USUAL_RATE = 15.0  # frames a second of a recording whose rate is unknown
 
 
 class _Buffer:
@@ -69,7 +69,7 @@ def write_animated_points(
     points = [np.stack([each[axis] for axis in "xyz"], axis=1) for each in shown]
     levels = np.stack([shown[0][name] for name in ("red", "green", "blue")], axis=1)
     record = scene.record
-    seconds = np.multiply(times, record.duration or record.count / USUAL_RATE)
+    seconds = np.multiply(times, record.duration or record.count / UNKNOWN_RATE)
     content = _glb(points, levels, (seconds - seconds[0]).astype("<f4"), times, record.unit)
     replace_file(file, lambda temporary: temporary.write_bytes(content))
     return len(levels)

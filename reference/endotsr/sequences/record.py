@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.camera import Camera
 
+UNKNOWN_RATE = 15.0  # frames a second at which a film or an animation shows a recording of unknown rate
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
 Row = tuple[Length, Length, Length]
 

@@ -13,11 +13,12 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.report.figures import ByteImage
 from endotsr.runs.files import replace_file
+from endotsr.sequences.record import UNKNOWN_RATE
 
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256
 PALETTE_FRAMES = 8  # pictures that the colours of a gif are chosen from
-LOWEST, UNKNOWN_RATE, USUAL = 0.1, 15.0, (1.0, 60.0)  # pictures a second
+LOWEST, USUAL = 0.1, (1.0, 60.0)  # pictures a second
 HUNDREDTHS = 100  # of a second: the unit of time in a gif
 
 

@@ -69,6 +69,15 @@ def with_visits(config: Config) -> Config:
     return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=visits))
 
 
+def window_length(config: Config, training_frames: int) -> Config:
+    """The settings of a window on so many training frames: `lengthened`, with 36 of its visits on each frame or all.
+
+    The length of a clip grows more slowly beyond 64 frames; a window keeps its least length per frame (B18).
+    """
+    found, least = lengthened(config, training_frames), min(VISITS, config.training.visits_per_frame) * training_frames
+    return found if found.training.iterations >= least else with_iterations(config, least)
+
+
 def recording_settings(run: Path) -> Config:
     """The settings of a run of windows; those of a window have its frames and its length."""
     return load_config(run / SETTINGS)
@@ -127,7 +136,7 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
     window, folder = record.windows[k], window_folder(run, record.windows[k])
     sequence = msgspec.structs.replace(config.sequence, frames=frame_range(config.sequence.frames, window))
     train, _ = split_frames(window.count, sequence.split, sequence.block_length)
-    own, start = lengthened(msgspec.structs.replace(config, sequence=sequence), len(train)), None
+    own, start = window_length(msgspec.structs.replace(config, sequence=sequence), len(train)), None
     begun_cold = (folder / "run.json").exists() and "start" not in open_run(folder).record()
     if window.start == "warm" and not cold and not begun_cold:
         neighbour, shorter = record.windows[k - 1], warm_settings(own)
