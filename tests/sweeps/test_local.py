@@ -4,6 +4,8 @@ import contextlib
 import json
 import os
 import signal
+import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,8 @@ from tiny_sweep import (
     wait_until,
     write_spec,
 )
+
+from endotsr.sweeps.local import LOOK
 
 pytestmark = [
     pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are found in /proc"),
@@ -39,11 +43,11 @@ def children(pid: int) -> list[int]:
     return found
 
 
-def running(pid: int) -> bool:
-    """Whether a process exists and is more than an entry that its parent has not read."""
+def state(pid: int) -> str:
+    """The state of a process: `T` is suspended, `Z` an entry that its parent has not read, also of one that is gone."""
     with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    return False
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    return "Z"
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +64,22 @@ def middle(out: Path) -> bool:
     """Whether a run has a checkpoint and is far from its end."""
     logs = [path for path in out.glob("runs/*/log.jsonl") if (path.parent / "checkpoint.npz").exists()]
     return any(7 < len(path.read_text().splitlines()) < LENGTH * 2 // 3 for path in logs)
+
+
+def suspended(pid: int) -> bool:
+    return state(pid) == "T"
+
+
+def hold_worker_in_the_middle(parent: int, out: Path) -> int:
+    """The only worker, suspended while its run is in the middle."""
+    while True:
+        wait_until(lambda: middle(out))
+        (worker,) = children(parent)
+        os.kill(worker, signal.SIGSTOP)
+        wait_until(partial(suspended, worker))
+        if middle(out):  # the iterations between the look and the signal are few, and sometimes too many
+            return worker
+        os.kill(worker, signal.SIGCONT)
 
 
 def assert_whole(out: Path, undisturbed: Path) -> None:
@@ -101,10 +121,12 @@ def test_workers_end_with_a_checkpoint_when_the_file_appears_and_no_signal_is_se
     out = tmp_path / "out"
     words = ("sweep", str(write_spec(tmp_path, iterations=str(LENGTH))), "--out", str(out), "--workers", "1")
     process = start(*words)
-    wait_until(lambda: middle(out) or process.poll() is not None)
+    worker = hold_worker_in_the_middle(process.pid, out)
     os.kill(process.pid, signal.SIGSTOP)  # the parent does nothing
     (out / "sweep.stop").touch()
-    wait_until(lambda: not any(running(pid) for pid in children(process.pid)), 60)
+    time.sleep(2 * LOOK)  # its next look for the file is due: a fast machine ends a run between two of them
+    os.kill(worker, signal.SIGCONT)
+    wait_until(lambda: not any(state(pid) != "Z" for pid in children(process.pid)), 60)
     (run,) = (
         run for run in (out / "runs").iterdir() if json.loads((run / "run.json").read_text())["status"] != "finished"
     )
