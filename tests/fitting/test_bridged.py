@@ -9,8 +9,9 @@ import pytest
 
 from endotsr.config import DEMO, TrainingConfig
 from endotsr.fitting import bridged as module
-from endotsr.fitting.bridged import STEPS, BridgedTargets
+from endotsr.fitting.bridged import BridgedTargets
 from endotsr.fitting.objective import frame_targets
+from endotsr.fitting.packed import STEPS
 from endotsr.fitting.sampling import BridgedTime, draw_view
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
@@ -50,7 +51,10 @@ def test_the_targets_of_a_bridged_time_are_those_of_the_equation(sequence, preci
     found, camera = BridgedTargets(sequence, config).observed(BridgedTime(0, 2, 0.75))
     assert np.abs(found.image - np.where(made.mask, made.image, 0)).max() <= 0.51 / STEPS
     assert camera == made.camera and found.image.dtype == precision
-    for a, b in zip(flat(found), flat(wanted), strict=True):
+    assert found.depth.normalised.dtype == precision
+    assert np.abs(found.depth.normalised - wanted.depth.normalised).max() <= 0.51 / STEPS
+    depth = wanted.depth._replace(normalised=found.depth.normalised)
+    for a, b in zip(flat(found), flat(wanted._replace(depth=depth)), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
@@ -58,6 +62,13 @@ def test_the_targets_of_a_frame_are_those_of_its_picture(sequence):
     shop = workshop(sequence, DEMO)
     for a, b in zip(flat(shop.targets_of(3)), flat(frame_targets(sequence.frame(3), DEMO)), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_what_is_kept_of_a_bridged_time_takes_nine_bytes_a_pixel(sequence):
+    kept = BridgedTargets(sequence, DEMO)
+    kept.observed(BridgedTime(0, 2, 0.5))  # and the two others of the gap
+    height, width = sequence.images.shape[2:]
+    assert 8.0 < kept.stored.bytes / (3 * height * width) < 9.0
 
 
 def flat(value):
@@ -83,7 +94,7 @@ def test_a_training_compares_with_bridged_times(sequence):
     )
     shop, state = workshop(sequence, config), new_training(sequence, config)
     entries = [training_step(state, shop) for _ in range(4)]
-    assert not len(shop.parts) and len(shop.bridged.stored)  # no frame was looked at
+    assert not len(shop.supports) and len(shop.bridged.stored)  # no frame was looked at
     assert all(np.isfinite(entry["loss"]) for entry in entries)
 
 

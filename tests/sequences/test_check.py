@@ -300,10 +300,10 @@ def test_cost_grows_with_the_clip_up_to_the_limit():
 
     small, large = of(60), of(120)
     assert large.sequence_bytes == pytest.approx(2 * small.sequence_bytes) and not large.file_bytes
-    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 7.3))
+    assert large.total_bytes - small.total_bytes == pytest.approx(60 * 640 * 512 * (9 + 0.17))
     long = of(2000, "sharp", 4.0)
     assert long.file_bytes == long.sequence_bytes == 2000 * 640 * 512 * 9
-    assert long.total_bytes == pytest.approx(4e9 / 2 + 0.6e9 + 8.7e3 * long.gaussians)
+    assert long.total_bytes == pytest.approx(4e9 / 4 + 2000 * 640 * 512 * 0.17 + 0.6e9 + 8.7e3 * long.gaussians)
     assert of(60, "sharp").total_bytes > small.total_bytes
 
 

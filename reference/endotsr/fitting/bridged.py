@@ -10,24 +10,34 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.config import Config
-from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
+from endotsr.fitting.objective import Targets, targets_of
+from endotsr.fitting.packed import (
+    STEPS,
+    PackedDepth,
+    PackedMask,
+    packed_depth,
+    packed_mask,
+    packed_supports,
+    unpacked_depth,
+    unpacked_mask,
+    unpacked_supports,
+)
 from endotsr.fitting.sampling import BridgedTime
-from endotsr.kernels.arrays import Array, BoolArray
+from endotsr.kernels.arrays import Array
 from endotsr.kernels.memory import Kept
 from endotsr.losses.masked_ssim import stored_target
 from endotsr.sequences.between import flows_between, frame_between
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 
-STEPS = 65535  # of an image value in [0, 1]; 8-bit steps would be as large as the error of a good fit
-
 
 class Stored(NamedTuple):
-    """The targets of one time; the picture is in whole numbers: 14 bytes a pixel in place of 20."""
+    """The targets of one time in whole numbers and bits: 8.5 bytes a pixel in place of 20. What is off is None."""
 
     image: Array  # (3, H, W) uint16, steps of 1 / STEPS
-    mask: BoolArray  # (H, W)
-    parts: TargetParts
+    mask: PackedMask
+    depth: PackedDepth | None
+    supports: tuple[PackedMask, ...] | None
     camera: Camera
 
 
@@ -41,18 +51,29 @@ class BridgedTargets:
 
     def observed(self, at: BridgedTime) -> tuple[Targets, Camera]:
         """The targets at a bridged time, in the precision of the training, and the camera there."""
-        made = self.stored.get((at.earlier, at.later), lambda: self._made(at))[at]
-        target = stored_target(made.image, STEPS, made.mask, self.config.training.precision)
-        return targets_of(target, made.parts, self.config), made.camera
+        made, precision = self.stored.get((at.earlier, at.later), lambda: self._made(at))[at], self._precision
+        mask = unpacked_mask(made.mask)
+        depth = None if made.depth is None else unpacked_depth(made.depth, precision)
+        rule = self.config.loss.upsampling
+        supports = None if made.supports is None else unpacked_supports(made.supports, mask, rule)
+        return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
+
+    @property
+    def _precision(self) -> str:
+        return self.config.training.precision
 
     def _made(self, wanted: BridgedTime) -> dict[BridgedTime, Stored]:
         """All times of the gap in which `wanted` lies."""
         earlier, later, _ = wanted
-        found, precision = {}, self.config.training.precision
+        config, found = self.config, {}
         flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
         for place in range(1, count):
             made = frame_between(self.sequence, earlier, later, place / count, flows)
-            image = np.rint(made.image * STEPS).astype(np.uint16)
-            parts = target_parts(made.mask, made.depth.astype(precision), self.config)
-            found[BridgedTime(earlier, later, place / count)] = Stored(image, made.mask, parts, made.camera)
+            found[BridgedTime(earlier, later, place / count)] = Stored(
+                np.rint(made.image * STEPS).astype(np.uint16),
+                packed_mask(made.mask),
+                packed_depth(made.depth.astype(self._precision), made.mask) if config.loss.depth_weight > 0 else None,
+                packed_supports(made.mask, config.loss.upsampling) if config.model.laplacian else None,
+                made.camera,
+            )
         return found

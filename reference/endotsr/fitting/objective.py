@@ -66,30 +66,17 @@ class ImageLoss(NamedTuple):
     d_depth: FloatArray  # (H, W)
 
 
-class TargetParts(NamedTuple):
-    """What the losses need of mask and prior depth of a frame; a term that is off has None."""
-
-    depth: DepthTarget | None
-    supports: SupportMasks | None
-
-
-def target_parts(mask: NDArray[np.bool_], depth: FloatArray, config: Config) -> TargetParts:
-    """Depth target and pyramid supports of one frame: the part of its targets that takes time to compute."""
-    return TargetParts(
-        depth_target(depth, mask) if config.loss.depth_weight > 0 else None,
-        support_masks(mask, LEVELS, config.loss.upsampling) if config.model.laplacian else None,
-    )
-
-
-def targets_of(target: SsimTarget, parts: TargetParts, config: Config) -> Targets:
-    """The targets of one frame from its masked picture and its parts."""
-    return Targets(target.image, target.mask, target if config.loss.ssim_weight > 0 else None, *parts)
+def targets_of(target: SsimTarget, depth: DepthTarget | None, supports: SupportMasks | None, config: Config) -> Targets:
+    """The targets of one frame from its masked picture and what depth and pyramid are compared with."""
+    # the target of the similarity holds the one copy of the image, zero outside the tissue
+    return Targets(target.image, target.mask, target if config.loss.ssim_weight > 0 else None, depth, supports)
 
 
 def frame_targets(frame: Frame, config: Config) -> Targets:
     """Masked target image, depth target and pyramid supports of one frame."""
-    # the target of the similarity holds the one copy of the image, zero outside the tissue
-    return targets_of(ssim_target(frame.image, frame.mask), target_parts(frame.mask, frame.depth, config), config)
+    depth = depth_target(frame.depth, frame.mask) if config.loss.depth_weight > 0 else None
+    supports = support_masks(frame.mask, LEVELS, config.loss.upsampling) if config.model.laplacian else None
+    return targets_of(ssim_target(frame.image, frame.mask), depth, supports, config)
 
 
 def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -> ImageLoss:

@@ -19,10 +19,12 @@ from endotsr.fitting.adam import AdamState, Rate, adam_state
 from endotsr.fitting.bridged import BridgedTargets
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
-from endotsr.fitting.objective import TargetParts, Targets, target_parts, targets_of
+from endotsr.fitting.objective import Targets, targets_of
+from endotsr.fitting.packed import PackedMask, packed_supports, unpacked_supports
 from endotsr.fitting.records import CheckpointHeader, RngState
 from endotsr.fitting.sampling import Drawn, View
 from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
+from endotsr.losses.depth import depth_target
 from endotsr.losses.masked_ssim import stored_target
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -65,7 +67,7 @@ class Workshop:
     config: Config
     spectral: Spectral
     extent: float
-    parts: Kept[int, TargetParts]  # of the targets, by frame, filled at first use
+    supports: Kept[int, tuple[PackedMask, ...]]  # of the pyramid, by frame, filled at first use
     bridged: BridgedTargets  # between the frames, filled at first use
     depth: float = 1.0  # median depth of the tissue, scene units; known where poses are corrected
 
@@ -85,11 +87,14 @@ class Workshop:
         return rates if given is None else rates | {"pose_translation": cast(float, given) * self.depth}
 
     def targets_of(self, index: int) -> Targets:
-        """The targets of a frame. All but its picture is computed once, or again where it was dropped."""
-        sequence, precision = self.sequence, self.config.training.precision
-        mask = sequence.masks[index]
-        parts = self.parts.get(index, lambda: target_parts(mask, sequence.depth[index].astype(precision), self.config))
-        return targets_of(stored_target(sequence.images[index], 255, mask, precision), parts, self.config)
+        """The targets of a frame. The supports of its pyramid are computed once, or again where they were dropped."""
+        sequence, config, precision = self.sequence, self.config, self.config.training.precision
+        mask, rule, depth, supports = sequence.masks[index], config.loss.upsampling, None, None
+        if config.loss.depth_weight > 0:
+            depth = depth_target(sequence.depth[index].astype(precision, copy=False), mask)
+        if config.model.laplacian:
+            supports = unpacked_supports(self.supports.get(index, lambda: packed_supports(mask, rule)), mask, rule)
+        return targets_of(stored_target(sequence.images[index], 255, mask, precision), depth, supports, config)
 
 
 def workshop(sequence: Sequence, config: Config) -> Workshop:

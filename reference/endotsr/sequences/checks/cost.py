@@ -16,8 +16,8 @@ from endotsr.config import Config
 from endotsr.kernels.memory import memory_limit
 from endotsr.sequences.frame_store import PIXEL_BYTES
 
-TARGET_BYTES = 7.3  # a pixel: what the losses keep of a training frame
-BETWEEN_BYTES = 2 * 14.3  # a pixel: the two moments between neighbouring training frames, where they are targets too
+TARGET_BYTES = 0.17  # a pixel: what the losses keep of a training frame
+BETWEEN_BYTES = 2 * 8.5  # a pixel: the two moments between neighbouring training frames, where they are targets too
 PROGRAM_BYTES, IMAGE_BYTES, GAUSSIAN_BYTES = 0.3e9, 0.3e9, 8.7e3  # the rest: program, images of 640x512, a Gaussian
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
 BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration

@@ -1,0 +1,67 @@
+"""The targets of a frame in few bytes between its visits, and unpacked at each.
+
+In: masks of the tissue and prior depths. Out: what the depth loss and the pyramid compare with. A mask takes one bit a
+pixel. The depth of a frame is normalised at every visit, which is quick; that of a time between two frames (B14) is
+stored in whole numbers. This module computes no loss.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from endotsr.equations.laplacian import LEVELS, SupportMasks, support_masks
+from endotsr.equations.pyramid import Upsampling
+from endotsr.kernels.arrays import Array, BoolArray, FloatArray
+from endotsr.losses.depth import DepthTarget, depth_target
+
+STEPS = 65535  # of a number in [0, 1]; 8-bit steps would be as large as the error of a good fit
+
+
+class PackedMask(NamedTuple):
+    """A mask of one bit a pixel."""
+
+    bits: Array  # (ceil(H W / 8),) uint8
+    shape: tuple[int, ...]  # (H, W)
+
+
+class PackedDepth(NamedTuple):
+    """A normalised prior depth in whole numbers: it differs from `DepthTarget` by at most half a step of 1 / STEPS."""
+
+    levels: Array  # (H, W) uint16, steps of 1 / STEPS of the largest prior of the picture
+    valid: PackedMask
+    count: int  # valid pixels
+
+
+def packed_mask(mask: BoolArray) -> PackedMask:
+    """The mask in an eighth of its bytes."""
+    return PackedMask(np.packbits(mask), mask.shape)
+
+
+def unpacked_mask(packed: PackedMask) -> BoolArray:
+    """The mask again, exactly."""
+    height, width = packed.shape
+    return np.unpackbits(packed.bits, count=height * width).view(np.bool_).reshape(packed.shape)
+
+
+def packed_supports(mask: BoolArray, upsampling: Upsampling) -> tuple[PackedMask, ...]:
+    """The valid pixels of the bands of the pyramid below a tissue mask."""
+    return tuple(packed_mask(band) for band in support_masks(mask, LEVELS, upsampling).bands)
+
+
+def unpacked_supports(packed: tuple[PackedMask, ...], mask: BoolArray, upsampling: Upsampling) -> SupportMasks:
+    """`support_masks` again, exactly."""
+    return SupportMasks(mask, tuple(unpacked_mask(band) for band in packed), upsampling)
+
+
+def packed_depth(prior_depth: FloatArray, mask: BoolArray) -> PackedDepth:
+    """`depth_target` in whole numbers."""
+    target = depth_target(prior_depth, mask)
+    levels = np.rint(target.normalised * STEPS).astype(np.uint16)
+    return PackedDepth(levels, packed_mask(target.valid), target.count)
+
+
+def unpacked_depth(packed: PackedDepth, dtype: DTypeLike) -> DepthTarget:
+    """The depth target again, to half a step."""
+    normalised = np.multiply(packed.levels, np.dtype(dtype).type(1 / STEPS), dtype=dtype)
+    return DepthTarget(normalised, unpacked_mask(packed.valid), packed.count)
