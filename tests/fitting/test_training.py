@@ -21,7 +21,8 @@ from endotsr.config import (
 )
 from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
-from endotsr.fitting import objective, trainer
+from endotsr.fitting import objective, packed, trainer
+from endotsr.fitting import state as state_module
 from endotsr.fitting.checkpoint import load_checkpoint
 from endotsr.fitting.checkpoint_values import check_lengths
 from endotsr.fitting.divergence import Diverged
@@ -214,13 +215,13 @@ OFF = {
     "deformation": ({"deformation": False}, [(model_module, "deformation_forward")], FDM),
     "laplacian": (
         {"laplacian": False},
-        [(objective, "laplacian_loss_forward"), (objective, "support_masks")],
+        [(objective, "laplacian_loss_forward"), (packed, "support_masks")],
         (),
     ),
     "ssim": ({"loss": {"ssim_weight": 0.0}}, [(objective, "masked_ssim_forward")], ()),
     "depth": (
         {"loss": {"depth_weight": 0.0}},
-        [(objective, "normalised_depth_forward"), (objective, "depth_target")],
+        [(objective, "normalised_depth_forward"), (state_module, "depth_target")],
         (),
     ),
     "smoothness": (

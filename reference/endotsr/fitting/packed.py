@@ -46,12 +46,12 @@ def unpacked_mask(packed: PackedMask) -> BoolArray:
 
 def packed_supports(mask: BoolArray, upsampling: Upsampling) -> tuple[PackedMask, ...]:
     """The valid pixels of the bands of the pyramid below a tissue mask."""
-    return tuple(packed_mask(band) for band in support_masks(mask, LEVELS, upsampling).bands)
+    return tuple(packed_mask(valid) for valid in support_masks(mask, LEVELS, upsampling).bands)
 
 
 def unpacked_supports(packed: tuple[PackedMask, ...], mask: BoolArray, upsampling: Upsampling) -> SupportMasks:
     """`support_masks` again, exactly."""
-    return SupportMasks(mask, tuple(unpacked_mask(band) for band in packed), upsampling)
+    return SupportMasks(mask, tuple(unpacked_mask(valid) for valid in packed), upsampling)
 
 
 def packed_depth(prior_depth: FloatArray, mask: BoolArray) -> PackedDepth:
