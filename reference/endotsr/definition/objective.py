@@ -1,4 +1,4 @@
-"""Equation (6): the objective of one view and its gradient by the rendered images."""
+"""Equation (6): the objective of one view and its gradient with respect to the rendered images."""
 
 from collections import namedtuple
 
@@ -23,7 +23,7 @@ def frame_targets(frame, config):
 
 
 def photometric_loss(colour, targets, ssim_weight):
-    """(1 - w) L1 + w (1 - SSIM), the terms, and the derivative by the render (3, H, W)."""
+    """(1 - w) L1 + w (1 - SSIM), the terms, and the derivative with respect to the render (3, H, W)."""
     l1, l1_saved = masked_l1_forward(colour, targets.image, targets.mask)
     ssim, ssim_saved = masked_ssim_forward(colour, targets.ssim)
     d_colour = masked_l1_reverse(1 - ssim_weight, l1_saved) + masked_ssim_reverse(-ssim_weight, ssim_saved)

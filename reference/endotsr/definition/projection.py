@@ -65,7 +65,7 @@ def projection_reverse(d_mean2d, d_covariance2d, d_depth, saved):
 
 
 def point_reverse(point, slope, free, g_j, d_mean2d, d_depth, camera, settings):
-    """From the derivatives by J, (u, v) and depth to those by the point in camera axes, (3, N)."""
+    """From the derivatives with respect to J, (u, v) and depth to dL/d(point in camera axes), (3, N)."""
     z, focal = point[2], np.array([[camera.fx], [camera.fy]])
     g_slope = -focal / z * np.array([g_j[0, 2], g_j[1, 2]])  # J_02 = -f x'/z / z; (6.6)
     g_clipped = np.where(free, g_slope, 0)  # (6.7)

@@ -52,7 +52,7 @@ def scene_at(gaussians, spectral, model, t):
 
 
 def scene_reverse(grads, saved):
-    """Gradients by every array of the Gaussians, by name, from those by the Scene."""
+    """Gradients with respect to every array of the Gaussians, by name, from those of the Scene."""
     names = ("position", "quaternion", "log_scale", "opacity_logit", "harmonics")
     found = {name: getattr(grads, f"d_{name}") for name in names}
     if saved.deformation is not None:

@@ -19,7 +19,7 @@ ViewGradients = namedtuple("ViewGradients", "loss terms gradients d_exposure d_p
 
 def view_gradients(gaussians, spectral, targets, weights, config, camera, t, edges=no_edges,
                    *, exposure=None, pose=None, raster=PAPER, degree=3):  # fmt: skip
-    """Loss, gradients by name, and those by exposure (log_gain, bias) and pose (rotation vector, offset), if given."""
+    """Loss, gradients by name, and those of exposure (log_gain, bias) and pose (rotation vector, offset), if given."""
     scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
     d_exposure = d_pose = exposure_saved = pose_saved = None
     if pose is not None:

@@ -31,7 +31,7 @@ class AppearanceSaved(NamedTuple):
 
 
 class AppearanceGrads(NamedTuple):
-    """Derivative by the coefficients and by the atoms."""
+    """Derivative with respect to the coefficients and the atoms."""
 
     d_appearance_coefficients: FloatArray  # (3, 2F, N)
     d_phi_bar: FloatArray | None  # (2F,), None unless requested
@@ -118,8 +118,8 @@ def appearance_reverse(
 ) -> AppearanceGrads:
     """Reverse of equation (2).
 
-    d_residual  (3, N)  derivative of the loss by the residual (that of the degree-0 coefficient it is added to)
-    returns     derivative by A (3, 2F, N) and by phi_bar (2F,): added in float64, None unless `atom_gradient`
+    d_residual  (3, N)  gradient of the residual, equal to that of the degree-0 coefficient it is added to
+    returns     gradients of A (3, 2F, N) and phi_bar (2F,), the latter added in float64, None unless `atom_gradient`
     Edges:      A = 0 has derivative (beta / Y00) phi_bar d_residual: not zero, so the residual can start.
     """
     d_argument = argument_gradient(d_residual, saved)
@@ -129,5 +129,5 @@ def appearance_reverse(
 
 
 def argument_gradient(d_residual: FloatArray, saved: AppearanceSaved) -> FloatArray:
-    """First half of the reverse pass: derivative (3, N) by A phi_bar, the argument of tanh."""
+    """First half of the reverse pass: derivative (3, N) with respect to A phi_bar, the argument of tanh."""
     return np.multiply(d_residual, saved.slope, dtype=saved.slope.dtype)

@@ -93,7 +93,7 @@ def combine(coefficients: FloatArray, atoms: FloatArray) -> FloatArray:
 def spread(
     d_out: FloatArray, coefficients: FloatArray, atoms: FloatArray, *, atom_gradient: bool = True
 ) -> tuple[FloatArray, FloatArray | None]:
-    """Reverse of `combine`: derivative by the coefficients (3, 2F, N) and, if requested, by the atoms (2F,)."""
+    """Reverse of `combine`: gradients of the coefficients (3, 2F, N) and, if requested, of the atoms (2F,)."""
     dtype = coefficients.dtype
     if d_out.shape != (coefficients.shape[0], coefficients.shape[2]):
         raise ValueError(f"upstream {d_out.shape} does not fit coefficients {coefficients.shape}")

@@ -47,7 +47,7 @@ class DeformationSaved(NamedTuple):
 
 
 class DeformationGrads(NamedTuple):
-    """Derivative of a loss by the inputs of the deformation."""
+    """Derivative of a loss with respect to the inputs of the deformation."""
 
     d_fdm_weight: FloatArray  # (10, B, N)
     d_fdm_centre: FloatArray  # (10, B, N)

@@ -31,7 +31,7 @@ class DictionarySaved(NamedTuple):
 
 
 class DictionaryGrads(NamedTuple):
-    """Derivative by time and by the frequencies."""
+    """Derivative with respect to time and the frequencies."""
 
     d_t: float
     d_omega: FloatArray  # (F,)
@@ -127,8 +127,8 @@ def dictionary_forward(t: float, omega: FloatArray) -> tuple[FloatArray, Diction
 def dictionary_reverse(d_phi: FloatArray, saved: DictionarySaved) -> DictionaryGrads:
     """Reverse of equation (1): d sin = 2 pi cos, d cos = -2 pi sin per turn of the phase omega t.
 
-    d_phi    (2F,) derivative of the loss by the atoms
-    returns  derivative by t (scalar) and by omega (F,)
+    d_phi    (2F,) derivative of the loss with respect to the atoms
+    returns  derivative with respect to t (scalar) and omega (F,)
     """
     count = saved.omega.size
     d_phi = np.asarray(d_phi, np.float64)

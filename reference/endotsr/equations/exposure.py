@@ -21,7 +21,7 @@ class ExposureSaved(NamedTuple):
 
 
 class ExposureGrads(NamedTuple):
-    """Derivatives by the three inputs."""
+    """Derivatives with respect to the three inputs."""
 
     d_colour: FloatArray  # (C, H, W)
     d_log_gain: FloatArray  # (C,)
@@ -53,7 +53,7 @@ def exposure_forward(colour: FloatArray, log_gain: FloatArray, bias: FloatArray)
 def exposure_reverse(d_exposed: FloatArray, saved: ExposureSaved) -> ExposureGrads:
     """Reverse of equation (B13), with the sums over the pixels taken in float64 and in a fixed order.
 
-    d_exposed  (C, H, W)  derivative of the loss by the exposed colours
+    d_exposed  (C, H, W)  derivative of the loss with respect to the exposed colours
     returns    d_colour = gain d_exposed, d_log_gain = gain sum_p d_exposed colour, d_bias = sum_p d_exposed
     """
     dtype = saved.colour.dtype

@@ -1,7 +1,7 @@
 """Equation (5): the mask-propagating Laplacian loss of component L.
 
 In: the rendered and the observed image, planar (3, H, W), display units [0, 1], and the tissue mask (H, W), True =
-tissue. Out: a scalar in display units, and its derivative by the rendered image.
+tissue. Out: a scalar in display units, and its derivative with respect to the rendered image.
 
     G_0 = image, G_j = reduce(G_{j-1}), P_j = G_{j-1} - expand(G_j), j = 1 ... 3
     L_lap = (1/3) sum_j mean over the valid band pixels and the channels of |P_j(rendered) - P_j(observed)|
@@ -260,8 +260,8 @@ def laplacian_loss_forward(
 def laplacian_loss_reverse(d_loss: float, saved: LaplacianSaved) -> FloatArray:
     """Reverse of equation (5): the adjoint of the pyramid applied to the weighted signs.
 
-    d_loss   ()         derivative of the objective by the loss
-    returns  (3, H, W)  derivative by the rendered image, dtype of the render; exactly 0 outside the mask
+    d_loss   ()         derivative of the objective with respect to the loss
+    returns  (3, H, W)  derivative with respect to the rendered image, dtype of the render; exactly 0 outside the mask
     """
     scales = tuple(float(d_loss) * weight for weight in saved.weights)
     return pull_back(saved.signs, scales, saved.mask, saved.upsampling, saved.dtype)
@@ -272,7 +272,7 @@ def pull_back(
 ) -> FloatArray:
     """Adjoint of masked image -> bands: sum_j scales[j] (d P_j / d image)^T fields[j], 0 outside the mask.
 
-    From coarse to fine, with g_j the derivative by G_j and s_j = scales[j] fields[j] that by P_j:
+    From coarse to fine, with g_j the gradient of G_j and s_j = scales[j] fields[j] that of P_j:
         g_3 = -expand^T s_3,   g_{j-1} = -expand^T s_{j-1} + s_j + reduce^T g_j,   and no first term for g_0.
     """
     real = np.dtype(dtype).type

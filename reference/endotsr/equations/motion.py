@@ -19,7 +19,7 @@ class MotionSaved(NamedTuple):
 
 
 class MotionGrads(NamedTuple):
-    """Derivative by the coefficients and by the atoms."""
+    """Derivative with respect to the coefficients and the atoms."""
 
     d_motion_coefficients: FloatArray  # (3, 2F, N)
     d_phi: FloatArray | None  # (2F,), None unless requested
@@ -42,7 +42,7 @@ def motion_forward(motion_coefficients: FloatArray, phi: FloatArray) -> tuple[Fl
 def motion_reverse(d_translation: FloatArray, saved: MotionSaved, *, atom_gradient: bool = True) -> MotionGrads:
     """Reverse of equation (3).
 
-    d_translation  (3, N)  derivative of the loss by the translation, loss / scene unit
-    returns        derivative by C (3, 2F, N) and by phi (2F,), the latter added in float64, None unless `atom_gradient`
+    d_translation  (3, N)  derivative of the loss with respect to the translation, loss / scene unit
+    returns        gradients of C (3, 2F, N) and phi (2F,), the latter added in float64, None unless `atom_gradient`
     """
     return MotionGrads(*spread(d_translation, saved.motion_coefficients, saved.phi, atom_gradient=atom_gradient))

@@ -15,7 +15,7 @@ from endotsr.kernels.arrays import FloatArray
 
 SMALL = 1.0  # rad^2; below it the closed forms lose digits, and ten terms of the series are exact to rounding
 _SIGNS = [(-1.0) ** k for k in range(10)]
-# of sin r / r, (1 - cos r) / r^2, and of the derivatives of both by r divided by r; powers of r^2, constant first
+# of f = sin r / r, g = (1 - cos r) / r^2, f' / r and g' / r; powers of r^2, constant first
 SERIES = (
     [sign / factorial(2 * k + 1) for k, sign in enumerate(_SIGNS)],
     [sign / factorial(2 * k + 2) for k, sign in enumerate(_SIGNS)],
@@ -39,7 +39,7 @@ class PoseSaved(NamedTuple):
 
 
 class PoseGrads(NamedTuple):
-    """Derivatives by all four inputs."""
+    """Derivatives with respect to all four inputs."""
 
     d_rotation: FloatArray  # (3, 3)
     d_translation: FloatArray  # (3,)
@@ -72,9 +72,9 @@ def pose_forward(
 def pose_reverse(d_rotation: FloatArray, d_translation: FloatArray, saved: PoseSaved) -> PoseGrads:
     """Reverse of equation (B16).
 
-    d_rotation     (3, 3)  derivative of the loss by rotation'
-    d_translation  (3,)    derivative of the loss by translation'
-    returns        the derivatives by the four inputs, float64
+    d_rotation     (3, 3)  derivative of the loss with respect to rotation'
+    d_translation  (3,)    derivative of the loss with respect to translation'
+    returns        the derivatives with respect to the four inputs, float64
     """
     d_w, d_d = (np.asarray(array, np.float64) for array in (d_rotation, d_translation))
     d_exponential = d_w @ saved.rotation.T + np.outer(d_d, saved.translation)
@@ -87,7 +87,7 @@ def pose_reverse(d_rotation: FloatArray, d_translation: FloatArray, saved: PoseS
 
 
 def _factors(square: float) -> tuple[float, float, float, float]:
-    """sin r / r, (1 - cos r) / r^2, and the derivatives of both by r divided by r, for r^2 = `square`."""
+    """f = sin r / r, g = (1 - cos r) / r^2, f' / r and g' / r, for r^2 = `square`."""
     if square < SMALL:
         a, b, a1, b1 = (float(np.polynomial.polynomial.polyval(square, terms)) for terms in SERIES)
         return a, b, a1, b1

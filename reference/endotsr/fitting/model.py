@@ -64,7 +64,7 @@ class OffsetsAhead(NamedTuple):
 
 
 class SceneGrads(NamedTuple):
-    """Gradients by the raw parameters; `d_offsets` is what the FDM's reverse pass takes."""
+    """Gradients with respect to the raw parameters; `d_offsets` is what the FDM's reverse pass takes."""
 
     by_field: dict[str, FloatArray]  # every field but the three of the FDM
     d_offsets: FloatArray | None  # (10, N)
@@ -153,7 +153,7 @@ def _residual(
 
 
 def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool = True) -> SceneGrads:
-    """Gradients by the raw parameters from those by the deformed scene (all additions are pre-activation).
+    """Gradients with respect to the raw parameters from those of the deformed scene (all additions are pre-activation).
 
     coefficients   False leaves the gradients of the Fourier coefficients to `coefficients_adam_step`
     """
@@ -181,7 +181,7 @@ def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, 
 
 
 def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[FloatArray, Exposure | None]:
-    """Gradients by the rendered colours and by the exposure of the frame, from those by the exposed colours."""
+    """Gradients of the rendered colours and the exposure of the frame, from those of the exposed colours."""
     if saved is None:
         return d_colour, None
     grads = exposure_reverse(d_colour, saved)
@@ -197,7 +197,7 @@ def corrected(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | No
 
 
 def corrected_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> Pose | None:
-    """Gradients by the correction, from those by the corrected pose."""
+    """Gradients of the correction, from those of the corrected pose."""
     if saved is None or d_camera is None:
         return None
     grads = pose_reverse(*d_camera, saved)

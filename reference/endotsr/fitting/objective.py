@@ -1,4 +1,4 @@
-"""The objective of one training view, equation (6), and its gradient by the rendered images.
+"""The objective of one training view, equation (6), and its gradient with respect to the rendered images.
 
 L = (1 - w) L1 + w (1 - SSIM) + depth + smoothness + lambda_msp L_msp + lambda_lap(iteration) L_lap
 
@@ -58,7 +58,7 @@ class LossWeights(NamedTuple):
 
 
 class ImageLoss(NamedTuple):
-    """Value, terms and gradient by the images."""
+    """Value, terms and gradient with respect to the images."""
 
     loss: float
     terms: dict[str, float]  # l1, ssim, depth, smoothness, laplacian: unweighted; only those evaluated
@@ -80,7 +80,7 @@ def frame_targets(frame: Frame, config: Config) -> Targets:
 
 
 def photometric_loss(colour: FloatArray, targets: Targets, ssim_weight: float) -> ImageLoss:
-    """(1 - w) masked L1 + w (1 - masked SSIM) and its gradient by the unclamped render."""
+    """(1 - w) masked L1 + w (1 - masked SSIM) and its gradient with respect to the unclamped render."""
     l1, l1_saved = masked_l1_forward(colour, targets.image, targets.mask)
     loss, terms = (1.0 - ssim_weight) * l1, {"l1": l1}
     d_colour = masked_l1_reverse(1.0 - ssim_weight, l1_saved)

@@ -3,7 +3,7 @@
     Gaussians --(B1), (1)-(3)--> scene at t --(B2)-(B5)--> images --(B13)--> exposed --(6)--> loss,   and back
                             camera --(B16)--^
 
-In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and its gradient by every array. The
+In: raw parameters, the targets of one frame, a camera and a time. Out: the loss and the gradient of every array. The
 gradient check and the golden family `objective` call this function. Training computes the same with the same functions
 (`training_step`), but fuses the largest reverse passes with the Adam step that follows (`fused/`); one such step
 equals `view_gradients` followed by `adam_update` bit by bit (tested).
@@ -42,8 +42,8 @@ class ViewGradients(NamedTuple):
     loss: float  # the Matern penalty included
     terms: dict[str, float]  # unweighted; only those evaluated
     gradients: dict[str, FloatArray]  # by field of `Gaussians`, for every array that exists
-    d_exposure: Exposure | None  # gradients by the exposure of this frame
-    d_pose: Pose | None  # gradients by the correction of its pose
+    d_exposure: Exposure | None  # gradients with respect to the exposure of this frame
+    d_pose: Pose | None  # gradients with respect to the correction of its pose
     rendered: RenderOut  # the images that were compared
     render_saved: RenderSaved  # holds the decisions of the render: order, contributors, clamps
 

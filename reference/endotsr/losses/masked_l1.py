@@ -1,7 +1,7 @@
 """Masked L1 between the render and the observed frame (B6): the mean absolute difference over tissue.
 
-In: planar images (C, H, W) and the tissue mask. Out: a scalar and its derivative by the render. The difference
-is selected, not multiplied, by the mask: values under an instrument, NaN included, have no effect.
+In: planar images (C, H, W) and the tissue mask. Out: a scalar and its derivative with respect to the render. The
+difference is selected, not multiplied, by the mask: values under an instrument, NaN included, have no effect.
 """
 
 from typing import NamedTuple

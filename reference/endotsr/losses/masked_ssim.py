@@ -108,7 +108,7 @@ def masked_ssim_forward(rendered: FloatArray, target: SsimTarget) -> tuple[float
 
 
 def masked_ssim_reverse(d_ssim: float, saved: SsimSaved) -> FloatArray:
-    """d_rendered (C, H, W) for the derivative d_ssim of a loss by the mean SSIM; 0 outside the mask."""
+    """d_rendered (C, H, W) for the derivative d_ssim of a loss with respect to the mean SSIM; 0 outside the mask."""
     target = saved.target
     if target.count == 0:
         return np.zeros(target.image.shape, saved.difference.dtype)

@@ -32,7 +32,7 @@ class SmoothnessSaved(NamedTuple):
 
 
 class SmoothnessGrads(NamedTuple):
-    """Derivatives of the loss by its two differentiable inputs."""
+    """Derivatives of the loss with respect to its two differentiable inputs."""
 
     d_rendered: FloatArray  # (C, H, W)
     d_rendered_depth: FloatArray  # (H, W)
@@ -74,7 +74,7 @@ def smoothness_forward(
 
 
 def smoothness_reverse(d_loss: float, saved: SmoothnessSaved) -> SmoothnessGrads:
-    """Derivatives by the rendered depth (both terms) and the rendered image (TV only)."""
+    """Derivatives with respect to the rendered depth (both terms) and the rendered image (TV only)."""
     depth, rendered, factor = saved.rendered_depth, saved.rendered, saved.total_variation_factor
     new = np.empty_like if factor != 0 else np.zeros_like  # total variation writes every pixel
     d_depth, d_rendered = new(depth), new(rendered)

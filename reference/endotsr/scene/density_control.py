@@ -67,7 +67,7 @@ def gather_statistics(
 ) -> None:
     """Add one view: norm of (g_u W/2, g_v H/2) for every visible Gaussian, in place.
 
-    d_mean   (2, N) gradient by the projected centre, loss per pixel
+    d_mean   (2, N) gradient with respect to the projected centre, loss per pixel
     visible  (N,) bool; the others gain neither gradient nor visit
     """
     if d_mean.shape != (2, visible.size) or visible.shape != statistics.visits.shape:

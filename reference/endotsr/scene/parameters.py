@@ -97,12 +97,12 @@ def _at(frames: FrameParameters, t: float, array: FloatArray) -> FloatArray:
 
 
 def exposure_gradients(frames: FrameParameters, k: int, exposure: Exposure) -> dict[str, FloatArray]:
-    """Gradients by the arrays of the exposures from those by the exposure of frame k: zero in every other column."""
+    """Gradients of all exposures from those of frame k: zero in every other column."""
     return _in_columns(frames, "exposure", exposure, {k: 1.0})
 
 
 def pose_gradients(frames: FrameParameters, t: float, pose: Pose) -> dict[str, FloatArray]:
-    """Gradients by the arrays of the poses from those by the correction at time t: the transpose of `pose_at`."""
+    """Gradients of all poses from those of the correction at time t: the transpose of `pose_at`."""
     last = frames.times.size - 1
     left = int(np.clip(np.searchsorted(frames.times, t, side="right") - 1, 0, last))
     right = min(left + 1, last)

@@ -72,7 +72,7 @@ def side_of(slit: Slit, a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def half_width(slit: Slit, x: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
-    """Half the width of the slit at x, mm, and its derivative by x. Both are 0 while it is closed and beyond its ends.
+    """Half the width of the slit at x, mm, and its slope. Both are 0 while it is closed and beyond its ends.
 
     The blade runs at constant speed and the width grows with the smooth step 3 p^2 - 2 p^3 of its progress p.
     """
@@ -88,7 +88,7 @@ def half_width(slit: Slit, x: FloatArray, t: float) -> tuple[FloatArray, FloatAr
 def parting(
     slit: Slit, a: FloatArray, b: FloatArray, side: FloatArray | None, t: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Displacement across the slit, mm, and its derivatives by a and b.
+    """Displacement across the slit, mm, and its derivatives with respect to a and b.
 
     side     +1 or -1; None takes the side on which each point lies. A side given for points beyond the line continues
              the formula of that side smoothly.

@@ -6,7 +6,7 @@ A material point has two coordinates (a, b) in millimetres. At rest it lies at (
 
 with a wave h, and for every motion k a time course s_k (0 at t = 0), a spatial weight w_k and a direction v_k. A slit
 adds the parting of its two sides (slit.py). World axes are those of the resting camera: x right, y down, z forward.
-Because X and its derivatives by a and b are formulas, the geometry is known to rounding.
+Because X and its derivatives with respect to a and b are formulas, the geometry is known to rounding.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from endotsr.simulator.slit import Slit, is_open, make_slit, parting
 
 Weight = Callable[
     [FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
-]  # (a, b) -> weight, its derivatives by a and b
+]  # (a, b) -> weight, its derivatives with respect to a and b
 
 PULSATION_CENTRE = (-0.2, 0.1)  # of the regions that beat and are pulled, distances of the camera
 PULL_CENTRE = (0.06, 0.04)
@@ -71,7 +71,7 @@ def surface_point(surface: Surface, material: FloatArray, t: float) -> FloatArra
 def evaluate(
     surface: Surface, a: FloatArray, b: FloatArray, t: float, side: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Position and its derivatives by a and by b, each (3, ...); `side` as in `slit.parting`."""
+    """Position and its derivatives with respect to a and b, each (3, ...); `side` as in `slit.parting`."""
     point = np.stack([a, b, np.full_like(a, surface.distance)])
     along_a, along_b = np.zeros_like(point), np.zeros_like(point)
     along_a[0], along_b[1] = 1.0, 1.0

@@ -16,7 +16,7 @@ from endotsr.simulator.surface import Surface, evaluate
 from endotsr.splatting.camera import Camera
 
 Formula = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-# (p, q) -> position, its derivatives by p and by q, each (3, ...)
+# (p, q) -> position, its derivatives with respect to p and q, each (3, ...)
 
 RESIDUAL_TOLERANCE = 1e-10  # mm, beside the ray
 MOST_STEPS = 30

@@ -25,7 +25,7 @@ class Camera(NamedTuple):
 
 
 class CameraGrads(NamedTuple):
-    """Derivative of a loss by the camera pose, every entry of the rotation matrix taken as independent."""
+    """Derivative of a loss with respect to the camera pose, every entry of the rotation matrix taken as independent."""
 
     d_rotation: FloatArray  # (3, 3)
     d_translation: FloatArray  # (3,)

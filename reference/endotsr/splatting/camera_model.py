@@ -57,7 +57,7 @@ def pinhole(x, y, z, lens):
 
 @jit_formula
 def pinhole_reverse(x, y, z, lens, d_u, d_v, d_z, d_jacobian):
-    """By (x, y, z), from the gradients by u, v, J and, through the depth image, z."""
+    """Gradient of (x, y, z), from those of u, v, J and, through the depth image, z."""
     one, two, zero = type(z)(1), type(z)(2), type(z)(0)
     d_j00, _, d_j02, _, d_j11, d_j12 = d_jacobian
     inverse_z = one / z

@@ -39,7 +39,7 @@ class CovarianceSaved(NamedTuple):
 
 
 class CovarianceGrads(NamedTuple):
-    """Gradients by the raw parameters."""
+    """Gradients with respect to the raw parameters."""
 
     d_quaternion: FloatArray  # (4, N)
     d_log_scale: FloatArray  # (3, N)
@@ -67,7 +67,7 @@ def unit_quaternion(w, x, y, z):
 
 @jit_formula
 def unit_quaternion_reverse(w, x, y, z, inverse_norm, d_unit):
-    """By the raw quaternion: the part of the gradient along the unit one is removed, the rest divided by the norm."""
+    """Gradient of the raw quaternion: the part along the unit one is removed, the rest divided by the norm."""
     d_w, d_x, d_y, d_z = d_unit
     along = d_w * w + d_x * x + d_y * y + d_z * z
     return (
@@ -91,7 +91,7 @@ def rotation_of(w, x, y, z):
 
 @jit_formula
 def rotation_reverse(w, x, y, z, d_rotation):
-    """By the unit quaternion, from G = dL/dR, all nine entries independent, row by row."""
+    """Gradient of the unit quaternion, from G = dL/dR, all nine entries independent, row by row."""
     two = type(w)(2)
     g00, g01, g02, g10, g11, g12, g20, g21, g22 = d_rotation
     return (
@@ -111,7 +111,7 @@ def semi_axis(log_scale):
 
 @jit_formula
 def semi_axis_reverse(log_scale, scale, d_scale):
-    """By the log-scale; zero where it was clipped."""
+    """Gradient of the log-scale; zero where it was clipped."""
     inside = abs(log_scale) <= type(log_scale)(LOG_SCALE_LIMIT)
     return d_scale * scale if inside else type(log_scale)(0)
 
@@ -135,7 +135,7 @@ def _covariance_forward(first, stop, quaternion, log_scale, rotation, scale):
 
 
 def _covariance_reverse(first, stop, quaternion, log_scale, scale, d_rotation, d_scale, d_out):
-    """`d_rotation` (9, N); `d_out` (7, N): gradients by quaternion and log-scale."""
+    """`d_rotation` (9, N); `d_out` (7, N): gradients with respect to quaternion and log-scale."""
     results = local_array(GRADIENTS, quaternion)
     for start in range(first, stop, GROUP):
         count = min(GROUP, stop - start)
@@ -178,7 +178,7 @@ def covariance_forward(quaternion: FloatArray, log_scale: FloatArray) -> tuple[S
 
 
 def covariance_reverse(d_shape: Shape, saved: CovarianceSaved) -> CovarianceGrads:
-    """Gradients by quaternion and log-scale from those by rotation (all nine entries independent) and scale."""
+    """Gradients of quaternion and log-scale from those of rotation (all nine entries independent) and scale."""
     n = saved.quaternion.shape[1]
     d_out = np.empty((7, n), saved.quaternion.dtype)
     parallel_for(_reverse_kernel, n, *saved, d_shape.rotation.reshape(9, n), d_shape.scale, d_out)

@@ -20,7 +20,7 @@ from endotsr.splatting.harmonics_formulas import direction, direction_reverse, h
 
 _U64 = np.uint64  # no index may count from the end
 
-DIRECTIONS_PER_SUM = 512  # Gaussians whose gradients by the camera centre are added up together
+DIRECTIONS_PER_SUM = 512  # Gaussians whose gradients with respect to the camera centre are added up together
 DIRECTION, BASIS, POSITION = 4 * GROUP, 15 * GROUP, 3 * GROUP  # numbers that these take for a group
 
 
@@ -72,7 +72,7 @@ def _colour_channel(harmonics, residual, channel, start, count, terms, basis, su
 
 
 def _colour_channel_reverse(harmonics, channel, start, count, terms, basis, d_sums, d_harmonics, d_residual, d_basis):
-    """By the coefficients and the residual of one channel; adds to the gradient by Y_1 ... Y_15."""
+    """Gradients of coefficients and residual of one channel; adds to that of Y_1 ... Y_15."""
     y00, zero = d_sums.dtype.type(Y00), d_sums.dtype.type(0)
     for item in range(count):
         d_harmonics[0, channel, _U64(start + item)] = y00 * d_sums[_U64(item)]
@@ -176,7 +176,7 @@ def harmonics_forward(
 
 
 def harmonics_reverse(d_colour: FloatArray, saved: HarmonicsSaved) -> HarmonicsGrads:
-    """Gradients by coefficients, residual, position and camera centre from dL/dcolour (3, N)."""
+    """Gradients with respect to coefficients, residual, position and camera centre from dL/dcolour (3, N)."""
     n = saved.position.shape[1]
     dtype = saved.position.dtype
     d_harmonics = np.empty_like(saved.harmonics)

@@ -110,7 +110,7 @@ def projection_reverse(
     *,
     pose_gradient: bool = False,
 ) -> ProjectionGrads:
-    """Gradients by position, rotation, scale and, when asked for, the camera pose.
+    """Gradients with respect to position, rotation, scale and, when asked for, the camera pose.
 
     d_mean2d        (2, N) dL/d(u, v), per px
     d_covariance2d  (3, N) dL/d(a, b, c), b counted once; the determinant's share is already inside (det = a c - b^2)
@@ -134,9 +134,9 @@ def projection_reverse_footprint(
     *,
     pose_gradient: bool = False,
 ) -> ProjectionGrads:
-    """As `projection_reverse`, from the gradients (3, N) by A, m, r of `footprint`.
+    """As `projection_reverse`, from the gradients (3, N) with respect to A, m, r of `footprint`.
 
-    The render takes this way: in gradients by a, b, c the length of a needle is lost, by (length / width)^2 roundings.
+    The render takes this way: in gradients of a, b, c the length of a needle is lost, by (length / width)^2 roundings.
     """
     n, dtype = saved.position.shape[1], saved.position.dtype
     d_out = np.empty((WITH_POSE if pose_gradient else WITHOUT_POSE, n), dtype)

@@ -43,7 +43,7 @@ def to_view(position, pose):
 
 @jit_formula
 def to_view_reverse(pose, d_x, d_y, d_z):
-    """By the centre: W^T (g_x, g_y, g_z)."""
+    """Gradient of the centre: W^T (g_x, g_y, g_z)."""
     w00, w01, w02, w10, w11, w12, w20, w21, w22 = pose.rotation
     return (
         w00 * d_x + w10 * d_y + w20 * d_z,
@@ -54,7 +54,7 @@ def to_view_reverse(pose, d_x, d_y, d_z):
 
 @jit_formula
 def pose_reverse(position, d_w, d_x, d_y, d_z):
-    """By W and d: what reaches W through J W, `d_w`, and what reaches both through the centre in camera axes."""
+    """Gradients of W and d: `d_w` reaches W through J W, the rest both through the centre in camera axes."""
     p0, p1, p2 = position
     return (
         d_w[0] + d_x * p0, d_w[1] + d_x * p1, d_w[2] + d_x * p2,
@@ -77,7 +77,7 @@ def product(a, b):
 
 @jit_formula
 def product_reverse(a, b, d_product):
-    """By the left factor, G b^T, and by the right one, a^T G."""
+    """Gradients of the left factor, G b^T, and of the right one, a^T G."""
     a00, a01, a02, a10, a11, a12 = a
     b00, b01, b02, b10, b11, b12, b20, b21, b22 = b
     g00, g01, g02, g10, g11, g12 = d_product
@@ -129,7 +129,7 @@ def screen_covariance(t, s, low_pass):
 
 @jit_formula
 def axis_reverse(t0, t1, s, e, m, g_a, g_m, g_r, free):
-    """By column k of T and by S_k; `free`: a clipped axis is constant.
+    """Gradients of column k of T and of S_k; `free`: a clipped axis is constant.
 
     g_a = 2 A^2 g_A, g_m = r g_m, g_r = 2 r^2 g_r of the specification.
     """
@@ -142,7 +142,7 @@ def axis_reverse(t0, t1, s, e, m, g_a, g_m, g_r, free):
 
 @jit_formula
 def screen_covariance_reverse(t, s, free, low_pass, determinant, d_footprint):
-    """By T and S, from the gradients by A, m, r of the footprint."""
+    """Gradients of T and S, from those of A, m, r of the footprint."""
     t00, t01, t02, t10, t11, t12 = t
     s0, s1, s2 = s
     free0, free1, free2 = free
@@ -182,7 +182,7 @@ def project_one(position, rotation, scale, lens, pose, rules):
 def project_one_reverse(
     position, rotation, scale, lens, pose, rules, drawn, determinant, d_mean, d_footprint, d_depth
 ):  # fmt: skip
-    """By position (3), scale (3), rotation (9) and pose (9 + 3); of one that is not drawn the numbers mean nothing."""
+    """Gradients of position (3), scale (3), rotation (9) and pose (9 + 3); meaningless for one that is not drawn."""
     one = type(determinant)(1)
     x, y, z = to_view(position, pose)
     z, determinant = (z if drawn else one), (determinant if drawn else one)

@@ -14,14 +14,14 @@ from endotsr.kernels.vectors import local_array
 from endotsr.splatting.projection_formulas import project_one, project_one_reverse
 
 PROJECTED = 8  # results: mean 2, covariance 3, determinant, depth, whether it is drawn
-WITHOUT_POSE, WITH_POSE = 15, 27  # gradients by position 3, scale 3, rotation 9; and by the pose 9 + 3
+WITHOUT_POSE, WITH_POSE = 15, 27  # gradients of position 3, scale 3, rotation 9; and of the pose 9 + 3
 RESULTS, GRADIENTS = PROJECTED * GROUP, WITH_POSE * GROUP
 
 _U64 = np.uint64  # no index may count from the end
 
 
 class ScreenGrads(NamedTuple):
-    """Gradients of the loss by what the projection puts on the screen."""
+    """Gradients of the loss with respect to what the projection puts on the screen."""
 
     d_mean2d: FloatArray  # (2, N)
     d_footprint: FloatArray  # (3, N) by A, m, r
@@ -46,7 +46,7 @@ def _project(first, stop, position, rotation, scale, lens, pose, rules, out, vis
 
 
 def _project_reverse(first, stop, position, rotation, scale, lens, pose, rules, visible, determinant, d_screen, d_out):
-    """`d_out` (15, N): gradients by position, scale, rotation; (27, N): and the terms of that by the pose."""
+    """`d_out` (15, N): gradients of position, scale, rotation; (27, N): and the terms of that of the pose."""
     d_mean2d, d_footprint, d_depth = d_screen
     results = local_array(GRADIENTS, position)
     for start in range(first, stop, GROUP):

@@ -164,7 +164,7 @@ def gather_gradients(
     conic_epsilon: float,
     keep_depth: bool,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Gradients by mean2d (2, N), covariance2d (3, N), logit (N,), colour (3, N), depth (N,); zero where unseen."""
+    """Gradients of mean2d (2, N), covariance2d (3, N), logit (N,), colour (3, N), depth (N,); zero where unseen."""
     d_mean2d, d_footprint, d_logit, d_colour, d_depth = gather_footprint_gradients(
         order, records, lists, pair_gradients, determinant, opacity_logit,
         conic_epsilon=conic_epsilon, keep_depth=keep_depth,

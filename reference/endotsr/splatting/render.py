@@ -1,7 +1,7 @@
 """One view of the Gaussians at one time: all splatting stages composed, forward and reverse.
 
-Input: deformed raw parameters and a camera. Output: colour, depth, opacity and, in reverse, gradients by every
-parameter and, on request, by the background and the camera pose. This module does not depend on time.
+Input: deformed raw parameters and a camera. Output: colour, depth, opacity and, in reverse, gradients with respect
+to every parameter and, on request, the background and the camera pose. This module does not depend on time.
 """
 
 from collections.abc import Callable, Mapping
@@ -155,7 +155,7 @@ def render_reverse(
     pose_gradient: bool = False,
     timer: Timer = NO_TIMER,
 ) -> RenderGrads:
-    """Gradients of a loss by every input of the view.
+    """Gradients of a loss with respect to every input of the view.
 
     d_colour   (3, H, W), d_depth (H, W), d_opacity (H, W) or None = zero
     timer      told of the stages "blend reverse", "binning" and "projection"

@@ -1,7 +1,7 @@
 """A stage: a forward pass, its reverse pass, the arrays that it returns and the inputs at which it is checked.
 
-The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss by NAME: a
-cotangent where NAME is an output, a gradient where it is an input.
+The names of arrays and settings are those of the golden cases. `d_NAME` is the derivative of the loss with respect to
+NAME: a cotangent where NAME is an output, a gradient where it is an input.
 """
 
 from collections.abc import Callable, Mapping

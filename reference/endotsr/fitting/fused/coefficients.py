@@ -42,7 +42,7 @@ def coefficients_adam_step(
 ) -> None:
     """Update coefficients (3, 2F, N), and their moments in `state`, in place.
 
-    d_sums     (3, N) gradient of the loss by sum_a coefficients[:, a] atoms[a]
+    d_sums     (3, N) gradient of the loss with respect to sum_a coefficients[:, a] atoms[a]
     atoms      (2F,) the atoms of that sum
     shrink     (2F,) of `penalty_factors`: shrink[a] x coefficients[:, a] is added to the gradient; or None
     parameter  (3, 2F, N) the coefficients themselves

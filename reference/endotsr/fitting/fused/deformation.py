@@ -58,14 +58,14 @@ def deformation_adam_step(
 ) -> FloatArray | None:
     """Update the FDM arrays held in `saved`, and their moments in `state`, in place.
 
-    d_offsets  (10, N) gradient of the loss by the offsets
+    d_offsets  (10, N) gradient of the loss with respect to the offsets
     saved      from `deformation_forward`; its weight, centre and width are the parameters themselves
     state      moments and steps under the names fdm_weight, fdm_centre, fdm_width
     rates      learning rates under the same names, one each or one per part of the ten channels
     ahead      normalised time at which the offsets of the updated arrays are computed; None = not computed
     returns    those offsets, (10, N); None without `ahead`
 
-    The gradient by t is not formed.
+    The gradient with respect to t is not formed.
     Raises: ValueError naming the array whose shape, dtype or layout does not fit.
     Oracle: `deformation_reverse`, `adam_update`, `deformation_forward`, bitwise.
     """

@@ -1,4 +1,4 @@
-"""One Adam step of everything that is trained, from the gradients by the deformed scene.
+"""One Adam step of everything that is trained, from the gradients with respect to the deformed scene.
 
 Where the gradient of an array is much larger than its factors (time bases, Fourier coefficients), the reverse pass and
 the step are one sweep, and the gradient is never stored. The sweep over the time bases also computes the offsets of
@@ -34,8 +34,8 @@ def optimise(
     """Change the Gaussians and their moments in place.
 
     saved   of `scene_at`, for the same Gaussians
-    grads   gradients by the deformed scene
-    back    of `scene_reverse(..., coefficients=False)`: gradients by the arrays that need no sweep of their own
+    grads   gradients with respect to the deformed scene
+    back    of `scene_reverse(..., coefficients=False)`: gradients of the arrays that need no sweep of their own
     rates   learning rate of every array
     next_time  normalised time of the next iteration, if it is known
     timer   records the stages "FDM" and "Adam"

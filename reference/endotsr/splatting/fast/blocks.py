@@ -287,7 +287,7 @@ def _new_sums(like):
 
 
 class PictureGrads(NamedTuple):
-    """Gradients of the loss by what compositing draws."""
+    """Gradients of the loss with respect to what compositing draws."""
 
     d_colour: FloatArray  # (3, H, W)
     d_depth: FloatArray  # (H, W)
