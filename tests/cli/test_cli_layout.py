@@ -23,6 +23,8 @@ FAULTS = {
     "folded.html": f"<details>{WIDE}</details>",
     "word.html": '<p style="width:2em;overflow-wrap:anywhere">a statistical word</p>',
     "cut.html": '<p style="width:4em;overflow:hidden;white-space:nowrap">a statistical word</p>',
+    "book.html": '<article class="bd-article" style="width:2em;overflow-wrap:anywhere">a statistical word',
+    "code.html": '<article class="bd-article" style="width:2em;overflow-wrap:anywhere"><code>statistical</code>',
     "good.html": '<input type="search"><input type="search" hidden><table><tr><td>1</td></tr></table>',
 }
 
@@ -35,6 +37,7 @@ def test_faults_of_a_layout_are_found(tmp_path):
         ("wide.html", 1000, "page"), ("wide.html", 390, "page"),
         *((name, width, "table") for name in ("table.html", "folded.html") for width in (1400, 1000)),
         *((f"{kind}.html", width, kind) for kind in ("word", "cut") for width in (1400, 1000, 390)),
+        *(("book.html", width, "word") for width in (1400, 1000, 390)),
         *(("search.html", width, "search") for width in (1400, 1000, 390)),
     }  # fmt: skip
 

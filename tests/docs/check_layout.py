@@ -2,8 +2,8 @@
 
 Run after the build: python tests/docs/check_layout.py docs/_build/html [PAGE ...]
 At 1400 and 1000 px every column of every table is visible. On a telephone (390 px) a table of many columns may scroll
-inside its box. At every width a page shows at most one search box, and in the pages that commands write no word is
-broken over two lines and no text is cut at the edge of its box. Without a browser the check says so and ends with exit
+inside its box. At every width a page shows at most one search box, and no word is broken over two lines. In the pages
+that commands write no text is cut at the edge of its box. Without a browser the check says so and ends with exit
 code 0.
 """
 
@@ -32,12 +32,12 @@ function measure(page, width) {
     const whole = width >= ALL_COLUMNS_FROM || box(table).matches(".few, .listed");
     if (shown(table) && whole && by > 1) say("table", name(table), by);
   }
-  if (!root.querySelector("article.bd-article")) text(root, say, shown);  // names of files break in the book
+  for (const word of brokenWords(root.querySelector("article.bd-article") || root)) say("word", word, 0);
+  if (!root.querySelector("article.bd-article")) cutText(root, say, shown);  // the theme cuts within formulas
   const boxes = [...frame.contentDocument.querySelectorAll("input[type=search], .search-button-field")].filter(shown);
   if (boxes.length > 1) say("search", boxes.length + " search boxes", 0);
 }
-function text(root, say, shown) {  // of the pages that commands write
-  for (const word of brokenWords(root)) say("word", word, 0);
+function cutText(root, say, shown) {
   for (const e of root.querySelectorAll("*")) {
     const flow = frame.contentWindow.getComputedStyle(e).overflowX, hides = ["hidden", "clip"].includes(flow);
     const by = e.scrollWidth - e.clientWidth;
@@ -45,7 +45,7 @@ function text(root, say, shown) {  // of the pages that commands write
   }
 }
 function brokenWords(root) {  // words and numbers on two lines; names of files and settings may break
-  const page = frame.contentDocument, walker = page.createTreeWalker(page.body, 4), range = page.createRange();
+  const page = frame.contentDocument, walker = page.createTreeWalker(root, 4), range = page.createRange();
   const broken = new Set(), apart = "script,style,code,pre,svg,mjx-container";
   const words = /(?<![^\\s(\u201c"])(?:\\p{L}{2,}|[\u2212-]?\\d[\\d.]+)(?![^\\s.,;:)!?\u201d"])/gu;
   for (let node; (node = walker.nextNode());) {
