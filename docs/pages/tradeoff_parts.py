@@ -4,7 +4,7 @@ from typing import Any
 
 from tradeoff_dials import OMITTED
 from tradeoff_presets import judge_presets
-from tradeoff_training_text import best_by_time, gain_by_minute, summary, training_rows
+from tradeoff_training_text import summary, training_rows
 
 from endotsr.report.tables import markdown
 from endotsr.tradeoff.text import (
@@ -155,7 +155,7 @@ def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any])
 
 
 def training(name: str, result: dict[str, Any]) -> str:
-    """One study of training: what was run, its pictures, the table, and what each stretch of time bought."""
+    """One study of training: what was run, its picture, the table, and what is not worth its time."""
     m = result["machine"]
     head = (
         f"**{result['sequence']}**, {result['frames']} frames of {result['width']}x{result['height']}, preset "
@@ -163,27 +163,9 @@ def training(name: str, result: dict[str, Any]) -> str:
         f"{result['threads']} threads of {m['processor']} ({m['cores']} cores)."
     )
     left = [f"{name}: {reason}" for name, reason in result["left_out"].items()]
-    stem = f"results/tradeoff_training_{name}"
-    pictures = [
-        f"![Held-out PSNR against minutes of training]({stem}.svg)",
-        f"![All metrics against minutes of training]({stem}_seconds.svg)",
-        f"![All metrics against iterations]({stem}_iterations.svg)",
-    ]
-    bought = gain_by_minute(best_by_time(result))
-    return "\n\n".join(
-        part
-        for part in (
-            head,
-            pictures[0],
-            markdown(TRAINING_COLUMNS, training_rows(result)),
-            _bullets(summary(result)),
-            "Which minute bought how many decibels, whatever the training:" if bought else "",
-            _bullets(bought),
-            _bullets(left),
-            *pictures[1:],
-        )
-        if part
-    )
+    picture = f"![Held-out PSNR against minutes of training](results/tradeoff_training_{name}.svg)"
+    table = markdown(TRAINING_COLUMNS, training_rows(result))
+    return "\n\n".join(part for part in (head, picture, table, _bullets(summary(result)), _bullets(left)) if part)
 
 
 def _numbered(sentences: list[str]) -> str:

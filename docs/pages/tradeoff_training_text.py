@@ -1,4 +1,4 @@
-"""The results in `training.json` as text: a table of the trainings, and the gain of each interval of time."""
+"""The results in `training.json` as text: a table of the trainings, and which of them another one exceeds."""
 
 from typing import Any
 
@@ -7,11 +7,11 @@ from endotsr.report.words import duration
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
-    """Text for the terminal: the final state of every training beside the base, then the gain of each interval."""
+    """Text for the terminal: the final state of every training beside the base, and the summary."""
     rows = training_rows(result)
     lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
     lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
-    return lines + summary(result) + gain_by_minute(best_by_time(result))
+    return lines + summary(result)
 
 
 def summary(result: dict[str, Any]) -> list[str]:
@@ -23,16 +23,13 @@ def summary(result: dict[str, Any]) -> list[str]:
     if "float64" in ends:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
-            f"one seed each: `float64` differs from `base` by rounding alone and ends {chance:.2f} dB from it, "
-            "so that is how far chance goes here"
+            "Chance: each training has one seed. `float64` differs from `base` by rounding alone, and ends "
+            f"{chance:.2f} dB from it. Smaller differences mean nothing here."
         )
-    beaten = {
-        name: [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
-        for name, (seconds, psnr) in ends.items()
-    }
-    kept = [name for name in sorted(ends, key=lambda n: ends[n]) if not beaten[name]]
-    lines.append(f"nothing was both faster and better by more than chance than: {', '.join(kept)}")
-    lines += [f"{name}: beaten by {', '.join(others)}" for name, others in beaten.items() if others]
+    for name, (seconds, psnr) in ends.items():
+        better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
+        if better:
+            lines.append(f"Faster than *{name}*, and better by more than chance: {', '.join(better)}.")
     return lines
 
 
@@ -54,40 +51,3 @@ def training_rows(result: dict[str, Any]) -> list[list[str]]:
         cells += [duration(last["seconds"]), f"{last['seconds'] / base['seconds']:.2f}x", str(last["gaussians"])]
         rows.append([c["name"], *cells])
     return rows
-
-
-def best_by_time(result: dict[str, Any]) -> list[dict[str, Any]]:
-    """The measured states that no other state reached sooner and better, earliest first."""
-    rows = [
-        row | {"name": c["name"], "change": c["change"]}
-        for c in result["configurations"]
-        for row in c["milestones"]
-        if row["psnr_full"] is not None
-    ]
-    found: list[dict[str, Any]] = []
-    for row in sorted(rows, key=lambda r: (r["seconds"], -r["psnr_full"])):
-        if not found or row["psnr_full"] > found[-1]["psnr_full"]:
-            found.append(row)
-    return found
-
-
-def gain_by_minute(states: list[dict[str, Any]], least: float = 0.3, stretch: float = 1.5) -> list[str]:
-    """The best states: time, training, and gain per minute since the state before.
-
-    least, stretch   a state is listed if it is `least` dB better and `stretch` times later than the last listed one
-    """
-    lines: list[str] = []
-    before: dict[str, Any] | None = None
-    for row in states:
-        if before is not None and row is not states[-1]:
-            if row["psnr_full"] < before["psnr_full"] + least or row["seconds"] < stretch * before["seconds"]:
-                continue
-        line = (
-            f"after {duration(row['seconds'])}: {row['psnr_full']:.2f} dB ({row['name']}, iteration {row['iteration']})"
-        )
-        if before is not None:
-            minutes = (row["seconds"] - before["seconds"]) / 60
-            line += f", {(row['psnr_full'] - before['psnr_full']) / max(minutes, 1e-9):.2f} dB a minute"
-        lines.append(line)
-        before = row
-    return lines

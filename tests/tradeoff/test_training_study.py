@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tradeoff_training as training
 from tradeoff_training import changed, configurations, measured, run_training_study
-from tradeoff_training_text import best_by_time, gain_by_minute, summary, training_lines, training_rows
+from tradeoff_training_text import summary, training_lines, training_rows
 
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
@@ -128,21 +128,6 @@ def test_the_words_of_a_configuration_make_its_settings():
             assert value == other or np.isclose(value, other, rtol=1e-5), configuration.name
 
 
-def test_best_states_and_what_a_minute_gained():
-    def entry(name, *rows):
-        keys = ("seconds", "iteration", "psnr_full")
-        return {"name": name, "change": [], "milestones": [dict(zip(keys, row, strict=True)) for row in rows]}
-
-    result = {"configurations": [entry("a", (60, 1, 20.0), (180, 2, 30.0)), entry("b", (30, 1, 19.0), (120, 2, 19.5))]}
-    states = best_by_time(result)
-    assert [(s["name"], s["seconds"]) for s in states] == [("b", 30), ("a", 60), ("a", 180)]
-    near = [{"name": "c", "seconds": 80, "iteration": 1, "psnr_full": 20.5}]  # better, but not half as late again
-    lines = gain_by_minute([*states[:2], *near, states[2]])
-    assert len(lines) == 3
-    assert lines[1].endswith("20.00 dB (a, iteration 1), 2.00 dB a minute")
-    assert lines[2].endswith("30.00 dB (a, iteration 2), 5.00 dB a minute")
-
-
 def test_a_training_is_beaten_only_beyond_chance():
     ends = {"base": (60, 30.0), "float64": (90, 30.5), "slow": (70, 29.4), "near": (70, 29.6), "small": (20, 25.0)}
     result = {
@@ -151,10 +136,9 @@ def test_a_training_is_beaten_only_beyond_chance():
             for name, (seconds, psnr) in ends.items()
         ]
     }
-    chance, kept, beaten = summary(result)
+    chance, beaten = summary(result)
     assert "ends 0.50 dB from it" in chance
-    assert kept.endswith("than: small, base, near, float64")
-    assert beaten == "slow: beaten by base"
+    assert beaten == "Faster than *slow*, and better by more than chance: base."
     del result["configurations"][0]
     assert summary(result) == []
 
