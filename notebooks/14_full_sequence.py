@@ -387,9 +387,13 @@ SimpleNamespace(_repr_html_=lambda: picture)
 #
 # ![PSNR of every held-out frame at full size](/results/full_size/curves.svg)
 #
-# With every eighth frame held out, the preset `quick` is 2.2 dB above the blend of the two neighbours there. On a
-# recorded clip with little noise, the preset `paper` is 1.5 dB below that blend, and `sharp` is 0.8 dB above it. The
-# blend adds its own noise, and it smears what moves: it is strong where a clip has little of both.
+# With every eighth frame held out, the preset `quick` is 2.2 dB above the blend of the two neighbours there, and
+# `paper` is 0.6 dB above it. On a recorded clip with little noise, the preset `paper` is 1.5 dB below that blend, and
+# `sharp` is 0.8 dB above it. The blend adds its own noise, and it smears what moves: it is strong where a clip has
+# little of both. The worst frame of `paper` shows the same fault as the blend. Every vessel appears twice, because the
+# model fades one training frame into the next and does not move the vessel between them:
+#
+# ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)
 #
 # ## Ablation
 #

@@ -38,6 +38,11 @@ def mean_psnr(run: dict[str, Any], name: str) -> float:
     return float(np.mean([psnr(row["squared_error"][name]) for row in run["frames"]]))
 
 
+def ahead(run: dict[str, Any]) -> float:
+    """How far the model is above the blend, dB."""
+    return mean_psnr(run, "model") - mean_psnr(run, "two_neighbours")
+
+
 def encoded(picture: NDArray[np.uint8]) -> bytes:
     """The bytes of a webp file; a picture of noise has a quarter of the size it has as png."""
     from PIL import Image

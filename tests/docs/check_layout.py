@@ -44,9 +44,9 @@ function cutText(root, say, shown) {
     if (hides && by > 1 && shown(e) && e.textContent.trim()) say("cut", e.textContent.trim().slice(0, 40), by);
   }
 }
-function brokenWords(root) {  // words and numbers on two lines; names of files and settings may break
+function brokenWords(root) {  // words and numbers on two lines; names and signatures may break
   const page = frame.contentDocument, walker = page.createTreeWalker(root, 4), range = page.createRange();
-  const broken = new Set(), apart = "script,style,code,pre,svg,mjx-container";
+  const broken = new Set(), apart = "script,style,code,pre,svg,mjx-container,dt.sig";
   const words = /(?<![^\\s(\u201c"])(?:\\p{L}{2,}|[\u2212-]?\\d[\\d.]+)(?![^\\s.,;:)!?\u201d"])/gu;
   for (let node; (node = walker.nextNode());) {
     if (!node.parentElement.checkVisibility() || node.parentElement.closest(apart)) continue;
