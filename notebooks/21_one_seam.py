@@ -140,6 +140,15 @@ assert steps["blend"].max() < steps["change of window"].max()
 assert values[2] > max(values[:2])
 
 # %% [markdown]
+# ## Play: the length of the overlap
+#
+# Two windows differ by 6 levels, and their errors are of equal size. Lengthen the overlap: the largest step becomes
+# smaller (21.2), and the recording needs more windows. Raise the correlation of the errors: the gain in the middle goes
+# to 0 (21.3).
+#
+# <div class="widget" data-widget="seam">The figure is live in the built book.</div>
+
+# %% [markdown]
 # ## The warm start
 #
 # The second window takes the Gaussians of the first at one shared frame, the join, at the time $t^*$ of the neighbour

@@ -1,4 +1,4 @@
-// Four figures that respond to the reader: <div class="widget" data-widget="NAME"></div>. No network, no library.
+// Five figures that respond to the reader: <div class="widget" data-widget="NAME"></div>. No network, no library.
 // Each keeps its numbers in `element.state`, which the tests compare with endotsr.definition.
 "use strict";
 (() => {
@@ -262,7 +262,47 @@
     draw();
   };
 
-  const widgets = {compositing, matern, masks, cutoff};
+  // ---- chapter 21: the overlap of two windows against step, error and cost; equation (B18b), (21.2), (21.3) ----
+  const seam = (box) => {
+    const N = 60, G = 2000, FRAMES = 80, MIDDLE = 40, DELTA = 6, width = 560, height = 230;
+    let overlap = 8, correlation = 0;
+    const pen = canvas(box, width, height, "brightness and error over the frames of a seam");
+    const words = make(box, "p"), row = make(box, "div", {class: "widget-row"});
+    const draw = () => {
+      const begin = MIDDLE - overlap / 2, frames = Array.from({length: FRAMES + 1}, (_, g) => g);
+      const weight = frames.map((g) => overlap ? Math.min(1, Math.max(0, (g - begin) / overlap)) : Number(g >= MIDDLE));
+      const first = frames.map((g) => 8 * Math.sin(g / 9)), second = first.map((v) => v + DELTA);
+      const shown = weight.map((w, g) => (1 - w) * first[g] + w * second[g]);
+      const error = weight.map((w) => Math.sqrt((1 - w) ** 2 + w ** 2 + 2 * w * (1 - w) * correlation));
+      const step = DELTA * Math.max(...weight.slice(1).map((w, g) => w - weight[g]));
+      const windows = Math.ceil((G - overlap) / (N - overlap));
+      box.state = {overlap, correlation, weight, error, step, windows};
+      pen.clearRect(0, 0, width, height);
+      const x = (g) => 10 + 540 * g / FRAMES;
+      pen.fillStyle = "#8883";
+      pen.fillRect(x(begin), 0, x(begin + overlap) - x(begin), height);
+      const line = (values, at, colour, thick) => {
+        pen.beginPath();
+        values.forEach((v, g) => { if (v !== null) pen.lineTo(x(g), at(v)); });
+        pen.strokeStyle = colour;
+        pen.lineWidth = thick;
+        pen.stroke();
+      };
+      const brightness = (v) => 80 - 4 * v, below = (v) => 220 - 60 * v;
+      line(first.map((v, g) => g <= begin + overlap ? v : null), brightness, "#38c", 2);
+      line(second.map((v, g) => g >= begin ? v : null), brightness, "#c44", 2);
+      line(shown, brightness, "#d08000", 4);
+      line(error, below, "#d08000", 2);
+      words.textContent = `Above, brightness of a pixel: window k (blue), window k + 1 (red), scene (orange). Below, size of ` +
+        `its error. Largest step beside the motion ${step.toFixed(2)} of ${DELTA} levels; error in the middle ` +
+        `${(20 * Math.log10(error[MIDDLE])).toFixed(2)} dB; ${windows} windows of ${N} frames cover ${G} frames.`;
+    };
+    slider(row, "overlap, frames", 0, 40, 2, overlap, (v) => v.toFixed(0), (v) => { overlap = v; draw(); });
+    slider(row, "correlation of the errors", 0, 1, 0.05, correlation, (v) => v.toFixed(2), (v) => { correlation = v; draw(); });
+    draw();
+  };
+
+  const widgets = {compositing, matern, masks, cutoff, seam};
   const start = () => document.querySelectorAll("div.widget").forEach((box) => {
     box.textContent = "";
     widgets[box.dataset.widget](box);

@@ -10,11 +10,13 @@ from page_visits import found_browser, visits
 
 from endotsr.definition.laplacian import support_masks
 from endotsr.definition.matern import matern_weights
+from endotsr.splatting.render import RenderOut
+from endotsr.windows.scene import blended
 
 pytestmark = pytest.mark.slow  # a browser
 ROOT = Path(__file__).parents[2]
 STATIC = ROOT / "docs" / "_static"
-CHAPTERS = {"compositing": "08", "matern": "04", "masks": "09", "cutoff": "16"}
+CHAPTERS = {"compositing": "08", "matern": "04", "masks": "09", "cutoff": "16", "seam": "21"}
 WIDTHS = (390, 1000, 1400)
 SCRIPT = """
 const say = (page, key) => {
@@ -50,6 +52,8 @@ async function visit(page) {
   slide("log10 of the penalty", -6);
   slide("log10 of the cutoff", -1);
   slide("log10 of the stop", -1);
+  slide("overlap, frames", 20);
+  slide("correlation of the errors", 0.5);
   say(page, "moved");
 }
 """
@@ -113,6 +117,25 @@ def test_a_painted_instrument_removes_the_values_that_the_definition_removes(sta
 def test_cutoff_and_stop_change_error_and_visits(states):
     before, after = (states[key]["states"]["cutoff"] for key in ("start 1400", "moved"))
     assert 0 < before["largest"] < 5 / 255 < after["largest"] and after["visits"] < before["visits"] < 1
+
+
+def test_a_longer_overlap_makes_a_smaller_step_and_more_windows(states):
+    """Against two pictures 6 levels apart blended by the package, and against the spread of drawn errors."""
+    before, after = (states[key]["states"]["seam"] for key in ("start 1400", "moved"))
+    assert (before["overlap"], after["overlap"], after["correlation"]) == (8, 20, 0.5)
+    for state in (before, after):
+        begin, frames = 40 - state["overlap"] // 2, np.arange(81)
+        weight = np.clip((frames - begin) / state["overlap"], 0, 1)
+        pictures = [RenderOut(np.full((3, 1, 1), v), np.zeros((1, 1)), np.zeros((1, 1))) for v in (0.0, 6.0)]
+        shown = np.array([blended(pictures, [1 - w, w]).colour[0, 0, 0] for w in weight])
+        np.testing.assert_allclose([state["step"], *state["weight"]], [np.diff(shown).max(), *weight], atol=1e-12)
+        drawn = np.random.default_rng(21).normal(size=(2, 100_000))
+        other = state["correlation"] * drawn[0] + np.sqrt(1 - state["correlation"] ** 2) * drawn[1]
+        spread = [np.std((1 - w) * drawn[0] + w * other) for w in weight]
+        np.testing.assert_allclose(state["error"], spread, rtol=0.01)
+        covered = state["windows"] * (60 - state["overlap"]) + state["overlap"]
+        assert 2000 <= covered < 2000 + 60 - state["overlap"]
+    assert after["step"] < before["step"] and after["windows"] > before["windows"]
 
 
 @pytest.mark.parametrize("name", CHAPTERS)
