@@ -78,7 +78,7 @@ def render_with_gradients(
     """Colour, depth and the gradients of sum(d_colour * colour) + sum(d_depth * depth), in the dtype of the scene.
 
     scene, camera, settings, degree, background   as for `endotsr.splatting.render.render_forward`
-    d_colour (3, H, W), d_depth (H, W)            gradients of a loss by the two images
+    d_colour (3, H, W), d_depth (H, W)            gradients of a loss with respect to the two images
     Raises: ValueError where gsplat's rules and `settings` differ on this scene, see `difference_of_rules`.
     """
     import torch

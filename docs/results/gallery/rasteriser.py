@@ -133,8 +133,8 @@ def by_division(alphas, dtype):
     naive="`T = T / (1 - alpha)`, back to front",
     bound=8,
     why="The transmittance is not stored but recovered by division. Once an alpha is 1, this is 0/0. Many programs "
-    "therefore clamp alpha at 0.99. (Gradient of the red of one pixel by the first of three alphas, 0.3, 1 and "
-    "0.5; only the first is red.)",
+    "therefore clamp alpha at 0.99. (Gradient of the red of one pixel with respect to the first of three alphas, 0.3, "
+    "1 and 0.5; only the first is red.)",
 )
 def opaque(dtype):
     return 1.0, by_division([0.3, 1.0, 0.5], dtype), weight_gradient([0.3, 1.0, 0.5], dtype)
