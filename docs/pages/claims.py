@@ -9,6 +9,9 @@ To measure, on a machine that has nothing else to do (each command continues whe
 
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --lpips LPIPS.npz \
         --json docs/results/ablation_pulling.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_half --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
+        --measures right_view --json docs/results/ablation_pulling_half.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --collect --json ...   what is finished
     endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
     endotsr ablate simulated --preset paper --iterations 1500 --no-fixed-count --out runs/ablation_simulated_paper \
@@ -23,6 +26,8 @@ from typing import Any
 
 import claims_parts
 import claims_power
+import claims_protocols
+import claims_verdicts
 from marks import read_json, write_marked
 
 from endotsr.errors import InputError
@@ -34,6 +39,7 @@ DOCS = Path(__file__).parents[1]
 PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / "results"
 FILES = {
     "pulling": "ablation_pulling.json",
+    "pulling_half": "ablation_pulling_half.json",
     "simulated": "ablation_simulated.json",
     "simulated_paper": "ablation_simulated_paper.json",
 }
@@ -65,12 +71,14 @@ def parts(folder: Path = RESULTS) -> dict[str, str]:
     """Every generated part of both pages by name."""
     found, runs, cost = read(folder), read_runs(folder), folder / COST
     return {
-        "verdicts": claims_parts.verdicts(found["pulling"], runs),
+        "verdicts": claims_verdicts.verdicts(found["pulling"], found["pulling_half"], runs),
+        "right_eye": claims_protocols.right_eye(found["pulling_half"]),
         "power": claims_power.sentences(found["pulling"]),
         "pulling": claims_parts.tables(found["pulling"]),
+        "pulling_half": claims_parts.tables(found["pulling_half"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "simulated_paper": claims_parts.tables(found["simulated_paper"]),
-        "protocols": claims_parts.protocols(found["pulling"], runs),
+        "protocols": claims_parts.protocols([found["pulling"], found["pulling_half"]], runs),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(read_json(cost, "docs/results/sweep_cost.py") if cost.exists() else None),
     }

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from claims_parts import student
+from claims_verdicts import student
 from marks import read_json, write_marked
 
 DOCS = Path(__file__).parents[1]

@@ -1,14 +1,17 @@
 """The page of claims: what it says is what the results say, and a verdict needs numbers."""
 
 import json
+import re
 from itertools import pairwise
 
 import claims
 import numpy as np
 import pytest
 from claims_cost import planned_hours
-from claims_parts import NOT_YET, increment_verdict, level_verdict, protocols, student, tables, verdicts
+from claims_parts import protocols, tables
 from claims_power import least_size, pairs_needed
+from claims_protocols import MOVED, right_eye
+from claims_verdicts import NOT_YET, increment_verdict, level_verdict, student, verdicts
 from marks import replaced
 from scipy import stats
 
@@ -34,11 +37,11 @@ def test_every_ablation_is_drawn_on_the_page(tmp_path):
 
 
 def test_without_results_every_claim_says_so():
-    text = verdicts(None, [])
+    text = verdicts(None, None, [])
     rows = [line for line in text.splitlines()[2:]]
-    assert len(rows) == 21 and sum(NOT_YET in row for row in rows) == 15
-    assert "not testable" in rows[-7] and all("not measured" in row for row in rows[-6:-1])
-    assert tables(None) == protocols(None, []) == NOT_YET
+    assert len(rows) == 22 and sum(NOT_YET in row for row in rows) == 15
+    assert "not testable" in rows[-8] and all("not measured" in row for row in rows[-7:-1])
+    assert tables(None) == protocols([None], []) == NOT_YET
 
 
 @pytest.mark.parametrize(
@@ -90,11 +93,55 @@ def made_up_record(gain: float) -> dict:
 
 
 def test_a_measured_claim_has_verdict_number_and_interval():
-    line = row_of(verdicts(made_up_record(0.28), []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(0.28), None, []), "Temporal appearance gains")
     assert "| A+S - S | +0.29 dB, mean over EndoNeRF | reproduced | +0.290 dB | +0.265 to +0.315 dB |" in line
-    line = row_of(verdicts(made_up_record(-0.5), []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(-0.5), None, []), "Temporal appearance gains")
     assert "| not reproduced: the opposite |" in line
     assert "6 of 6 runs" in tables(made_up_record(0.28))
+
+
+def half_record(gains: list[float]) -> dict:
+    """Base and whole method, one seed a gain: frames 1, 3, ... held out, and the right camera 1 dB lower."""
+    rows = []
+    for seed, gain in enumerate(gains):
+        for name, psnr in (("base", 36.0 + seed), ("A+S+L", 36.0 + seed + gain)):
+            right = {"label": "this model", "held_out_psnr": psnr - 1, "training_psnr": 30.0}
+            moved = {"label": MOVED, "training_psnr": 33.0}
+            rows.append({
+                "name": f"{name}{seed}", "sequence": "pulling", "split": "every_second", "configuration": name,
+                "seed": seed, "psnr_full": psnr, "iterations": 3500, "preset": "paper", "width": 320, "height": 256,
+                "arrays_sha256": {}, "measures": {"right_view": {"rows": [moved, right]}},
+            })  # fmt: skip
+    return {"rows": rows}
+
+
+@pytest.mark.parametrize("gains, verdict", [([0.2, 0.3, 0.4], "gains"), ([-0.2, -0.3, -0.4], "loses"),
+                                            ([-0.1, 0.1, 0.2], "not decided: the interval holds 0"),
+                                            ([0.3, 0.4], "not decided: 2 of 3 seeds")])  # fmt: skip
+def test_other_frames_are_decided_without_a_published_value(gains, verdict):
+    """Against SciPy; the right camera at held-out times has the same differences, at training times none."""
+    table = verdicts(None, half_record(gains), [])
+    low, high = stats.ttest_1samp(gains, 0.0).confidence_interval(0.95)
+    shown = f"{low:+.2f} to {high:+.2f} dB" if len(gains) > 2 else "-"
+    for words in ("Every second frame", "The view of the right eye, at held-out"):
+        line = row_of(table, words)
+        assert "| A+S+L - base, 320x256, 3500 iterations | not at hand |" in line
+        assert f"| {verdict} | {np.mean(gains):+.2f} dB | {shown} |" in line
+    assert "+0.00 dB" in row_of(table, "The view of the right eye, at training")
+    assert "not measured" in row_of(table, "Blocks of 2")
+    assert "`base` 30.00 dB, `A+S+L` 30.00 dB, left picture moved" in right_eye(half_record(gains))
+    assert right_eye(half_record(gains)).endswith("33.00 dB.") and "not measured" in right_eye(None)
+
+
+def test_what_the_page_says_of_the_right_camera():
+    """A gain in every seed for the trained view, none to see for the other, and the moved left picture ahead of both."""
+    half = json.loads((claims.RESULTS / claims.FILES["pulling_half"]).read_text(encoding="utf-8"))
+    gains = next(r for r in half["increments"] if r["metric"] == "psnr_full")["of"]
+    assert all(pair["difference"] > 0 for pair in gains)
+    row = row_of(claims.parts()["verdicts"], "The view of the right eye, at held-out")
+    assert "not decided" in row and row.endswith("| 0.10 dB |")
+    base, whole, moved = map(float, re.findall(r"([\d.]+) dB", right_eye(half)))
+    assert moved > max(base, whole)
 
 
 def row_of(table: str, words: str) -> str:
@@ -154,6 +201,14 @@ def test_the_stored_differences_are_those_of_the_stored_runs(path):
     record = json.loads((claims.RESULTS / path).read_text(encoding="utf-8"))
     again = json.loads(json.dumps(claims.compared(record)))
     assert again["increments"] == record["increments"] and again["levels"] == record["levels"]
+
+
+@pytest.mark.parametrize("path", claims.FILES.values())
+def test_differences_on_tissue_are_those_of_the_whole_image(path):
+    record = json.loads((claims.RESULTS / path).read_text(encoding="utf-8"))
+    of = {(r["claim"], r["split"], r["metric"]): r["mean"] for r in record["increments"]}
+    whole = {key[:2]: mean for key, mean in of.items() if key[2] == "psnr_full"}
+    assert whole and all(abs(of[*key, "psnr_tissue"] - mean) < 1e-9 for key, mean in whole.items())
 
 
 def test_lpips_has_a_verdict_for_each_range_of_its_input():

@@ -1,0 +1,93 @@
+"""Rows of docs/claims.md on other held-out frames and on the right camera, for which nothing is published.
+
+They come from an ablation at half size (`ablation_pulling_half.json`): the whole method minus the base, paired by seed.
+The right camera is measured by `endotsr evaluate --measures right_view` on two sets of frames: held-out ones, where
+time and view are new, and training frames, where only the view is.
+"""
+
+from typing import Any
+
+import numpy as np
+from claims_power import least_size
+from over_seeds import interval
+
+from endotsr.sweeps.ablation import COMPARISONS, paired
+from endotsr.sweeps.execute import FINISHED
+
+Record = Any  # what a file of docs/results holds
+WHOLE = next(c for c in COMPARISONS if c.claim == "all three")  # the whole method against the base
+PROTOCOLS = (  # what is held out, split, metric
+    ("Every second frame held out", "every_second", "psnr_full"),
+    ("The view of the right eye, at held-out times", "every_second", "held_out_psnr"),
+    ("The view of the right eye, at training times", "every_second", "training_psnr"),
+    ("Blocks of 2 frames held out", "blocks 2", "psnr_full"),
+    ("The end of the clip held out", "end 8", "psnr_full"),
+)
+FIXED_CLAIM = "Laplacian detail gains at a fixed number of Gaussians", "A+S+L fixed - A+S fixed"
+MOVED = "left picture moved by the prior depth"  # needs no model, and no time but that of the frame
+LEAST_PAIRS = 3  # below, nothing is decided
+UNMEASURED = ["not at hand", "not measured", "-", "-", "-"]
+
+
+def protocol_rows(half: Record | None) -> list[list[str]]:
+    """Claim, configurations, published value, verdict, mean, 95 % interval, least difference that is seen."""
+    rows = [] if half is None else [with_right_eye(row) for row in half["rows"]]
+    return [[*FIXED_CLAIM, *UNMEASURED], *(_row(rows, *protocol) for protocol in PROTOCOLS)]
+
+
+def with_right_eye(row: Record) -> Record:
+    """A row with the PSNR of the right camera among its metrics, where it was measured."""
+    measured = row.get("measures", {}).get("right_view", {}).get("rows", [])
+    model = next((found for found in measured if found["label"] == "this model"), {})
+    return {**row, "status": FINISHED, **{key: model.get(key) for key in ("held_out_psnr", "training_psnr")}}
+
+
+def _row(rows: list[Record], label: str, split: str, metric: str) -> list[str]:
+    found = _differences(rows, split, metric)
+    claim = [label, f"{WHOLE.with_} - {WHOLE.without}{_about(rows, split)}"]
+    if not found:
+        return [*claim, *UNMEASURED]
+    if len(found) < LEAST_PAIRS:
+        few = f"not decided: {len(found)} of {LEAST_PAIRS} seeds"
+        return [*claim, "not at hand", few, f"{np.mean(found):+.2f} dB", "-", "-"]
+    mean, half_width = interval(found)
+    low, high = mean - half_width, mean + half_width
+    least = least_size(len(found)) * _spread(rows, metric)
+    return [*claim, "not at hand", decided(low, high), f"{round(mean, 2) + 0.0:+.2f} dB", f"{low:+.2f} to {high:+.2f} dB",
+            f"{least:.2f} dB"]  # fmt: skip
+
+
+def _differences(rows: list[Record], split: str, metric: str) -> list[float]:
+    return [pair.difference for pair in paired(rows, WHOLE, split, metric)]
+
+
+def _spread(rows: list[Record], metric: str) -> float:
+    """Standard deviation of a difference between seeds, pooled over the choices of held-out frames."""
+    chosen = [d for _, split, of in PROTOCOLS if of == metric and len(d := _differences(rows, split, metric)) > 1]
+    return float(np.sqrt(sum(np.var(d) * len(d) for d in chosen) / sum(len(d) - 1 for d in chosen)))
+
+
+def right_eye(half: Record | None) -> str:
+    """PSNR in the right camera at training times: both configurations, and the left picture moved by the depth."""
+    measured = [] if half is None else [row for row in half["rows"] if "right_view" in row.get("measures", {})]
+    if not measured:
+        return "The right camera is not measured yet."
+    rows = [with_right_eye(row) for row in measured]
+    means = {
+        name: np.mean([row["training_psnr"] for row in rows if row["configuration"] == name])
+        for name in (WHOLE.without, WHOLE.with_)
+    }
+    labels = {row["label"]: row["training_psnr"] for row in measured[0]["measures"]["right_view"]["rows"]}
+    models = ", ".join(f"`{name}` {mean:.2f} dB" for name, mean in means.items())
+    return f"Right camera at training times: {models}, {MOVED} {labels[MOVED]:.2f} dB."
+
+
+def decided(low: float, high: float) -> str:
+    """The verdict without a published value, from the ends of the interval."""
+    return "gains" if low > 0 else "loses" if high < 0 else "not decided: the interval holds 0"
+
+
+def _about(rows: list[Record], split: str) -> str:
+    """Size and length of the runs on a split."""
+    of = next((row for row in rows if row["split"] == split), None)
+    return "" if of is None else f", {of['width']}x{of['height']}, {of['iterations']} iterations"
