@@ -53,8 +53,8 @@ def _row(rows: list[Record], label: str, split: str, metric: str) -> list[str]:
     mean, half_width = interval(found)
     low, high = mean - half_width, mean + half_width
     least = least_size(len(found)) * _spread(rows, metric)
-    return [*claim, "not at hand", decided(low, high), f"{round(mean, 2) + 0.0:+.2f} dB", f"{low:+.2f} to {high:+.2f} dB",
-            f"{least:.2f} dB"]  # fmt: skip
+    shown = f"{round(mean, 2) + 0.0:+.2f} dB"  # no "-0.00"
+    return [*claim, "not at hand", decided(low, high), shown, f"{low:+.2f} to {high:+.2f} dB", f"{least:.2f} dB"]
 
 
 def _differences(rows: list[Record], split: str, metric: str) -> list[float]:

@@ -134,7 +134,7 @@ def test_other_frames_are_decided_without_a_published_value(gains, verdict):
 
 
 def test_what_the_page_says_of_the_right_camera():
-    """A gain in every seed for the trained view, none to see for the other, and the moved left picture ahead of both."""
+    """A gain in every seed for the trained view, none for the other, and the moved left picture ahead of both."""
     half = json.loads((claims.RESULTS / claims.FILES["pulling_half"]).read_text(encoding="utf-8"))
     gains = next(r for r in half["increments"] if r["metric"] == "psnr_full")["of"]
     assert all(pair["difference"] > 0 for pair in gains)
