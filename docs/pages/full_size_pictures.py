@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from full_size_text import LABELS, PREDICTIONS, SPLITS, psnr
+from full_size_text import LABELS, PREDICTIONS, PRESETS, SPLITS, psnr
 from numpy.typing import NDArray
 
 from endotsr.evaluation.baselines import unit_image
@@ -59,13 +59,16 @@ def maps_picture(roots: dict[str, NDArray[np.float64]]) -> NDArray[np.uint8]:
 
 
 def curves_figure(runs: dict[str, Any]) -> Any:
-    """PSNR over the tissue of every held-out frame: one panel a split; the line of a model is solid."""
+    """PSNR over the tissue of every held-out frame: one panel a split; the line of a model is solid.
+
+    A preset has one colour in all panels, and the legend has every preset.
+    """
     splits = [split for split in SPLITS if any(run["split"] == split for run in runs.values())]
     figure = new_figure(10.0, 3.4)
     for axes, split in zip(figure.subplots(1, len(splits), sharey=True, squeeze=False)[0], splits, strict=True):
         same = [run for run in runs.values() if run["split"] == split]
-        for run, colour in zip(same, LIGHT.colours, strict=False):
-            _curve(axes, run, "model", run["preset"], "-", colour)
+        for run in same:
+            _curve(axes, run, "model", run["preset"], "-", LIGHT.colours[PRESETS.index(run["preset"])])
         for (name, line), grey in zip(LINES.items(), (GREY, "#000000", "#8a6d3b"), strict=True):
             _curve(axes, same[0], name, LABELS[name], line, grey)
         axes.axhline(psnr(same[0]["noise"] ** 2), color=GREY, linewidth=0.8)
@@ -74,8 +77,10 @@ def curves_figure(runs: dict[str, Any]) -> Any:
         plain_axes(axes, sizes=SMALL)
         name_axes(axes, "frame", title=SPLITS[split], sizes=SMALL)
     name_axes(figure.axes[0], y="PSNR of the tissue, dB", sizes=SMALL)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    legend(figure, sizes=SMALL, loc="outside lower center", ncols=6, handles=handles, labels=labels)
+    named = {
+        label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    legend(figure, sizes=SMALL, loc="outside lower center", ncols=6, handles=[*named.values()], labels=[*named])
     return figure
 
 

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import full_size
+import full_size_pictures
 import full_size_text
 import numpy as np
 import pytest
@@ -29,6 +30,16 @@ def test_stored_files_are_small_and_every_one_is_shown():
     assert sum(file.stat().st_size for file in files) <= LARGEST
     text = full_size.PAGE.read_text(encoding="utf-8")
     assert {file.name for file in files} - {full_size.FILE.name} == set(re.findall(r"full_size/([\w.]+)\)", text))
+
+
+def test_a_preset_has_one_colour_in_all_panels():
+    colours: dict[str, set[str]] = {}
+    for axes in full_size_pictures.curves_figure(RUNS).axes:
+        for line in axes.get_lines():
+            colours.setdefault(line.get_label(), set()).add(line.get_color())
+    assert {run["preset"] for run in RUNS.values()} <= set(colours)
+    models = [colours[preset] for preset in full_size_text.PRESETS if preset in colours]
+    assert all(len(of) == 1 for of in models) and len(set.union(*models)) == len(models)
 
 
 def test_chosen_frames_are_the_worst_the_median_and_the_best():
