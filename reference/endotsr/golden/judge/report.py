@@ -57,8 +57,8 @@ def as_table(report: Report, *, everything: bool = False) -> str:
 def answer(report: Report, *, everything: bool = False) -> list[str]:
     """What is wrong: how the port failed, the first wrong operation, what explains it and what it is like."""
     return [
-        *report.failures, *report.diagnosis[:1], *report.causes, *_suspects(report, everything=everything),
-        *report.diagnosis[1:],
+        *report.failures, *report.diagnosis[:1], *report.inside, *report.causes,
+        *_suspects(report, everything=everything), *report.diagnosis[1:],
     ]  # fmt: skip
 
 

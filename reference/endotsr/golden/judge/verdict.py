@@ -20,6 +20,7 @@ from endotsr.golden.judge.relate import relations
 from endotsr.golden.judge.store import Golden
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
+INSIDE = "inside"  # in that file: the port has no arrays inside its operations to show
 LARGEST_RELATED = 20_000  # entries of an output for which relations are sought
 MISSING = "missing"  # how the reader of arrays refuses a file that is not there
 MOST_FILES = 1000  # of the folder of a case in which a missing output is looked for under another name
@@ -84,6 +85,8 @@ class Report(msgspec.Struct, kw_only=True):
     """the first wrong operation and how its outputs relate to the expected ones; empty where nothing is refused"""
     causes: list[str] = []
     """changes of the definition that give the outputs of that operation as the port wrote them; see golden.search"""
+    inside: list[str] = []
+    """the first wrong array inside that operation, of those that the port wrote; see golden.search.inside"""
     failures: list[str] = []
     """how the port failed as a program"""
 
@@ -131,14 +134,21 @@ def only_of(golden: Golden, only: str) -> Golden:
 
 def declared(golden: Golden, outputs: Path) -> tuple[tuple[str, ...], list[str]]:
     """Operations named in the port's file of what it leaves out, and notes on what could not be understood there."""
+    named, refusal = left_out(outputs)
+    if refusal:
+        return (), [f"{NOT_PORTED}: {refusal}; every operation is judged"]
+    known = dict.fromkeys(case.operation for case in golden.cases)
+    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - {*known, INSIDE})]
+    return tuple(name for name in known if name in named), unknown[:5]
+
+
+def left_out(outputs: Path) -> tuple[set[str], str]:
+    """The words of the port's file of what it leaves out, and why they could not be read; no file holds none."""
     try:
         lines = read_text(outputs / NOT_PORTED, outputs).splitlines()
     except Refused as refusal:
-        return (), [] if str(refusal) == MISSING else [f"{NOT_PORTED}: {refusal}; every operation is judged"]
-    named = {line.split("#")[0].strip() for line in lines} - {""}
-    known = dict.fromkeys(case.operation for case in golden.cases)
-    unknown = [f"{NOT_PORTED}: no operation {name[:40]!a}" for name in sorted(named - set(known))]
-    return tuple(name for name in known if name in named), unknown[:5]
+        return set(), "" if str(refusal) == MISSING else str(refusal)
+    return {line.split("#")[0].strip() for line in lines} - {""}, ""
 
 
 def _left_out(case: Case) -> CaseReport:

@@ -1,6 +1,6 @@
 """The process of a search: `python -m endotsr.golden.search GOLDEN OUTPUTS PRECISION LEVEL OPERATION SECONDS`.
 
-Prints the sentences as JSON; ends with code 1 where there is nothing to explain.
+Prints what it finds as JSON; ends with code 1 where there is nothing to explain.
 """
 
 import contextlib
@@ -12,6 +12,7 @@ from typing import Any
 from endotsr.errors import InputError
 from endotsr.golden.judge.store import read_golden
 from endotsr.golden.search.find import explained, sentences
+from endotsr.golden.search.inside import looked
 
 MOST_MEMORY = 4 << 30  # bytes, where the system can limit them
 
@@ -29,7 +30,8 @@ def main(words: list[str]) -> int:
         found = explained(golden, Path(outputs), given, int(level), operation, float(seconds))
     except InputError:
         return 1
-    print(json.dumps(sentences(found)))
+    inside, asked = looked(found.stage, found.cases)
+    print(json.dumps({"causes": sentences(found), "inside": inside, "asked": asked}))
     return 0
 
 

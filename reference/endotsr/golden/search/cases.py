@@ -23,8 +23,11 @@ class Answered:
     """One case: the outputs of the port, and what differences are rounding."""
 
     def __init__(self, golden: Golden, case: Case, report: CaseReport, outputs: Path, precision: str) -> None:
-        self.case, self.settings = case, case.settings
+        self.case, self.settings, self.folder = case, case.settings, outputs / case.name
+        rules = [asked.compare for asked in case.outputs.values() if asked.dtype == "real"]
+        self.tolerance = max((r.float64 if precision == "float64" else r.float32 for r in rules), default=0.0)
         self.inputs: Inputs = in_precision(golden.inputs(case), "float64")
+        _lock(tuple(self.inputs.values()))
         self.refused = {o.name for o in report.outputs if o.status == "refused"}
         self.got: dict[str, NDArray] = {}
         self.unit: dict[str, NDArray | float] = {}
@@ -53,6 +56,7 @@ class Answered:
     def begin(self, stage: Stage) -> None:
         """Compute the right outputs, and tell those of the forward pass from gradients."""
         forward, self.saved = self.forward(stage, self.inputs, self.settings)
+        _lock(self.saved)
         self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
         self.ahead = [name for name in self.got if name in forward]
         self.back = [name for name in self.got if name not in forward]
@@ -125,3 +129,12 @@ class Answered:
         size = float(np.abs([(np.abs(self.got[f"d_{n}"] * along[n])).sum() for n in names]).sum())
         found = (values[0] - values[1]) / (2 * PIECE)
         return bool(abs(found - sum(parts)) <= DERIVATIVE * size) if size > 0 and np.isfinite(found + size) else None
+
+
+def _lock(value: Any) -> None:
+    """Arrays that a change must not write into: what is tried next would start from others."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, tuple | list):
+        for part in value:
+            _lock(part)

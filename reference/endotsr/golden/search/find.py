@@ -17,16 +17,17 @@ from endotsr.errors import InputError
 from endotsr.golden.judge.diagnose import made_of
 from endotsr.golden.judge.format import Precision
 from endotsr.golden.judge.store import Golden, in_precision
-from endotsr.golden.judge.verdict import Report, judge
+from endotsr.golden.judge.verdict import INSIDE, Report, judge, left_out
 from endotsr.golden.search.cases import Answered
 from endotsr.golden.search.numbers import START, best_number, plain_first, said_number
 from endotsr.golden.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.golden.search.requests import OtherReading, other_requests
 from endotsr.golden.search.rewrites import rewrites, with_number
+from endotsr.golden.search.second import Change, Counter, at, beside, expressions, orders, pairs, parts
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
 
-SECONDS = 8.0  # of computing that a search may take
+SECONDS = 16.0  # of computing that a search may take
 START_UP = 60.0  # seconds that a process may take beside its search
 SLOWEST = 10.0  # seconds that a second of computing may take on a busy machine
 LATEST = 1000  # a spot of which it is not known what it reaches
@@ -70,7 +71,10 @@ class Search:
         self.stage, self.cases, self.end = stage, answered, time.process_time() + seconds
         self.golden = golden
         self.hits: list[Hit] = []
+        self.live: list[Live] = []
+        self.counter = Counter()
         self.tried = 0
+        self.matched = False  # the change tried last gives the forward outputs of a case in which one is refused
         for one in answered:
             one.begin(stage)
         first = answered[0]
@@ -89,9 +93,15 @@ class Search:
         """Whether time is up, or enough is found."""
         return time.process_time() > self.end or len(self.hits) >= ENOUGH
 
+    @property
+    def explains(self) -> bool:
+        """Whether a change explains both passes."""
+        return any(hit.whole in ("all", "derivative") for hit in self.hits)
+
     def fits(self, install: Install | None, mode: str, request: OtherReading | None = None) -> str:
         """How much of all cases a change explains: a key of WHOLE, or "" for nothing."""
         self.tried += 1
+        self.matched = False
         gradients: list[bool | None] = []  # of cases whose gradients are not those of the definition with the change
         spoils = False  # a case that passed
         for one in self.cases:
@@ -105,6 +115,7 @@ class Search:
             same = one.same(request.tell(found) if request else found, one.ahead)
             if not same and one.refused:
                 return ""
+            self.matched |= same and bool(one.refused.intersection(one.ahead))
             if same and one.back and False not in gradients and (one.refused or not gradients):
                 with _installed(install if mode != "forward" else None):
                     back = one.reverse(self.stage, inputs, saved)
@@ -120,6 +131,15 @@ class Search:
         if gradients:
             return "derivative" if True in gradients and False not in gradients else "forward"
         return "refused" if spoils else "all"
+
+    def best(self, install: Install, mode: str) -> tuple[str, str]:
+        """The same, and the phases of it: a change of both may explain more if the reverse pass does without."""
+        whole = self.fits(install, mode)
+        if mode == "both" and whole != "all" and self.matched:
+            alone, order = self.fits(install, "forward"), list(WHOLE)
+            if alone and (not whole or order.index(alone) < order.index(whole)):
+                return alone, "forward"
+        return whole, mode
 
     def outputs(self, install: Install | None, mode: str, request: OtherReading | None = None) -> Outputs:
         """All outputs of the first case with a change."""
@@ -162,7 +182,7 @@ class Search:
         """The phases in which a change of a place can make what is refused."""
         if len(place.phases) == 1:
             return list(place.phases)
-        return ["both", "forward", *["reverse"] * self.back] if self.ahead else ["reverse"]
+        return ["both" if self.ahead else "reverse"]
 
 
 @contextlib.contextmanager
@@ -191,8 +211,9 @@ def search(stage: Stage, answered: Sequence[Answered], golden: Golden, seconds: 
         _requests(found)
         _places(found, [place for place in places if not place.is_constant and place not in glue])
         _places(found, [place for place in places if place.is_constant])
+        _second(found, [place for place in (glue or places) if not place.is_constant])
     for module in definition_modules():
-        for name in ("_knob", "_seen"):
+        for name in ("_knob", "_seen", "_at", "_nth"):
             module.__dict__.pop(name, None)
     found.hits.sort(key=lambda hit: hit.rank)
     return found
@@ -215,6 +236,7 @@ def _inner(operation: str, golden: Golden) -> set[str]:
 def _places(search: Search, places: Sequence[Statement]) -> None:
     """Changes of some places: numbers, then other texts, then other names."""
     live = _numbers(search, places)
+    search.live += live
     for texts, rank in ((_texts, 1), (_names, 2)):
         lines = {hit.where for hit in search.hits if hit.rank[:2] < (0, 2) and not search.discrete}
         for one in live:  # once something is found, the rest of its line is tried
@@ -276,24 +298,38 @@ def _solved(search: Search, spot: Spot, mode: str, values: list[Any]) -> int:
     """Look for the number at a spot with which all is explained; returns how late other texts are tried there."""
     late = LATEST
     for text, rest in with_number(spot.node, values):
-        with contextlib.suppress(Exception):
-            with written(spot, text):
-                install = spot.place.compiled()
-
-            def at(value: float, install: Install = install) -> Outputs:
-                spot.place.module.__dict__["_knob"] = value
-                return search.outputs(install, mode)
-
-            numbers, spoils = search.number(at, rest)
-            late = min(late, spoils)
-            for value, plain in numbers:
-                spot.place.module.__dict__["_knob"] = value
-                if whole := search.fits(install, mode):
-                    rank = 2 if isinstance(spot.node, ast.Constant) else 3
-                    said = _replaced(spot, mode, said_number(spot.node, rest, value))
-                    search.note(whole, said, spot, 1 + search.discrete if plain else 3, rank)
-                    break
+        late = min(late, _number_at(search, spot, mode, text, rest, 2 if isinstance(spot.node, ast.Constant) else 3))
     return late
+
+
+def _number_at(search: Search, spot: Spot, mode: str, text: str, rest: float, rank: int, words: str = "") -> int:
+    """The same for one text."""
+    names, counter = spot.place.module.__dict__, search.counter
+    try:
+        with written(spot, text):
+            made = spot.place.compiled()
+
+        def install() -> Any:
+            counter.count = 0
+            return made()
+
+        def outputs(value: float) -> Outputs:
+            names["_knob"] = value
+            return search.outputs(install, mode)
+
+        numbers, spoils = search.number(outputs, rest)
+        for value, plain in numbers:
+            names["_knob"] = value
+            whole, phases = search.best(install, mode)
+            if whole:
+                when = words or (f"at {counter.words()}" if rank > 3 else "")
+                said = _replaced(spot, phases, said_number(spot.node, rest, value), when)
+                by_name = rest == 0 and isinstance(spot.node, ast.Name | ast.Attribute)  # rather another name
+                search.note(whole, said, spot, 1 + (search.discrete or by_name) if plain else 3, rank)
+                break
+    except Exception:  # whatever the changed text does
+        return LATEST
+    return spoils
 
 
 def _texts(one: Live) -> Iterator[tuple[str, int]]:
@@ -315,14 +351,47 @@ def _try(search: Search, one: Live, texts: Iterator[tuple[str, int]], rank: int)
         with contextlib.suppress(Exception):
             with written(one.spot, text):
                 install = one.spot.place.compiled()
-            search.note(
-                search.fits(install, one.mode), _replaced(one.spot, one.mode, text), one.spot, rank, less + less_likely
-            )
+            whole, mode = search.best(install, one.mode)
+            search.note(whole, _replaced(one.spot, mode, text), one.spot, rank, less + less_likely)
 
 
-def _replaced(spot: Spot, mode: str, new: str) -> str:
-    side = "" if mode == "both" or len(spot.place.phases) == 1 else f", in the {mode} pass alone"
-    return f"`{new}` where `{ast.unparse(spot.node)}` is right{side}"
+def _replaced(spot: Spot, mode: str, new: str, words: str = "") -> str:
+    return f"`{new}` {f'{words} ' if words else ''}where `{ast.unparse(spot.node)}` is right{_side(spot, mode)}"
+
+
+def _side(spot: Spot, mode: str) -> str:
+    return "" if mode == "both" or len(spot.place.phases) == 1 else f", in the {mode} pass alone"
+
+
+def _second(search: Search, places: Sequence[Statement]) -> None:
+    """Changes of more than one expression, of a part of an array and of the order, where nothing else fits."""
+    if search.explains or search.wrong < TELLING:
+        return
+    for module in definition_modules():
+        module.__dict__.update(_at=at, _nth=search.counter.nth)
+    places = [place for place in places if search.ahead or "reverse" in place.phases]
+    live = sorted((one for one in search.live if one.spot.place in places), key=lambda one: one.late)
+    for place in places:
+        _changes(search, orders(place))
+    for one in live if not search.explains else ():
+        for text, words in parts(one.spot, one.values):
+            if not search.over:
+                _number_at(search, one.spot, one.mode, text, 1.0, 4, words)
+    for place in places if not search.explains else ():
+        _changes(search, pairs([one.spot for one in live if one.spot.place is place]))
+    for one in live if not search.explains else ():
+        _try(search, one, beside(one.spot, one.values, expressions(one.spot.place)), 5)
+
+
+def _changes(search: Search, changes: Iterator[Change]) -> None:
+    for spot, text, writing in changes:
+        if search.over:
+            return
+        with contextlib.suppress(Exception):
+            with writing:
+                install = spot.place.compiled()
+            whole, mode = search.best(install, search.modes(spot.place)[0])
+            search.note(whole, f"{text}{_side(spot, mode)}", spot, 4, 0)
 
 
 def explained(
@@ -355,7 +424,11 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
     with contextlib.suppress(subprocess.TimeoutExpired):
         done = subprocess.run([sys.executable, "-m", "endotsr.golden.search", *map(str, words)],
                               capture_output=True, timeout=limit, check=False)  # fmt: skip
-        report.causes = json.loads(done.stdout) if done.returncode == 0 else []
+        if done.returncode == 0:
+            found = json.loads(done.stdout)
+            report.causes, report.inside = found["causes"], found["inside"]
+            unasked = report.causes or INSIDE in left_out(outputs)[0]
+            report.notes += [found["asked"]] if found["asked"] and not unasked else []
 
 
 def sentences(search: Search) -> list[str]:

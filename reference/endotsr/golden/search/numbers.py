@@ -55,8 +55,10 @@ def plain_first(number: float) -> list[tuple[float, bool]]:
 def said_number(node: ast.expr | ast.stmt, rest: float, value: float) -> str:
     """The expression with its number."""
     text = ast.unparse(node)
-    if isinstance(node, ast.Constant):
+    if isinstance(node, ast.Constant) and rest:
         return number_text(float(ast.literal_eval(node)) * value)
+    if isinstance(node, ast.Constant):
+        return number_text(value)
     if rest == 0.0:
         return f"{text} {'+' if value > 0 else '-'} {number_text(abs(value))}"
     return f"({text}) * {number_text(value)}" if isinstance(node, ast.BinOp) else f"{text} * {number_text(value)}"

@@ -123,10 +123,13 @@ def _put(holder: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
 
 
 def spots(place: Statement) -> list[Spot]:
-    """Every expression that is read in a place, and its statements; what occurs several times also all at once."""
-    found: dict[str, list[Spot]] = {}
+    """Every expression that is read in a place, and its statements; what occurs several times also all at once.
+
+    All at once: in the whole place, and in each of its statements.
+    """
+    found: dict[tuple[str, int], list[Spot]] = {}
     body = place.statement.body if isinstance(place.statement, ast.FunctionDef) else [place.statement]
-    for statement in body:
+    for number, statement in enumerate(body):
         for holder in ast.walk(statement):
             for field, value in ast.iter_fields(holder):
                 stored = isinstance(holder, ast.Subscript) and isinstance(holder.ctx, ast.Store)
@@ -137,9 +140,20 @@ def spots(place: Statement) -> list[Spot]:
                 for index, node in enumerate(value) if isinstance(value, list) else ((None, value),):
                     if _is_read(node):
                         spot = Spot(place, node, ((holder, field, index),))
-                        found.setdefault(ast.unparse(node), []).append(spot)
-    groups = [Spot(place, of[0].node, tuple(s.holders[0] for s in of)) for of in found.values() if len(of) > 1]
-    return [spot for of in found.values() for spot in of] + groups
+                        found.setdefault((ast.unparse(node), number), []).append(spot)
+    whole: dict[str, list[Spot]] = {}
+    for (text, _), of in found.items():
+        whole.setdefault(text, []).extend(of)
+    together = [of for of in found.values() if len(of) < len(whole[ast.unparse(of[0].node)])] + list(whole.values())
+    together = [[spot for spot in of if not _is_index(spot)] for of in together]
+    groups = [Spot(place, of[0].node, tuple(s.holders[0] for s in of)) for of in together if len(of) > 1]
+    return [spot for of in whole.values() for spot in of] + groups
+
+
+def _is_index(spot: Spot) -> bool:
+    return isinstance(spot.node, ast.Constant) and isinstance(
+        spot.holders[0][0], ast.Subscript | ast.Slice | ast.Tuple | ast.keyword
+    )
 
 
 def _is_read(node: Any) -> bool:

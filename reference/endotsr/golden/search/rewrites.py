@@ -15,15 +15,15 @@ TWINS = (
     "sin cos", "exp exp2", "log log2", "log log10", "maximum minimum", "max min", "max mean", "max sum", "sum mean",
     "sum max", "mean sum", "median mean", "median min", "median max", "mean median", "ceil floor", "ceil rint",
     "round floor", "round ceil", "rint floor", "rint trunc", "trunc floor", "trunc rint", "tanh arctan", "cosh sinh",
-    "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort",
+    "tile repeat", "any all", "all any", "zeros ones", "ones zeros", "sign abs", "unique sort", "minimum maximum",
 )  # fmt: skip
 """Functions that are taken for another."""
 OPERATORS: dict[type, str] = {
-    ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l})",
+    ast.Add: "{l}; {r}; ({l}) - ({r}); ({r}) - ({l}); 2 * ({l}); 2 * ({r})",
     ast.Sub: "{l}; -({r}); ({l}) + ({r}); ({r}) - ({l})",
     ast.Mult: "{l}; {r}; ({l}) / ({r}); ({r}) / ({l}); ({l}) + ({r})",
     ast.Div: "{l}; 1 / ({r}); ({l}) * ({r}); ({r}) / ({l}); ({l}) / ({r}) ** 2; ({l}) / np.sqrt({r}); ({l}) // ({r})",
-    ast.FloorDiv: "{l}; ({l}) / ({r}); -(-({l}) // ({r}))",
+    ast.FloorDiv: "{l}; ({l}) / ({r}); -(-({l}) // ({r})); round(({l}) / ({r}))",
     ast.Mod: "{l}; ({l}) // ({r})",
     ast.Pow: "{l}; ({l}) ** (({r}) + 1); ({l}) ** (({r}) - 1); ({l}) ** (2 * ({r})); np.abs({l}); np.sqrt({l})",
     ast.MatMult: "{l}; {r}; ({l}).T @ ({r}); ({l}) @ ({r}).T; ({r}) @ ({l}); (({l}) @ ({r})).T; ({l}).T @ ({r}).T",
@@ -79,13 +79,13 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
 
 def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tuple[str, float]]:
     """Texts in which `_knob` is a number to be found, and its value where nothing is changed."""
-    if isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind == "f" for value in values):
+    if isinstance(node, ast.Constant) and type(node.value) is int:
+        yield (f"{node.value} * _knob", 1.0) if node.value else ("_knob", 0.0)
+    elif isinstance(node, ast.expr) and any(np.asarray(value).dtype.kind in "fiu" for value in values):
         text = ast.unparse(node)
         yield f"_knob * ({text})", 1.0
         if not isinstance(node, ast.Constant):
             yield f"({text}) + _knob", 0.0
-    elif isinstance(node, ast.Constant) and type(node.value) is int and node.value:
-        yield f"{node.value} * _knob", 1.0
 
 
 def _wrapped(values: Sequence[Any]) -> Iterator[str]:
@@ -116,6 +116,10 @@ def _other_calls(node: ast.Call) -> Iterator[str]:
     yield from arguments
     if name == "exp":
         yield f"1 + ({arguments[0]})"
+    if name == "linspace":  # other conventions of where the samples lie
+        a, b, n = arguments
+        yield from (f"({a}) + (({b}) - ({a})) * (np.arange({n}) + {k}) / ({n})" for k in (0, 0.5, 1))
+        yield f"np.linspace({a}, {b}, ({n}) + 2)[1:-1]"
     rest = ast.unparse(node)[len(function) :]
     yield from (function[: -len(name)] + pair.split()[1] + rest for pair in TWINS if pair.split()[0] == name)
     words = [ast.unparse(word) for word in node.keywords]

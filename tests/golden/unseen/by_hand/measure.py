@@ -205,7 +205,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--jobs", type=int, choices=(1, 2), default=1)
     parser.add_argument("--record", metavar="NAME", default="")
     parser.add_argument("--said", action="store_true", help="print the first answer of every mistake")
-    parser.add_argument("--search", type=float, default=8.0, metavar="SECONDS", help="of the judge for each mistake")
+    parser.add_argument("--search", type=float, default=16.0, metavar="SECONDS", help="of the judge for each mistake")
     parser.add_argument("--sample", type=int, metavar="N", help="N mistakes drawn at random, the same every time")
     options = parser.parse_args(words)
     entries = [entry for entry in mistakes() if not options.ids or entry["id"] in options.ids]
