@@ -66,7 +66,7 @@ _BLEND = {
     ),
     "transmittance": Inner("compositing.layers_of", "t"),
 }
-_MOMENTS = {
+_WINDOWED = {
     "mu_x": "mu_x", "mu_y": "mu_y", "sigma_xx": "blurred(x**2) - mu_x**2", "sigma_yy": "blurred(y**2) - mu_y**2",
     "sigma_xy": "blurred(x * y) - mu_x * mu_y", "map": "s",
 }  # fmt: skip
@@ -93,7 +93,7 @@ INSIDE: dict[str, dict[str, Inner]] = {
     "harmonics": _COLOUR,
     "composite": _BLEND,
     "render": _UNIT | _LENS | _SCREEN | _COLOUR | _BLEND,
-    "masked_ssim": _inner("masked_ssim.masked_ssim_forward", **_MOMENTS),
+    "masked_ssim": _inner("masked_ssim.masked_ssim_forward", **_WINDOWED),
     "normalised_depth": _inner(
         "depth.normalised_depth_forward", largest="largest", prior="target.normalised", residual="residual"
     ),
