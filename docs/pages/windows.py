@@ -80,10 +80,12 @@ def trained(source: Path, run: Path, name: str, options: argparse.Namespace, win
     words = ["train", str(source), "--out", str(run), "--windows", windows, "--preset", options.preset]
     words += ["--chain", str(options.chain), "--sequence.split", options.split]
     words += ["--iterations", str(options.iterations)] if options.iterations else []
+    words += ["--scale", str(options.scale)] if options.scale < 1 else []
     words = ["train", "--out", str(run), "--resume"] if run.exists() else words
     words += ["--workers", str(options.workers)]
     words += ["--lpips", str(options.lpips)] if options.lpips else []
     seconds, _ = command(*words)
+    name += "" if options.scale == 1 else f" at scale {options.scale:g}"
     return row_of(run, name if options.split == "every_eighth" else f"{name}, {options.split}", seconds, options.preset)
 
 
@@ -235,6 +237,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int)
     parser.add_argument("--most", type=int, default=1000, help="warm windows that are trained again (warm)")
     parser.add_argument("--preset", default="quick")
+    parser.add_argument("--scale", type=float, default=1.0, help="of the pictures of a clip")
     parser.add_argument("--split", choices=["every_eighth", "every_second", "blocks"], default="every_eighth")
     parser.add_argument("--lpips", type=Path)
     parser.add_argument("--keep", type=Path, help="folder for what is made (default: a temporary one)")

@@ -19,11 +19,12 @@ from endotsr.errors import InputError
 from endotsr.sequences.checks.depth import (
     FULL_SCALE,
     depth_facts,
-    inverted_finding,
     light_correlation,
     light_finding,
     unit_finding,
 )
+from endotsr.sequences.checks.findings import Finding
+from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
 from endotsr.sequences.recording import ARBITRARY, Recording
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
@@ -55,12 +56,16 @@ def _of_names(path: Path) -> str:
 
 
 def _of_values(recording: Recording, frames: list[int]) -> str:
-    """What speaks against lengths in the numbers and beside the pictures; "" if nothing does."""
+    """What speaks against lengths in the numbers and beside the pictures; "" if nothing does.
+
+    Raises: InputError where the depth lies upside down or mirrored.
+    """
     stated, where = recording.stated_depth, str(recording.where)
     read, masks = recording.depth, recording.masks
     assert read is not None and stated is not None
     planes: list[NDArray[np.float32]] = []
     light: list[float] = []
+    shading: list[Fit] = []
     for i, pair in zip(frames, recording.pictures(frames)):
         plane = read(i)
         if plane is None or not plane.any():
@@ -69,10 +74,13 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
         if plane.shape == pair.left.shape[:2]:
             tissue = masks(i) if masks else None
             light.append(light_correlation(pair.left, plane, tissue))
+            shading += filter(None, [shading_fit(pair.left, plane, tissue)])
             if len(planes) == 1 and recording.rig is None and pair.right is not None and plane.shape[1] > MATCHED:
-                found = inverted_finding(plane, _disparity(pair.left, pair.right), where, i)
+                found = stereo_finding(plane, _disparity(pair.left, pair.right), where, i)
+                _refuse_flipped(found, stated.path)
                 if found:
                     return found[0].what
+    _refuse_flipped(shading_finding(shading, where), stated.path)
     if not planes:
         return ""
     if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
@@ -83,6 +91,11 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
         return f"{unit[0].what}; another unit is stated with --depth-unit and --depth-scale"
     found = light_finding(light, where)
     return found[0].what if found else ""
+
+
+def _refuse_flipped(found: list[Finding], path: Path) -> None:
+    for flipped in (f for f in found if f.code == "flipped-depth"):
+        raise InputError(f"{path}: {flipped.what}; {flipped.remedy}; --trust-depth reads the files all the same")
 
 
 def _full_scale(stored: list[NDArray[np.float32]]) -> str:

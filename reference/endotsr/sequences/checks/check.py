@@ -22,11 +22,11 @@ from endotsr.sequences.checks.depth import (
     DepthFacts,
     depth_facts,
     depth_findings,
-    inverted_finding,
     light_correlation,
     light_finding,
 )
 from endotsr.sequences.checks.findings import Finding, finding, worst_first
+from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings, time_findings
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
@@ -66,6 +66,7 @@ class _Pass:
         self.samples: list[tuple[str, NDArray, NDArray[np.bool_], NDArray]] = []
         self.pictures: list[tuple[str, NDArray[np.uint8]]] = []
         self.light: list[float] = []  # rank correlation of brightness with depth, of the sampled frames
+        self.shading: list[Fit] = []  # of the sampled frames, where it can be told
 
     def tried(self, make: Callable[[], T], code: str, where: object, frame: int | None = None) -> T | None:
         """The value, or None and a refusal."""
@@ -94,7 +95,7 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if run.depth:
         where, near = str(parts.depth[0].parent), config.raster.near
         run.findings += depth_findings(run.depth, where, parts.arbitrary, near, parts.assumed)
-        run.findings += light_finding(run.light, str(parts.depth[0].parent))
+        run.findings += light_finding(run.light, where) + shading_finding(run.shading, where)
     if run.samples:
         _check_masks(parts, run, config)
     config = _of_length(parts, config, run)
@@ -133,6 +134,7 @@ def _read_frames(parts: Parts, run: _Pass) -> tuple[int, int] | None:
         if i in sampled:
             if found is not None:
                 run.light.append(light_correlation(picture, found, tissue))
+                run.shading += filter(None, [shading_fit(picture, found, tissue)])
             _sample(run, file, picture, tissue, found)
             if i == 0 and parts.right and found is not None:
                 _against_stereo(parts, run, picture, found, depth[i])
@@ -200,7 +202,7 @@ def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, 
     if right is not None and right.shape == picture.shape and picture.shape[1] > 128:
         match = match_pair(picture, right, 0, 64, smooth=False)
         disparity = np.where(match.disagreement <= 1, match.raw, np.nan)
-        run.findings += inverted_finding(depth, disparity, str(file), 0)
+        run.findings += stereo_finding(depth, disparity, str(file), 0)
 
 
 def _check_masks(parts: Parts, run: _Pass, config: Config) -> None:

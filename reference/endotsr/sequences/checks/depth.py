@@ -114,20 +114,6 @@ def unit_finding(usual: float, where: str) -> list[Finding]:
     return [finding("depth-unit", where, f"the median depth is {usual:.4g} mm{guess}")]
 
 
-def inverted_finding(
-    depth: NDArray[np.float32], disparity: NDArray[np.float32], where: str, frame: int
-) -> list[Finding]:
-    """A refusal where depth grows with the disparity of the stereo pair: the picture is inverted, or is disparity."""
-    both = (depth > 0) & np.isfinite(disparity) & (disparity > 0)
-    if both.sum() < 500 or np.ptp(depth[both]) == 0:
-        return []
-    correlation = float(np.corrcoef(depth[both], 1.0 / disparity[both])[0, 1])
-    if correlation > -0.5:
-        return []
-    what = f"depth falls where the stereo pair says far ({correlation:.2f})"
-    return [finding("inverted-depth", where, what, frame)]
-
-
 def light_correlation(
     picture: NDArray[np.uint8], depth: NDArray[np.float32], tissue: NDArray[np.bool_] | None
 ) -> float:

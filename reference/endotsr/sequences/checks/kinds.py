@@ -91,8 +91,10 @@ KINDS: dict[str, Kind] = {
     "inverted-depth": Kind("refusal", "near and far are exchanged: the file holds disparity, or an inverted picture",
                            "read it as disparity: endotsr depth --given FOLDER --kind disparity"),
     "depth-against-light": Kind("warning", "the light is on the scope, so that near tissue is brighter: the file may"
-                                " hold disparity or an inverse depth",
+                                " hold disparity or an inverse depth, or lie mirrored or upside down",
                                 "read a disparity as such: endotsr depth --given FOLDER --kind disparity"),
+    "flipped-depth": Kind("warning", "the depth lies on other tissue than the picture shows",
+                          "store its first row at the top and its first column at the left, as those of the picture"),
     # cameras
     "cameras": Kind("refusal", REFUSED, f"mend the poses; of one frame: {LEAVE_OUT}"),
     "distortion": Kind("refusal", "the model is a pinhole camera", "straighten them with endotsr prepare"),
