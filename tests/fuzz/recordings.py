@@ -28,6 +28,36 @@ def tiff_seeds() -> list[bytes]:
     return [cv2.imencode(".tiff", plane)[1].tobytes() for plane in planes]
 
 
+@cache
+def bmp_seeds() -> list[bytes]:
+    """Colour, grey and palette."""
+    return _by_pillow("bmp")
+
+
+@cache
+def webp_seeds() -> list[bytes]:
+    """With and without loss, and with a header of the extended form."""
+    return _by_pillow("webp") + _by_pillow("webp", lossless=True) + _by_pillow("webp", icc_profile=b"x" * 40)
+
+
+@cache
+def colour_tiff_seeds() -> list[bytes]:
+    """Uncompressed and compressed in three ways."""
+    return [data for way in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits") for data in
+            _by_pillow("tiff", compression=way)]  # fmt: skip
+
+
+def _by_pillow(kind: str, **how: object) -> list[bytes]:
+    from PIL import Image
+
+    picture, found = Image.fromarray(np.random.default_rng(0).integers(0, 255, (9, 13, 3), np.uint8)), []
+    for mode in ("RGB", "L", "P"):
+        out = io.BytesIO()
+        picture.convert(mode).save(out, kind, **how)
+        found.append(out.getvalue())
+    return found
+
+
 def pfm_seeds() -> list[bytes]:
     return [b"Pf\n5 4\n-1.0\n" + np.arange(20, dtype="<f4").tobytes()]
 

@@ -195,8 +195,25 @@ def cmyk(folder: Path) -> None:
     rewritten(folder / "clip", lambda opened, _: opened.convert("CMYK"), "jpg", quality=95)
 
 
-def converted(ending: str):
-    return lambda folder: rewritten(folder / "clip", lambda opened, _: opened, ending)
+def converted(ending: str, **how):
+    return lambda folder: rewritten(folder / "clip", lambda opened, _: opened, ending, **how)
+
+
+def blank():
+    from PIL import Image
+
+    return Image.new("RGB", (WIDTH, HEIGHT))
+
+
+def shortened(ending: str):
+    """The last twentieth of the fourth file is missing."""
+
+    def change(folder: Path) -> None:
+        converted(ending)(folder)
+        file = folder / f"clip/0003.{ending}"
+        file.write_bytes(file.read_bytes()[: int(0.95 * file.stat().st_size)])
+
+    return change
 
 
 def every_second_jpg(folder: Path) -> None:

@@ -140,12 +140,12 @@ Path(sys.argv[1]).write_bytes(b"II*\\0" + struct.pack("<IH", 8, len(entries)) + 
 try:
     read_picture(Path(sys.argv[1]))
 except InputError as error:
-    sys.exit(0 if "MAX_IMAGE_PIXELS" in str(error) else str(error))
+    sys.exit(0 if "9000x9000 pixels; allowed: at most 67108864" in str(error) else str(error))
 sys.exit("read")
 """
 
 
-def test_the_bound_on_pixels_holds_for_every_format_that_opencv_decodes(tmp_path):
+def test_the_bound_on_pixels_holds_for_a_tiff(tmp_path):
     process = subprocess.run(
         [sys.executable, "-c", TOO_LARGE, str(tmp_path / "a.tiff")], check=False, capture_output=True, text=True
     )

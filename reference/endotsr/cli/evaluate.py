@@ -30,9 +30,9 @@ class EvaluateOptions:
     name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
 
     With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
-    of the run or on --sequence. One picture a held-out frame is needed: .png (8 or 16 bit) or .npy (float, display
-    units) in a folder, paired by the names of the frames, by their numbers, or in order; or a video of all frames or of
-    the held-out ones. The run, if one is named, is not changed.
+    of the run or on --sequence. One picture a held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
+    .npy (float, display units) in a folder, paired by the names of the frames, by their numbers, or in order; or a
+    video of all frames or of the held-out ones. The run, if one is named, is not changed.
     """
 
     methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()

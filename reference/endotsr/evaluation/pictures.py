@@ -1,6 +1,6 @@
 """A folder of pictures or a video in the place of a model: the renders of any method, measured by the same code.
 
-In: a folder with one picture a frame, `.png` (8 or 16 bit) or `.npy` (float), or a video of the frames; and the
+In: a folder with one picture a frame, `.png`, `.tiff`, `.bmp` (8 or 16 bit) or `.npy` (float), or a video of them; the
 sequence that it shows. Out: the file of every frame, and the dictionary of metrics.json for these pictures. A float
 array keeps what an 8-bit file rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of
 that baseline to the last digit. What the compression of a video loses counts as an error of its method.
@@ -18,13 +18,13 @@ from endotsr.evaluation.evaluate import FORMAT, baseline_table, evaluate_frames
 from endotsr.evaluation.lpips import LpipsWeights, lpips_obstacle
 from endotsr.evaluation.records import EvaluationRecord
 from endotsr.kernels.arrays import Array, FloatArray
-from endotsr.opencv import read_png
+from endotsr.opencv import pictures as stored
 from endotsr.sequences.files import frame_numbers, shortened
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.video_file import VIDEO_ENDINGS, video_facts, video_pictures
 from endotsr.untrusted.arrays import read_npy
 
-KINDS = (".npy", ".png")  # the first kind of which a folder holds a file is read
+KINDS = (".npy", ".png", *stored.TIFF_ENDINGS, ".bmp")  # without loss; the first that a folder holds is read
 CHANNELS = 3
 LARGEST_FILE = 1 << 32  # bytes
 LARGEST = 16.0  # display units: a larger number is a level from 0 to 255 or 65535, not an overshoot
@@ -105,7 +105,7 @@ def _listed(folder: Path) -> list[Path]:
         files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
         if files:
             return files
-    raise InputError(f"{folder}: holds no picture; allowed: one {' or '.join(KINDS)} file a frame")
+    raise InputError(f"{folder}: holds no picture; allowed: one file a frame, {', '.join(KINDS)}")
 
 
 def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:
@@ -142,7 +142,8 @@ def _by_order(files: list[Path], numbers: list[tuple[int, ...]] | None, frames: 
 def read_picture(file: Path, shape: tuple[int, ...]) -> FloatArray:
     """One picture in display units.
 
-    file      PNG: 8 or 16 bits, divided by 255 or 65535; NPY: floats in display units, (3, H, W) or (H, W, 3)
+    file      PNG, TIFF or BMP: 8 or 16 bits, divided by 255 or 65535; NPY: floats in display units, (3, H, W) or
+              (H, W, 3)
     shape     (3, H, W) of the frame
     returns   (3, H, W), float32, or float64 where the file holds float64; not clipped
 
@@ -162,7 +163,9 @@ def _of_shape(picture: Array, shape: tuple[int, ...], file: Path) -> FloatArray:
 
 
 def _read_levels(file: Path) -> FloatArray:
-    pixels = read_png(file)
+    pixels = stored.read_picture(file)
+    if pixels.dtype.kind != "u":
+        raise InputError(f"{file}: holds {pixels.dtype}; allowed: levels of 8 or 16 bits, or .npy")
     return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
 
 

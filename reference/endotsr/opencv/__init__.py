@@ -73,13 +73,18 @@ def decoded(data: bytes, name: object, failure: str) -> Array:
     if pixels.ndim == 3 and pixels.shape[2] == 1:
         pixels = pixels[:, :, 0]
     if pixels.ndim == 3:
-        if pixels.shape[2] == 4 and pixels.dtype.kind == "u" and pixels[:, :, 3].min() < np.iinfo(pixels.dtype).max:
-            raise InputError(
-                f"{name}: has transparent pixels, and what they hide is not shown; allowed: pictures without"
-                " transparency (a mask that is stored as transparency is stored as black and white)"
-            )
-        pixels = pixels[:, :, 2::-1]  # BGR(A) to RGB
+        pixels = opaque(pixels, name)[:, :, ::-1]  # from BGR
     return np.ascontiguousarray(pixels)
+
+
+def opaque(pixels: Array, name: object) -> Array:
+    """The three colours of a picture (H, W, 3) or (H, W, 4). Raises InputError if a pixel is transparent."""
+    if pixels.shape[2] == 4 and pixels.dtype.kind == "u" and pixels[:, :, 3].min() < np.iinfo(pixels.dtype).max:
+        raise InputError(
+            f"{name}: has transparent pixels, and what they hide is not shown; allowed: pictures without"
+            " transparency (a mask that is stored as transparency is stored as black and white)"
+        )
+    return pixels[:, :, :3]
 
 
 def read_png(path: Path) -> Array:

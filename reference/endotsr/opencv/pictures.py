@@ -1,17 +1,23 @@
-"""Picture files of any kind that a recording may hold: PNG, JPEG, TIFF, and OpenEXR where OpenCV has it.
+"""Picture files of any kind that a recording may hold: PNG, JPEG, TIFF, WebP, BMP, and OpenEXR where OpenCV has it.
 
 Comes in: a path; goes out: RGB or grey pixels as stored. Every reader refuses a file that OpenCV would repair in
-silence: a JPEG that was cut off decodes to a picture whose lower part is grey.
+silence: a JPEG that was cut off decodes to a picture whose lower part is grey. Sizes are checked before anything is
+decoded.
 """
 
+import importlib
 import io
+import struct
+import warnings
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
-from endotsr.opencv import decoded, read_png
+from endotsr.opencv import decoded, opaque, read_png
 from endotsr.opencv.library import cv2_library
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
 from endotsr.untrusted.names import plain_line
@@ -20,62 +26,129 @@ from endotsr.untrusted.png import LARGEST_FILE
 JPEG_ENDINGS = (".jpg", ".jpeg")
 TIFF_ENDINGS = (".tif", ".tiff")
 EXR_ENDINGS = (".exr",)
-PICTURE_ENDINGS = (".png", *JPEG_ENDINGS)  # of colour pictures and masks
-JPEG_START, JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"
+PICTURE_ENDINGS = (".png", *JPEG_ENDINGS, *TIFF_ENDINGS, ".webp", ".bmp")  # of colour pictures and masks
+JPEG_END = b"\xff\xd9"
+STARTS = {  # kind of a file by its ending, and the first bytes of such a file
+    **dict.fromkeys(JPEG_ENDINGS, ("JPEG", (b"\xff\xd8\xff",))),
+    **dict.fromkeys(TIFF_ENDINGS, ("TIFF", (b"II*\0", b"MM\0*"))),
+    ".webp": ("WebP", (b"RIFF",)),
+    ".bmp": ("BMP", (b"BM",)),
+    ".exr": ("EXR", (b"v/1\x01",)),
+}
+PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
 ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
-TIFF_STARTS = (b"II*\0", b"MM\0*")
-EXR_START = b"v/1\x01"
+GREY = ("1", "L")  # modes of Pillow
+NOT_DECODED = ("LA", "La", "PA", "LAB")  # of these OpenCV drops the transparency, or takes them for RGB
 
 
 def read_picture(path: Path) -> Array:
-    """Pixels of a PNG, JPEG, TIFF or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
+    """Pixels of a PNG, JPEG, TIFF, WebP, BMP or EXR file: (H, W) grey or (H, W, 3) RGB, in the stored type.
 
-    Raises:  InputError naming the file if it is missing, of another kind, truncated or damaged.
+    Raises:  InputError naming the file if it is missing, of another kind, truncated or damaged, not opaque, turned by
+             its EXIF data, if it holds several pictures, or has more than 2^26 pixels.
     """
     ending = Path(path).suffix.lower()
     if ending == ".png":
         return read_png(path)
-    if ending not in JPEG_ENDINGS + TIFF_ENDINGS + EXR_ENDINGS:
-        raise InputError(f"{path}: no picture by its name; allowed: .png, .jpg, .jpeg, .tif, .tiff, .exr")
+    if ending not in STARTS:
+        raise InputError(f"{path}: no picture by its name; allowed: {', '.join((*PICTURE_ENDINGS, *EXR_ENDINGS))}")
     data = read_bytes(Path(path), LARGEST_FILE)
-    _check_start_and_end(data, ending, path)
-    if ending in JPEG_ENDINGS:
-        return _jpeg(data, path)
+    kind = _check_start_and_end(data, ending, path)
+    pixels = None if kind == "EXR" else _by_pillow(data, kind, path)
+    if pixels is not None:
+        return pixels
     return decoded(data, path, "cannot be decoded: the file is damaged, or this OpenCV lacks its format")
 
 
-def _jpeg(data: bytes, path: Path) -> Array:
-    """Pixels of a JPEG file. Pillow returns those of OpenCV, which prints complaints about a damaged file itself."""
-    from PIL.JpegImagePlugin import JpegImageFile  # without the limit of `Image.open`, which prints a warning
-
+def other_profile(path: Path) -> bool:
+    """Whether a picture states a colour profile (ICC) that is not sRGB. False for a file that cannot be read."""
+    kind = "PNG" if path.suffix.lower() == ".png" else STARTS.get(path.suffix.lower(), ("", ()))[0]
+    if kind not in PLUGINS:
+        return False
     try:
-        with JpegImageFile(io.BytesIO(data)) as picture:
-            turn = picture.getexif().get(ORIENTATION, 1)
-            if turn not in (0, 1):
-                raise InputError(
-                    f"{path}: its EXIF data turn the picture (orientation {turn}), which a calibration may not know;"
-                    " allowed: pictures that are stored as they are shown"
-                )
-            if picture.width * picture.height > MOST_PIXELS:
-                raise InputError(f"{path}: {picture.width}x{picture.height} pixels; allowed: at most {MOST_PIXELS}")
-            return np.array(picture if picture.mode == "L" else picture.convert("RGB"))
+        data = read_bytes(path, LARGEST_FILE)
+        if kind == "WebP":
+            _check_size(_webp_size(data), path)
+        with _plugin(kind)(io.BytesIO(data)) as picture:
+            profile = picture.info.get("icc_profile") or b""
+    except Exception:  # the reader of the pixels names what is wrong
+        return False
+    return bool(profile) and not any("sRGB".encode(code) in profile for code in ("ascii", "utf-16-be"))
+
+
+def _by_pillow(data: bytes, kind: str, path: Path) -> Array | None:
+    """Pixels; of a TIFF the header alone is checked, and None returned.
+
+    Pillow returns the pixels of OpenCV, which prints complaints about a damaged JPEG itself, takes the first of several
+    pictures, and takes the unused fourth byte of a BMP for transparency. Of a TIFF it is Pillow that drops the lower
+    half of 16 bits, and whose library prints complaints.
+    """
+    try:
+        if kind == "WebP":
+            _check_size(_webp_size(data), path)  # its reader makes room for the picture when it is opened
+        with _plugin(kind)(io.BytesIO(data)) as picture:
+            _check_size(picture.size, path)
+            _check_one_upright(picture, path)
+            if kind == "TIFF":
+                if picture.mode in NOT_DECODED:
+                    raise InputError(f"{path}: a TIFF of the mode {picture.mode}; allowed: grey, palette, RGB, CMYK")
+                return None
+            if picture.mode in GREY:
+                return np.array(picture.convert("L"))
+            alpha = "A" in picture.getbands() or "transparency" in picture.info
+            return np.ascontiguousarray(opaque(np.array(picture.convert("RGBA" if alpha else "RGB")), path))
     except InputError:
         raise
     except Exception as error:  # Pillow raises whatever its parsers of metadata meet
-        raise InputError(f"{path}: damaged JPEG: {plain_line(str(error))}") from None
+        raise InputError(f"{path}: damaged {kind}: {plain_line(str(error))}") from None
 
 
-def _check_start_and_end(data: bytes, ending: str, path: Path) -> None:
+@cache
+def _plugin(kind: str) -> Any:
+    """Pillow's class for a kind of file, without the limit of `Image.open`, which prints a warning."""
+    name = PLUGINS[kind]
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # on metadata, with no name of the file
+    return getattr(importlib.import_module(f"PIL.{name}Plugin"), f"{name}File")
+
+
+def _check_one_upright(picture: Any, path: Path) -> None:
+    turn = picture.getexif().get(ORIENTATION, 1)
+    if turn not in (0, 1):
+        raise InputError(
+            f"{path}: its EXIF data turn the picture (orientation {turn}), which a calibration may not know;"
+            " allowed: pictures that are stored as they are shown"
+        )
+    if getattr(picture, "n_frames", 1) != 1:
+        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture a file")
+
+
+def _check_size(size: tuple[int, int], path: Path) -> None:
+    if not 0 < size[0] * size[1] <= MOST_PIXELS:
+        raise InputError(f"{path}: {size[0]}x{size[1]} pixels; allowed: at most {MOST_PIXELS}")
+
+
+def _webp_size(data: bytes) -> tuple[int, int]:
+    """Width and height in the header of a WebP file, of any of its three forms."""
+    form, start = data[12:16], data[20:30].ljust(10, b"\0")
+    if form == b"VP8X":  # 24 bits each, less one
+        return 1 + int.from_bytes(start[4:7], "little"), 1 + int.from_bytes(start[7:10], "little")
+    if form == b"VP8L":  # 14 bits each, less one
+        (packed,) = struct.unpack_from("<I", start, 1)
+        return 1 + (packed & 0x3FFF), 1 + (packed >> 14 & 0x3FFF)
+    width, height = struct.unpack_from("<HH", start, 6)
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
+    """The kind of the file by its ending, which its first bytes confirm."""
+    kind, starts = STARTS[ending]
     if not data:
         raise InputError(f"{path}: the file is empty")
-    if ending in JPEG_ENDINGS:
-        if not data.startswith(JPEG_START):
-            raise InputError(f"{path}: not a JPEG file: it does not start with the JPEG signature")
-        if JPEG_END not in data[-64:]:  # some cameras append a few bytes
-            raise InputError(f"{path}: truncated JPEG: the file ends after {len(data)} bytes, without its end marker")
-    starts = TIFF_STARTS if ending in TIFF_ENDINGS else (EXR_START,)
-    if ending not in JPEG_ENDINGS and not data.startswith(starts):
-        raise InputError(f"{path}: not a {'TIFF' if ending in TIFF_ENDINGS else 'EXR'} file by its first bytes")
+    if not data.startswith(starts):
+        raise InputError(f"{path}: not a {kind} file by its first bytes")
+    if kind == "JPEG" and JPEG_END not in data[-64:]:  # some cameras append a few bytes
+        raise InputError(f"{path}: truncated JPEG: the file ends after {len(data)} bytes, without its end marker")
+    return kind
 
 
 def write_jpeg(path: Path, pixels: Array, quality: int = 95) -> None:

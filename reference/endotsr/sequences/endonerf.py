@@ -1,8 +1,8 @@
 """Reading EndoNeRF folders.
 
-    images/*.png     RGB, or *.jpg                    poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
+    images/*.png     RGB, or jpg, tiff, webp, bmp     poses_bounds.npy (or pose_bounds.npy)   LLFF rows, see poses.py
     depth/*.png      z in millimetres, 0 = none; .npy and .tiff too
-    masks/*.png      or gt_masks/*.png, white = excluded unless the configuration says otherwise
+    masks/*.png      or gt_masks/*.png (or as above), white = excluded unless the configuration says otherwise
 
 File names are free, in one pattern a folder; frames are ordered and paired by the number in the name. In: a folder and
 the `SequenceConfig`. Out: a `Sequence` in memory, whose notes state every assumption. Input that cannot be used raises
@@ -76,7 +76,7 @@ def _list_masks(folder: Path, config: SequenceConfig) -> list[Path]:
         raise InputError(
             f"{folder / config.masks}: folder not found; a clip without masks is read with --sequence.masks none"
         )
-    return list_pictures(folder / config.masks)
+    return list_pictures(folder / config.masks, PICTURE_ENDINGS)
 
 
 def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> Sequence:

@@ -27,7 +27,14 @@ from endotsr.sequences.checks.depth import (
 )
 from endotsr.sequences.checks.findings import Finding, finding, worst_first
 from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
-from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings, gap_findings, time_findings
+from endotsr.sequences.checks.frames import (
+    FrameFacts,
+    frame_facts,
+    frame_findings,
+    gap_findings,
+    profile_findings,
+    time_findings,
+)
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.files import check_pairing
@@ -87,7 +94,9 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if not parts.images:
         return Checked(str(path), worst_first(run.findings), {}, [])
     _pairing(parts, run)
-    run.findings += gap_findings(parts.images) + time_findings(parts.seconds, str(parts.folder))
+    run.findings += (
+        profile_findings(parts.images[0]) + gap_findings(parts.images) + time_findings(parts.seconds, str(parts.folder))
+    )
     size = _read_frames(parts, run)
     facts: dict[str, Any] = {"frames": len(parts.images)}
     if run.frames:

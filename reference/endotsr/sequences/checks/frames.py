@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.opencv.pictures import other_profile
 from endotsr.sequences.checks.findings import Finding, finding
 from endotsr.sequences.checks.scenes import cut_findings, halves_finding
 from endotsr.sequences.files import frame_numbers, shortened
@@ -120,6 +121,11 @@ def time_findings(seconds: NDArray[np.float64] | None, where: str) -> list[Findi
         return []
     steps = np.diff(seconds)
     return [finding("uneven-times", where, f"the frames are {steps.min():.3g} to {steps.max():.3g} s apart")]
+
+
+def profile_findings(file: Path) -> list[Finding]:
+    """A note on a picture whose colour profile (ICC) is not sRGB; one file stands for the clip."""
+    return [finding("colour-profile", file, "states a colour profile other than sRGB")] if other_profile(file) else []
 
 
 def gap_findings(files: list[Path]) -> list[Finding]:

@@ -55,6 +55,8 @@ KINDS: dict[str, Kind] = {
                           "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
     "two-views": Kind("warning", "a stereo pair in one picture is no scene",
                       "name it: endotsr prepare --stereo side_by_side or stacked"),
+    "colour-profile": Kind("note", "its numbers are read as sRGB, so that colours differ from what a viewer shows",
+                           "convert the pictures to sRGB where colours matter"),
     "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
     # masks
     "no-masks": Kind("note", "instruments count as tissue",

@@ -60,7 +60,7 @@ def _listed(folder: Path, endings: tuple[str, ...], what: str, findings: list[Fi
 
 def _endonerf_parts(folder: Path, config: SequenceConfig, findings: list[Finding]) -> Parts:
     images = _listed(folder / IMAGES, PICTURE_ENDINGS, "images", findings)
-    masks = [] if config.masks == NO_MASKS else _listed(folder / config.masks, (".png",), "masks", findings)
+    masks = [] if config.masks == NO_MASKS else _listed(folder / config.masks, PICTURE_ENDINGS, "masks", findings)
     depth = _listed(folder / "depth", DEPTH_ENDINGS, "depth", findings)
     right = list_pictures(folder / RIGHT, PICTURE_ENDINGS) if (folder / RIGHT).is_dir() else []
 

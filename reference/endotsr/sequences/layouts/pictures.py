@@ -1,4 +1,4 @@
-"""A plain folder of pictures, or one picture: png or jpg, one a frame, alone or as stereo pairs.
+"""A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one a frame, alone or as stereo pairs.
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
 or with `000_left.png` beside `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording.
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.sequences.checks.frames import profile_findings
 from endotsr.sequences.files import check_pairing, frame_numbers
 from endotsr.sequences.layouts import STATEMENTS, Layout
 from endotsr.sequences.recording import CameraPose, Recording, colour_picture
@@ -82,7 +83,7 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
     width, height = halves(stored.shape[1], stored.shape[0], stereo)
     lens, rig = stated_camera(options, width, height, path)
     poses: list[CameraPose | None] | None = None
-    notes = []
+    notes = [found.line for found in profile_findings(left[0])]
     if options.trajectory is not None:
         unit = options.trajectory_unit or "m"
         trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
