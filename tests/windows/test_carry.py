@@ -1,5 +1,6 @@
 """A warm start: the picture at the join is the neighbour's, tissue is followed, added and dropped."""
 
+import weakref
 from dataclasses import replace
 
 import msgspec
@@ -10,6 +11,7 @@ from small_recording import settings, trained, write_recording
 from endotsr.errors import InputError
 from endotsr.fitting.model import render_at, spectral_from
 from endotsr.fitting.schedules import active_degree, residuals_active
+from endotsr.fitting.state import fresh_state
 from endotsr.runs.folder import open_run
 from endotsr.runs.model import load_model
 from endotsr.runs.sources import load_run_sequence
@@ -145,6 +147,26 @@ def test_a_neighbour_of_another_world_is_refused(both, cold_run, tmp_path):
     assert start.state(sequence, config).iteration == 0
     with pytest.raises(InputError, match="its origin is another one"):
         start.state(replace(sequence, cameras=elsewhere), config)
+
+
+def test_the_neighbour_is_gone_before_the_moments_are_made(both, cold_run, monkeypatch):
+    """Both at a time were the peak of a warm window."""
+    _, sequence, config = both
+    start, alive, made = CarriedStart(str(cold_run / "windows" / "000"), SHIFT, SHARED, SAVED), [], []
+
+    def loaded(folder):
+        model = load_model(folder)
+        alive.append(weakref.ref(model.gaussians.motion_coefficients))
+        return model
+
+    def fresh(*words, **more):
+        made.append(alive[0]())
+        return fresh_state(*words, **more)
+
+    monkeypatch.setattr("endotsr.runs.model.load_model", loaded)
+    monkeypatch.setattr("endotsr.windows.carry.fresh_state", fresh)
+    start.state(sequence, config)
+    assert len(alive) == 1 and made == [None]
 
 
 def test_exposures_of_shared_frames_are_carried(tmp_path):

@@ -68,8 +68,9 @@ class CarriedStart(NamedTuple):
         record = folder.sequence_record()
         _refuse_other_world(sequence, record.frame_cameras[self.shift], self.folder)
         weight = folder.record().get("lambda_lap")
-        neighbour = Neighbour(load_model(folder), record.times, self.shift, self.shared, weight)
-        return carried_state(neighbour, sequence, config)
+        return carried_state(
+            Neighbour(load_model(folder), record.times, self.shift, self.shared, weight), sequence, config
+        )
 
 
 class Neighbour(NamedTuple):
@@ -100,6 +101,8 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "
     rng, dtype = np.random.default_rng(config.training.seed), np.dtype(config.training.precision)
     place = neighbour.join(sequence)
     gaussians = _canonical(neighbour, int(sequence.train_index[place]), config, dtype)
+    frames, weight = _frame_parameters(neighbour, sequence, config, dtype), neighbour.lambda_lap
+    del neighbour  # its arrays are as large as those of this window, whose moments come now
     gaussians = _gathered(gaussians, _kept(gaussians, sequence, max(1, int(CARRIED * config.density.maximum))))
     spectral = spectral_from(config.model, sequence.times[sequence.train_index])
     if config.initialisation.motion != "none" and config.model.spectral_motion:
@@ -110,9 +113,7 @@ def carried_state(neighbour: Neighbour, sequence: Sequence, config: Config) -> "
     if residuals_active(1, config):
         model = config.model
         gaussians = activate_residuals(gaussians, model.frequencies, model.appearance, model.spectral_motion)
-    frames = _frame_parameters(neighbour, sequence, config, dtype)
-    weight = config.loss.lambda_lap
-    weight = neighbour.lambda_lap if weight == "auto" else float(weight)
+    weight = weight if config.loss.lambda_lap == "auto" else float(config.loss.lambda_lap)
     return fresh_state(gaussians, frames, rng, lambda_lap=weight)
 
 

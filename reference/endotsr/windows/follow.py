@@ -4,7 +4,7 @@ A point X at frame g of a window moves with the Gaussians around it:
 
     X(g') = X + sum_j w_j (mu_j(g') - mu_j(g)) / sum_j w_j,    w_j = o_j exp(-|X - mu_j(g)|^2 / (2 r^2)),
 
-over the 8 nearest Gaussians, with opacity o_j and their root mean square distance r. The seam of two windows is the
+over the 128 nearest Gaussians, with opacity o_j and their root mean square distance r. The seam of two windows is the
 frame in the middle of their overlap; there a point that has arrived is matched anew, with the Gaussians of the other
 window.
 
@@ -20,7 +20,7 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.windows.scene import WindowedScene
 
-NEAREST = 8  # Gaussians that move a point
+NEAREST = 128  # Gaussians that move a point; the error of one is of the order of the motion (B18)
 STEP = 16  # frames over which errors are measured
 EVERY = 3  # pixels, in rows and columns, of which one is followed
 
