@@ -63,5 +63,5 @@ def packed_depth(prior_depth: FloatArray, mask: BoolArray) -> PackedDepth:
 
 def unpacked_depth(packed: PackedDepth, dtype: DTypeLike) -> DepthTarget:
     """The depth target again, to half a step."""
-    normalised = np.multiply(packed.levels, np.dtype(dtype).type(1 / STEPS), dtype=dtype)
+    normalised = np.multiply(packed.levels, 1 / STEPS, dtype=dtype)
     return DepthTarget(normalised, unpacked_mask(packed.valid), packed.count)
