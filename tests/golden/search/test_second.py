@@ -25,7 +25,7 @@ MISTAKES = {
     ),
     "a factor at one index": (
         "covariance", "+ z * (g[1, 0] - g[0, 1]))\n    g_x", "+ z * (g[0, 1] - g[1, 0]))\n    g_x",
-        "`spin * -1` at [2] where `spin` is right: equation (B2)",
+        "* -1` at [2] where `",  # of `spin` or of `v`: the product is the same
     ),
     "a factor at one pass of a loop": (
         "harmonics", "(-K3A * y * (3 * xx - yy), -6 * K3A * x * y,", "(-K3A * y * (3 * xx - yy), -3 * K3A * x * y,",

@@ -23,7 +23,7 @@ from endotsr.golden.search.numbers import START, best_number, plain_first, said_
 from endotsr.golden.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.golden.search.requests import OtherReading, other_requests
 from endotsr.golden.search.rewrites import rewrites, with_number
-from endotsr.golden.search.second import Change, Counter, at, beside, expressions, orders, pairs, parts
+from endotsr.golden.search.second import Counter, SecondChange, at, beside, expressions, orders, pairs, parts
 from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
 
@@ -383,7 +383,7 @@ def _second(search: Search, places: Sequence[Statement]) -> None:
         _try(search, one, beside(one.spot, one.values, expressions(one.spot.place)), 5)
 
 
-def _changes(search: Search, changes: Iterator[Change]) -> None:
+def _changes(search: Search, changes: Iterator[SecondChange]) -> None:
     for spot, text, writing in changes:
         if search.over:
             return

@@ -23,7 +23,7 @@ BESIDE = ("({t}) * ({e})", "({t}) / ({e})", "({t}) * (1 - ({e}))", "({t}) + ({e}
 BESIDE_TRUE = ("({t}) & ({e})", "({t}) | ({e})", "({t}) & ~({e})")
 
 
-class Change(NamedTuple):
+class SecondChange(NamedTuple):
     """A change of a place, in words, and the writing of it."""
 
     spot: Spot
@@ -31,7 +31,7 @@ class Change(NamedTuple):
     writing: AbstractContextManager
 
 
-def pairs(spots: Sequence[Spot]) -> Iterator[Change]:
+def pairs(spots: Sequence[Spot]) -> Iterator[SecondChange]:
     """Two numbers of one line, both with another value."""
     numbers = [s for s in spots if _is_number(s.node) and len(s.holders) == 1]
     for one, other in combinations(numbers, 2):
@@ -40,7 +40,7 @@ def pairs(spots: Sequence[Spot]) -> Iterator[Change]:
         for first in _values_near(one.node):
             for second in _values_near(other.node):
                 text = f"`{first}` where `{ast.unparse(one.node)}` is right, and `{second}` where "
-                yield Change(one, f"{text}`{ast.unparse(other.node)}` is", _both(one, first, other, second))
+                yield SecondChange(one, f"{text}`{ast.unparse(other.node)}` is", _both(one, first, other, second))
 
 
 def _is_number(node: ast.AST) -> bool:
@@ -60,7 +60,7 @@ def _both(one: Spot, first: str, other: Spot, second: str) -> Iterator[None]:
         yield
 
 
-def orders(place: Statement) -> Iterator[Change]:
+def orders(place: Statement) -> Iterator[SecondChange]:
     """A statement earlier or later in its block."""
     for holder in ast.walk(place.statement):
         block = getattr(holder, "body", None)
@@ -71,7 +71,7 @@ def orders(place: Statement) -> Iterator[Change]:
                 if to != k and isinstance(node, ast.Assign | ast.AugAssign) and isinstance(block[to], ast.stmt):
                     side, spot = "before" if to < k else "after", Spot(place, node, ((holder, "body", k),))
                     text = f"`{ast.unparse(node)}` {side} `{ast.unparse(block[to])}`"
-                    yield Change(spot, text, _moved(block, k, to))
+                    yield SecondChange(spot, text, _moved(block, k, to))
 
 
 @contextmanager
