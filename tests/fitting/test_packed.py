@@ -37,7 +37,8 @@ def test_a_depth_comes_back_to_half_a_step(dtype):
     rng = np.random.default_rng(5)
     depth, mask = rng.uniform(20, 90, (17, 23)).astype(dtype), rng.random((17, 23)) < 0.7
     depth[2, 3], depth[4, :5], depth[7, 7] = np.nan, 0.0, np.inf
-    wanted, found = depth_target(depth, mask), unpacked_depth(packed_depth(depth, mask), dtype)
+    wanted = depth_target(depth, mask)
+    found = unpacked_depth(packed_depth(wanted), dtype)
     assert found.normalised.dtype == dtype and found.count == wanted.count
     np.testing.assert_array_equal(found.valid, wanted.valid)
     assert np.abs(found.normalised - wanted.normalised).max() <= 0.501 / STEPS
@@ -45,5 +46,5 @@ def test_a_depth_comes_back_to_half_a_step(dtype):
 
 def test_a_picture_without_any_depth_has_no_valid_pixel():
     mask = np.ones((5, 6), np.bool_)
-    found = unpacked_depth(packed_depth(np.zeros((5, 6), np.float32), mask), "float32")
+    found = unpacked_depth(packed_depth(depth_target(np.zeros((5, 6), np.float32), mask)), "float32")
     assert found.count == 0 and not found.valid.any() and not found.normalised.any()

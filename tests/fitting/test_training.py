@@ -22,7 +22,6 @@ from endotsr.config import (
 from endotsr.equations.deformation import deformation_forward
 from endotsr.fitting import model as model_module
 from endotsr.fitting import objective, packed, trainer
-from endotsr.fitting import state as state_module
 from endotsr.fitting.checkpoint import load_checkpoint
 from endotsr.fitting.checkpoint_values import check_lengths
 from endotsr.fitting.divergence import Diverged
@@ -221,7 +220,7 @@ OFF = {
     "ssim": ({"loss": {"ssim_weight": 0.0}}, [(objective, "masked_ssim_forward")], ()),
     "depth": (
         {"loss": {"depth_weight": 0.0}},
-        [(objective, "normalised_depth_forward"), (state_module, "depth_target")],
+        [(objective, "normalised_depth_forward"), (objective, "depth_target")],
         (),
     ),
     "smoothness": (

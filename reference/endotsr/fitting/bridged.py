@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.config import Config
-from endotsr.fitting.objective import Targets, targets_of
+from endotsr.fitting.objective import Targets, optional_depth_target, targets_of
 from endotsr.fitting.packed import (
     STEPS,
     PackedDepth,
@@ -51,28 +51,25 @@ class BridgedTargets:
 
     def observed(self, at: BridgedTime) -> tuple[Targets, Camera]:
         """The targets at a bridged time, in the precision of the training, and the camera there."""
-        made, precision = self.stored.get((at.earlier, at.later), lambda: self._made(at))[at], self._precision
-        mask = unpacked_mask(made.mask)
+        made = self.stored.get((at.earlier, at.later), lambda: self._made(at))[at]
+        mask, precision = unpacked_mask(made.mask), self.config.training.precision
         depth = None if made.depth is None else unpacked_depth(made.depth, precision)
         rule = self.config.loss.upsampling
         supports = None if made.supports is None else unpacked_supports(made.supports, mask, rule)
         return targets_of(stored_target(made.image, STEPS, mask, precision), depth, supports, self.config), made.camera
 
-    @property
-    def _precision(self) -> str:
-        return self.config.training.precision
-
     def _made(self, wanted: BridgedTime) -> dict[BridgedTime, Stored]:
         """All times of the gap in which `wanted` lies."""
         earlier, later, _ = wanted
-        config, found = self.config, {}
+        config, precision, found = self.config, self.config.training.precision, {}
         flows, count = flows_between(self.sequence, earlier, later), 2 * (later - earlier)
         for place in range(1, count):
             made = frame_between(self.sequence, earlier, later, place / count, flows)
+            depth = optional_depth_target(made.depth.astype(precision), made.mask, config)
             found[BridgedTime(earlier, later, place / count)] = Stored(
                 np.rint(made.image * STEPS).astype(np.uint16),
                 packed_mask(made.mask),
-                packed_depth(made.depth.astype(self._precision), made.mask) if config.loss.depth_weight > 0 else None,
+                None if depth is None else packed_depth(depth),
                 packed_supports(made.mask, config.loss.upsampling) if config.model.laplacian else None,
                 made.camera,
             )

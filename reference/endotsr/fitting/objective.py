@@ -72,9 +72,14 @@ def targets_of(target: SsimTarget, depth: DepthTarget | None, supports: SupportM
     return Targets(target.image, target.mask, target if config.loss.ssim_weight > 0 else None, depth, supports)
 
 
+def optional_depth_target(depth: FloatArray, mask: NDArray[np.bool_], config: Config) -> DepthTarget | None:
+    """`depth_target`, or None where its loss is off."""
+    return depth_target(depth, mask) if config.loss.depth_weight > 0 else None
+
+
 def frame_targets(frame: Frame, config: Config) -> Targets:
     """Masked target image, depth target and pyramid supports of one frame."""
-    depth = depth_target(frame.depth, frame.mask) if config.loss.depth_weight > 0 else None
+    depth = optional_depth_target(frame.depth, frame.mask, config)
     supports = support_masks(frame.mask, LEVELS, config.loss.upsampling) if config.model.laplacian else None
     return targets_of(ssim_target(frame.image, frame.mask), depth, supports, config)
 

@@ -1,6 +1,6 @@
 """The targets of a frame in few bytes between its visits, and unpacked at each.
 
-In: masks of the tissue and prior depths. Out: what the depth loss and the pyramid compare with. A mask takes one bit a
+In: masks of the tissue and depth targets. Out: what the depth loss and the pyramid compare with. A mask takes one bit a
 pixel. The depth of a frame is normalised at every visit, which is quick; that of a time between two frames (B14) is
 stored in whole numbers. This module computes no loss.
 """
@@ -12,8 +12,8 @@ from numpy.typing import DTypeLike
 
 from endotsr.equations.laplacian import LEVELS, SupportMasks, support_masks
 from endotsr.equations.pyramid import Upsampling
-from endotsr.kernels.arrays import Array, BoolArray, FloatArray
-from endotsr.losses.depth import DepthTarget, depth_target
+from endotsr.kernels.arrays import Array, BoolArray
+from endotsr.losses.depth import DepthTarget
 
 STEPS = 65535  # of a number in [0, 1]; 8-bit steps would be as large as the error of a good fit
 
@@ -54,9 +54,8 @@ def unpacked_supports(packed: tuple[PackedMask, ...], mask: BoolArray, upsamplin
     return SupportMasks(mask, tuple(unpacked_mask(valid) for valid in packed), upsampling)
 
 
-def packed_depth(prior_depth: FloatArray, mask: BoolArray) -> PackedDepth:
-    """`depth_target` in whole numbers."""
-    target = depth_target(prior_depth, mask)
+def packed_depth(target: DepthTarget) -> PackedDepth:
+    """A depth target in whole numbers."""
     levels = np.rint(target.normalised * STEPS).astype(np.uint16)
     return PackedDepth(levels, packed_mask(target.valid), target.count)
 

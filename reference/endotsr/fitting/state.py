@@ -19,12 +19,11 @@ from endotsr.fitting.adam import AdamState, Rate, adam_state
 from endotsr.fitting.bridged import BridgedTargets
 from endotsr.fitting.checkpoint import Checkpoint, restore_rng, save_checkpoint
 from endotsr.fitting.model import OffsetsAhead, Spectral, spectral_from
-from endotsr.fitting.objective import Targets, targets_of
+from endotsr.fitting.objective import Targets, optional_depth_target, targets_of
 from endotsr.fitting.packed import PackedMask, packed_supports, unpacked_supports
 from endotsr.fitting.records import CheckpointHeader, RngState
 from endotsr.fitting.sampling import Drawn, View
 from endotsr.kernels.memory import Kept, keep_freed_memory, memory_limit
-from endotsr.losses.depth import depth_target
 from endotsr.losses.masked_ssim import stored_target
 from endotsr.scene.density_control import DensityStatistics, empty_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -89,9 +88,8 @@ class Workshop:
     def targets_of(self, index: int) -> Targets:
         """The targets of a frame. The supports of its pyramid are computed once, or again where they were dropped."""
         sequence, config, precision = self.sequence, self.config, self.config.training.precision
-        mask, rule, depth, supports = sequence.masks[index], config.loss.upsampling, None, None
-        if config.loss.depth_weight > 0:
-            depth = depth_target(sequence.depth[index].astype(precision, copy=False), mask)
+        mask, rule, supports = sequence.masks[index], config.loss.upsampling, None
+        depth = optional_depth_target(sequence.depth[index].astype(precision, copy=False), mask, config)
         if config.model.laplacian:
             supports = unpacked_supports(self.supports.get(index, lambda: packed_supports(mask, rule)), mask, rule)
         return targets_of(stored_target(sequence.images[index], 255, mask, precision), depth, supports, config)
