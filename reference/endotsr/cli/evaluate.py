@@ -9,8 +9,9 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.parts.shown import SHOWN, ShownSettings, shown_sequence
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, replace_file, write_json
+from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import RunFolder, open_run
+from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -90,7 +91,7 @@ def run(words: list[str]) -> int:
         write_json(options.json, metrics)
     if options.csv:
         text = frames_csv(metrics, metrics.get("label", "this model"))
-        replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
+        replace_text(options.csv, text)
     return 0
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from endotsr.report import parts as parts
 from endotsr.report.data import FramePictures, FreeTable, ReportData
 from endotsr.report.sections import SECTIONS
-from endotsr.runs.files import replace_file
+from endotsr.untrusted.writing import replace_text
 
 __all__ = ["FramePictures", "FreeTable", "ReportData", "report_html", "write_report"]
 
@@ -21,7 +21,7 @@ def write_report(path: Path, data: ReportData) -> None:
     Raises   OSError as the file system reports it
     """
     content = report_html(data)
-    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8", newline="\n"))
+    replace_text(Path(path), content)
 
 
 def report_html(data: ReportData) -> str:

@@ -22,11 +22,12 @@ from endotsr.report.live_page import REPORT, lead_to_report
 from endotsr.report.page import write_report
 from endotsr.report.pictures import rgb_bytes
 from endotsr.report.run_text import component_table, facts
-from endotsr.runs.files import replace_file, replacing_folder, write_json
+from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.names import file_name
+from endotsr.untrusted.writing import replace_file, replacing_folder
 
 MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the report: some 0.25 MB each
 

@@ -4,8 +4,6 @@ Comes in: the folder; goes out: `depth/` and the section [depth] of its `sequenc
 frame. The new folder takes its place when it is whole.
 """
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +23,7 @@ from endotsr.sequences.recording import ARBITRARY, PicturePair, Recording
 from endotsr.sequences.relative_depth import Align, MadeDepth, flat_depth, relative_depth
 from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, Assumed, DepthEntry, SequenceFile, sequence_text
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
-from endotsr.sequences.writing import new_folder, replace_text
+from endotsr.untrusted.writing import replace_text, replacing_folder
 
 OnFrame = Callable[[int, int], None]
 
@@ -104,9 +102,7 @@ def write_depth(
     if (contents.file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
     coverage, medians, step = [], [], 0.0
-    staged = folder / f".new-{DEPTH}"
-    shutil.rmtree(staged, ignore_errors=True)
-    with new_folder(staged) as place:
+    with replacing_folder(folder / DEPTH) as place:
         for k, frame in enumerate(frames):
             known = frame.depth[frame.depth > 0]
             if known.size:
@@ -122,18 +118,8 @@ def write_depth(
     unit = ARBITRARY if contents.file.arbitrary or assumed else "mm"
     entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=method, assumed=assumed)
     found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if assumed else contents.file.unit)
-    _put_in_place(folder, staged, found)
-    return DepthReport(found, coverage, float(np.median(medians)))
-
-
-def _put_in_place(folder: Path, staged: Path, found: SequenceFile) -> None:
-    """The new depth and the file that describes it; the old depth goes last."""
-    old = folder / f".old-{os.getpid()}-{DEPTH}"
-    if (folder / DEPTH).exists():
-        os.rename(folder / DEPTH, old)
-    os.rename(staged, folder / DEPTH)
     replace_text(folder / FILE_NAME, sequence_text(found))
-    shutil.rmtree(old, ignore_errors=True)
+    return DepthReport(found, coverage, float(np.median(medians)))
 
 
 def make_stereo_depth(

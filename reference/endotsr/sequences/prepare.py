@@ -41,7 +41,7 @@ from endotsr.sequences.splits import evenly_spaced
 from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
-from endotsr.sequences.writing import new_folder, replaced_folder
+from endotsr.sequences.writing import new_folder
 
 DEPTH_LEVELS = 65535 // 8  # of the 16 bits for the usual largest depth of a frame; eight times more still fits
 LARGEST = 99.8  # percentile of a frame that counts as its largest depth; single values may be outliers
@@ -79,7 +79,7 @@ def prepare(
     chosen = select_frames(recording, settings, notes)
     chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
     refuse_no_lengths(recording, chosen)
-    with replaced_folder(Path(out), FILE_NAME) if replace else new_folder(Path(out)) as folder:
+    with new_folder(Path(out), FILE_NAME if replace else "") as folder:
         found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
     return found, notes

@@ -15,7 +15,6 @@ import msgspec
 
 from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.errors import InputError
-from endotsr.runs.files import replacing_folder
 from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
@@ -24,6 +23,7 @@ from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job, finished_folder
 from endotsr.sweeps.locks import file_lock
 from endotsr.sweeps.sweep import Reporter, Watch
+from endotsr.untrusted.writing import replacing_folder
 from endotsr.windows.carry import CarriedStart
 from endotsr.windows.plan import Wanted, check_wanted, planned_windows
 from endotsr.windows.record import FOLDER, Window, WindowsRecord, read_record, write_record
