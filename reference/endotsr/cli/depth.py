@@ -108,28 +108,23 @@ def _refuse_contradictions(options: DepthOptions) -> None:
 
 def _made(options: DepthOptions) -> "DepthReport":
     """Depth of another program, or that of the stereo pairs."""
-    from endotsr.sequences.make_depth import (
-        make_flat_depth,
-        make_stereo_depth,
-        take_given_depth,
-        take_relative_depth,
-    )
+    from endotsr.sequences.common import list_contents
+    from endotsr.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
+    from endotsr.sequences.relative_depth import flat_depth
     from endotsr.sequences.stereo_depth import StereoSettings
 
+    folder, given = options.sequence, options.given
     if options.flat:
-        return make_flat_depth(options.sequence, options.replace, _said)
-    if options.given is not None and options.kind == "relative":
-        return take_relative_depth(
-            options.sequence, options.given, options.align, options.farthest_over_nearest, options.trust_depth,
-            options.replace, _said,
-        )  # fmt: skip
-    if options.given is not None and options.kind != "relative":
-        return take_given_depth(
-            options.sequence, options.given, options.kind, options.unit_scale, options.replace, _said
-        )
-    names = ("nearest", "farthest", "block", "smooth", "agreement", "confidence", "temporal")
-    settings = StereoSettings(**{name: getattr(options, name) for name in names})
-    return make_stereo_depth(options.sequence, settings, options.replace, _said)
+        made = flat_depth(list_contents(folder))
+    elif given is not None and options.kind == "relative":
+        farthest, trusted = options.farthest_over_nearest, options.trust_depth
+        made = from_relative(folder, given, options.align, farthest, trusted, options.replace)
+    elif given is not None and options.kind != "relative":
+        made = from_files(folder, given, options.kind, options.unit_scale)
+    else:
+        names = ("nearest", "farthest", "block", "smooth", "agreement", "confidence", "temporal")
+        made = from_pairs(folder, StereoSettings(**{name: getattr(options, name) for name in names}))
+    return write_depth(folder, made, options.replace, _said)
 
 
 def _said(done: int, total: int) -> None:

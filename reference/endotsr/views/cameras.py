@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.record import RecordedCamera
+from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.splatting.camera import Camera
-from endotsr.untrusted.json import read_json
+from endotsr.untrusted.json import read_json, typed
 
 TURNING = ("orbit", "sway")
 PATHS = ("observed", *TURNING)
-ORTHONORMAL = 1e-3  # largest entry of R R^T - I that still counts as the rounding of a written rotation
 LARGEST_SIDE = 16384  # pixels of a rendered picture
 
 
@@ -93,40 +93,17 @@ def read_cameras(file: Path, like: Camera) -> list[Camera]:
 def _camera(entry: Any, like: Camera, where: str) -> Camera:
     if not isinstance(entry, dict):
         raise InputError(f"{where}: {type(entry).__name__}; allowed: an object with rotation and translation")
-    unknown = [key for key in entry if key not in Camera._fields]
-    if unknown:
-        raise InputError(f"{where}: unknown key {unknown[0]}; allowed: {', '.join(Camera._fields)}")
-    rotation = _numbers(entry, "rotation", (3, 3), where)
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(rotation) < 0:
-        raise InputError(f"{where}: rotation is no rotation matrix; allowed: orthonormal rows, determinant 1")
-    named = {key: float(_numbers(entry, key, (), where)) for key in ("fx", "fy", "cx", "cy") if key in entry}
-    for key in ("fx", "fy"):
-        if named.get(key, 1.0) <= 0:
-            raise InputError(f"{where}: {key} = {named[key]:g} is not allowed; allowed: a number > 0")
+    lens = {key: getattr(like, key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
+    found = typed(lens | entry, RecordedCamera, where).camera
     for key in ("width", "height"):
-        if key in entry:
-            checked_side(entry[key], f"{where}: {key}")
-            named[key] = entry[key]
-    return like._replace(rotation=rotation, translation=_numbers(entry, "translation", (3,), where), **named)
+        checked_side(getattr(found, key), f"{where}: {key}")
+    return found._replace(rotation=checked_rotation(found.rotation, f"{where}: rotation"))
 
 
 def checked_side(side: Any, where: str) -> None:
     """Raises InputError if this is no number of pixels of a side."""
     if isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= LARGEST_SIDE:
         raise InputError(f"{where} = {side!r} is not allowed; allowed: an integer from 1 to {LARGEST_SIDE}")
-
-
-def _numbers(entry: dict[str, Any], key: str, shape: tuple[int, ...], where: str) -> NDArray[np.float64]:
-    size = "x".join(map(str, shape)) or "one"
-    if key not in entry:
-        raise InputError(f"{where}: {key} is missing; allowed: {size} number{'s' if shape else ''}")
-    try:
-        found = np.array(entry[key], np.float64)
-    except (TypeError, ValueError):
-        found = np.array(np.nan)
-    if found.shape != shape or not np.isfinite(found).all():
-        raise InputError(f"{where}: {key} = {entry[key]!r} is not allowed; allowed: {size} finite number(s)")
-    return found
 
 
 def along(cameras: list[Camera], count: int) -> list[Camera]:
