@@ -12,8 +12,8 @@ import numpy as np
 from claims_cost import planned_hours
 from claims_power import least_difference
 from over_seeds import interval
+from published import PUBLISHED
 
-from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
 from endotsr.sweeps.ablation import COMPARISONS, Contrast
 from endotsr.sweeps.ablation_page import increment_table, interval_text, level_table

@@ -193,7 +193,7 @@ def measure_pictures(
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
 
     metrics = evaluate_model(sequence, lambda index: pictures.read(index, shape), weights, training)
-    metrics["label"], metrics["published"] = label or pictures.folder.absolute().name, []
+    metrics["label"] = label or pictures.folder.absolute().name
     metrics["pictures"] = {
         "folder": str(pictures.folder.absolute()),
         "pairing": pictures.pairing,

@@ -113,7 +113,6 @@ def _report_data(
         evaluation=metrics,
         log=log,
         frames=frames,
-        reference_rows=tuple(metrics.get("published", ())),
         components=(component_table(metrics),),
         facts=facts(metrics),
         configuration=config_to_toml(folder.config()),

@@ -90,21 +90,17 @@ def moving(data: ReportData) -> str:
 
 
 def held_out(data: ReportData) -> str:
-    """The table of held-out metrics: model, baselines, published rows; values of 8 bits are folded."""
+    """The table of held-out metrics: model and baselines; values of 8 bits are folded."""
     rows: list[MetricsRow] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
     if faded := data.evaluation.get("cross_fade"):
         rows.append((faded["label"], faded["mean"], ""))
     rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
-    rows += [(str(row.get("label", "published")), row, "reference") for row in data.reference_rows]
     columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
     if not columns:
         return ""
-    note = (
-        "Mean over the held-out frames. Baselines use training frames only. Best measured value of a column in colour; "
-        "published rows are quoted, not measured here."
-    )
+    note = "Mean over the held-out frames. Baselines use training frames only. Best value of a column in colour."
     table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
     title = "Held-out frames against baselines without a model"
     return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
@@ -115,9 +111,9 @@ def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
     cells = [
         [
             parts.text(label),
-            *(_metric(row.get(key), n, None if kind == "reference" else best[key]) for key, _, n, _ in columns),
+            *(_metric(row.get(key), n, best[key]) for key, _, n, _ in columns),
         ]
-        for label, row, kind in rows
+        for label, row, _ in rows
     ]
     return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
 
@@ -133,7 +129,7 @@ def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
 
 
 def _best(rows: list[MetricsRow], key: str, sign: int) -> float | None:
-    values = [row[key] for _, row, kind in rows if kind != "reference" and row.get(key) is not None]
+    values = [row[key] for _, row, _ in rows if row.get(key) is not None]
     return max(values, key=lambda v: sign * v) if len(values) > 1 else None
 
 

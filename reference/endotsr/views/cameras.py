@@ -12,6 +12,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.between import camera_between
 from endotsr.sequences.record import RecordedCamera
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.splatting.camera import Camera
@@ -109,23 +110,11 @@ def checked_side(side: Any, where: str) -> None:
 def along(cameras: list[Camera], count: int) -> list[Camera]:
     """`count` cameras along the given ones, the first and the last included; as many as given are those given.
 
-    Positions of the optical centre and intrinsics are interpolated linearly, rotations on the sphere (slerp). The size
-    is that of the first camera.
+    Between two of them it is `camera_between`; the size is that of the first camera.
     """
     if len(cameras) == count:
         return list(cameras)
-    if len(cameras) == 1:
-        return cameras * count
-    from scipy.spatial.transform import Rotation, Slerp
-
-    keys, wanted = np.linspace(0, 1, len(cameras)), np.linspace(0, 1, count) if count > 1 else np.zeros(1)
-    rotations = Slerp(keys, Rotation.from_matrix([c.rotation for c in cameras]))(wanted).as_matrix()
-    centres = np.array([-np.asarray(c.rotation).T @ c.translation for c in cameras])
-    lenses = np.array([(c.fx, c.fy, c.cx, c.cy) for c in cameras])
-    centre = np.stack([np.interp(wanted, keys, column) for column in centres.T], axis=1)
-    lens = np.stack([np.interp(wanted, keys, column) for column in lenses.T], axis=1)
-    like = cameras[0]
-    return [
-        like._replace(rotation=r, translation=-r @ o, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
-        for r, o, (fx, fy, cx, cy) in zip(rotations, centre, lens)
-    ]
+    last, size = len(cameras) - 1, {"width": cameras[0].width, "height": cameras[0].height}
+    places = np.linspace(0, last, count) if count > 1 else [0.0]
+    pairs = [(k := min(int(place), max(last - 1, 0)), min(k + 1, last), place - k) for place in places]
+    return [camera_between(cameras[a], cameras[b], fraction)._replace(**size) for a, b, fraction in pairs]

@@ -60,7 +60,6 @@ def measure_windows(
     ]
     metrics["left_out"] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
     metrics["seams"] = _seams(scene, frames) if seams else None
-    metrics["published"] = []
     return metrics
 
 
