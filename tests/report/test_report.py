@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from endotsr.report.data import Preview
-from endotsr.report.page import FramePictures, FreeTable, ReportData, report_html, write_report
+from endotsr.report.data import FramePictures, FreeTable, Preview, ReportData
+from endotsr.report.sections import report_html, write_report
 
 VOID = {"meta", "img", "source", "br"}
 

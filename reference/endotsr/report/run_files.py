@@ -19,9 +19,9 @@ from endotsr.report.curves import curves_png, read_log
 from endotsr.report.data import FramePictures, Preview, ReportData
 from endotsr.report.figures import triptych, triptych_picture
 from endotsr.report.live_page import REPORT, lead_to_report
-from endotsr.report.page import write_report
 from endotsr.report.pictures import rgb_bytes
 from endotsr.report.run_text import component_table, facts
+from endotsr.report.sections import write_report
 from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence

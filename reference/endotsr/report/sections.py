@@ -1,17 +1,23 @@
-"""The sections of the report, top to bottom; each is a function of the data and is empty when its data is missing."""
+"""One self-contained HTML page about a run: numbers, baselines, pictures, curves, and how it was made.
+
+Its sections stand here from top to bottom; each is a function of the data and is empty when its data is missing. The
+page embeds every picture, needs no script and no other file, follows the reader's light or dark colour scheme and is
+readable on a phone. It links to the viewer page beside it, if there is one.
+"""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from endotsr.evaluation.evaluate import left_out
 from endotsr.evaluation.records import Means
-from endotsr.report import curves, figures
-from endotsr.report import parts as parts
+from endotsr.report import curves, figures, parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
 from endotsr.report.run_text import pose_sentence, trajectory_sentence
 from endotsr.report.tables import html_table
+from endotsr.untrusted.writing import replace_text
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
@@ -306,3 +312,18 @@ def footer(data: ReportData) -> str:
 
 
 SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)
+
+
+def write_report(path: Path, data: ReportData) -> None:
+    """Write the page to `path`: complete or not at all (an older file stays until the new one is whole).
+
+    Raises   OSError as the file system reports it
+    """
+    content = report_html(data)
+    replace_text(Path(path), content)
+
+
+def report_html(data: ReportData) -> str:
+    """The page as text."""
+    body = [make(data) for make in SECTIONS]
+    return parts.page(data.title, "\n".join(part for part in body if part))
