@@ -11,8 +11,8 @@ from typing import Any
 from claims_power import least_difference
 from claims_protocols import LEAST_PAIRS, protocol_rows
 from over_seeds import interval
+from published import PUBLISHED
 
-from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
 from endotsr.sweeps.ablation import COMPARISONS, Contrast
 from endotsr.sweeps.ablation_page import interval_text

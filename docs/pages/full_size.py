@@ -27,9 +27,10 @@ import endotsr
 from endotsr.errors import InputError
 from endotsr.evaluation.baselines import BASELINES, RenderFrame, neighbours, unit_image
 from endotsr.report.style import save
-from endotsr.runs.files import replace_file, write_json
+from endotsr.runs.files import write_json
 from endotsr.sequences.between import flows_between
 from endotsr.sequences.sequence import Sequence
+from endotsr.untrusted.writing import replace_file
 
 DOCS = Path(__file__).parents[1]
 PAGE, FOLDER = DOCS / "full_size.md", DOCS / "results" / "full_size"

@@ -15,8 +15,8 @@ from endotsr.cli.main import main as endotsr
 from endotsr.errors import InputError
 from endotsr.export.scene import MovingScene, open_scene
 from endotsr.report.figures import ByteImage, bytes_image
-from endotsr.runs.files import replace_file
 from endotsr.runs.sources import load_run_sequence
+from endotsr.untrusted.writing import replace_file
 from endotsr.views.cameras import fitted, path_cameras, pivot_depth_of
 from endotsr.views.panels import GAP
 from endotsr.views.preview import encoded

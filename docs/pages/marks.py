@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
-from endotsr.runs.files import replace_file
+from endotsr.untrusted.writing import replace_file
 
 
 def write_marked(page: Path, made: Mapping[str, str], room: str) -> None:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from claims_verdicts import student
 from marks import read_json, write_marked
+from published import PUBLISHED
 
 DOCS = Path(__file__).parents[1]
 sys.path.append(str(DOCS / "_extensions"))
@@ -22,7 +23,6 @@ from book_map import Equation, equations  # noqa: E402  # pyright: ignore[report
 from package_names import definitions  # noqa: E402  # pyright: ignore[reportMissingImports]
 
 from endotsr.errors import InputError  # noqa: E402
-from endotsr.evaluation.run import PUBLISHED  # noqa: E402
 from endotsr.report.tables import markdown  # noqa: E402
 
 PAGE, CLAIMS, RULINGS = DOCS / "paper.md", DOCS / "claims.md", DOCS / "specification" / "rulings.md"

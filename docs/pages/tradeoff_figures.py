@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tradeoff_labels import Label, place_labels
+from tradeoff_text import small
 
 from endotsr.report.style import (
     BLUE,
@@ -22,7 +23,7 @@ from endotsr.report.style import (
     save,
 )
 from endotsr.tradeoff.study import cost_of
-from endotsr.tradeoff.text import LEVELS, small
+from endotsr.tradeoff.text import LEVELS
 
 TIME = {"forward": "milliseconds a frame", "both": "milliseconds, forward and reverse"}
 FLOOR = 1e-10  # lower end of the error axis, in 1/255, where the exact path with error 0 is drawn

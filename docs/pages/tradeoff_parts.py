@@ -4,19 +4,11 @@ from typing import Any
 
 from tradeoff_dials import OMITTED
 from tradeoff_presets import judge_presets
+from tradeoff_text import advice, eight_bit_setting, error_over_cutoff, float32_floor
 from tradeoff_training_text import summary, training_rows
 
 from endotsr.report.tables import markdown
-from endotsr.tradeoff.text import (
-    COLUMNS,
-    advice,
-    eight_bit_setting,
-    error_over_cutoff,
-    float32_floor,
-    front_rows,
-    levels,
-    made,
-)
+from endotsr.tradeoff.text import COLUMNS, front_rows, levels, made
 
 TRAINING_COLUMNS = ("Training", "PSNR, dB", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians")
 

@@ -5,13 +5,12 @@ command writes.
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from tradeoff_certificate import certify
 from tradeoff_dials import OMITTED, Dial, dials
 
-from endotsr.tradeoff.measure import frame, prepare
+from endotsr.tradeoff.measure import RenderedFrame, frame, prepare
 from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.study import REPEATS, NamedSettings, exact_is_possible, reference_setting, run_study
 
@@ -37,14 +36,14 @@ def run_whole_study(
     scene: StudyScene,
     *,
     repeats: int = REPEATS,
-    images: Path | None = None,
+    keep: Callable[[str, RenderedFrame], object] = lambda file, found: None,
     begin: Callable[[int], None] = lambda steps: None,
     step: Callable[[int], None] = lambda steps: None,
 ) -> dict[str, Any]:
     """Measure everything; the arguments are those of `endotsr.tradeoff.study.run_study`."""
     plan, aim = WholePlan(scene), reference_setting(scene)
     certificate = certify(scene, frame(prepare(scene, aim))[0].colour, aim.raster)
-    result = run_study(scene, repeats=repeats, plan=plan, images=images, begin=begin, step=step)
+    result = run_study(scene, repeats=repeats, plan=plan, keep=keep, begin=begin, step=step)
     result["reference"]["certificate"] = certificate.as_dict()
     return result | {"dials": plan.dials, "omitted": omitted(scene)}
 

@@ -27,13 +27,13 @@ from typing import Any
 
 import numpy as np
 from marks import write_marked
+from seam_errors import seam_errors
 
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine
 from endotsr.simulator.recorded import recorded_positions
 from endotsr.sweeps.execute import execute
-from endotsr.windows.follow import seam_errors
 from endotsr.windows.make import recording_settings, window_job
 from endotsr.windows.record import read_record
 from endotsr.windows.scene import WindowFrames, open_windows

@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from endotsr.evaluation.run import PUBLISHED
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
+
+sys.path.append(str(Path(__file__).parents[1] / "pages"))
+from published import PUBLISHED
 
 FOLDER = Path(__file__).parent
 START, END = "<!-- results:start (made by docs/results/record.py) -->", "<!-- results:end -->"

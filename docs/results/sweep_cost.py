@@ -14,11 +14,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from endotsr.cli.sweep import Place, run_spec
+from endotsr.cli.sweep import run_spec
 from endotsr.kernels.machine import usable_cores
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.runs.sources import SIMULATED
+from endotsr.sweeps.place import Place
 from endotsr.sweeps.spec import Spec, spec_of
 
 FILE = Path(__file__).with_name("sweep_cost.json")

@@ -110,7 +110,8 @@ WRONG_PORTS = [
         "Atom statistics over test frames too",
         "mean and RMS over all stamps; right: over the training stamps",
         "atoms scene objective training",
-        edit("stages.requests", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]', 2),
+        edit("stages.requests", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]'),
+        edit("stages.spectral", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]'),
         edit("fitting.state", "sequence.times[sequence.train_index]", "sequence.times", 2),
     ),
     port(

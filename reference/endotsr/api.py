@@ -21,7 +21,6 @@ import shutil
 import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,7 +38,6 @@ from endotsr.config import (
     with_iterations,
 )
 from endotsr.errors import InputError
-from endotsr.fitting.model import corrected_cameras, render_at
 from endotsr.fitting.records import LogEntry
 from endotsr.runs import folder as run_folders
 from endotsr.runs import sources
@@ -47,7 +45,7 @@ from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
 from endotsr.runs.records import ResumedEntry, RunRecord, new_record
-from endotsr.sequences.record import SequenceRecord, nearest_frame, record_of
+from endotsr.sequences.record import SequenceRecord, record_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import Camera
@@ -61,7 +59,6 @@ if TYPE_CHECKING:
     from endotsr.windows.run import WindowedRun
 
 Component = Literal["appearance", "spectral_motion"]
-COMPONENTS: tuple[Component, ...] = ("appearance", "spectral_motion")
 OnIteration = Callable[[LogEntry], object]
 OnRun = Callable[["Run"], object]
 OnMessage = Callable[[str], object]
@@ -291,22 +288,7 @@ class Run:
         Depth is view-space z, not normalised by opacity. Colour is not clipped to [0, 1].
         Raises: InputError for a time, frame or component that does not exist.
         """
-        if not 0.0 <= time <= 1.0:
-            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
-        for name in without:
-            if name not in COMPONENTS:
-                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
-        model = self.model
-        return render_at(
-            model.gaussians,
-            model.spectral,
-            model.config,
-            self._camera(time, camera),
-            float(time),
-            frames=model.frames,
-            appearance="appearance" not in without,
-            spectral_motion="spectral_motion" not in without,
-        )
+        return self._scene().picture(time, camera, without)
 
     def film(
         self,
@@ -444,11 +426,10 @@ class Run:
         return folder.path
 
     def _scene(self) -> "MovingScene":
-        """What the writers of films and files take; the record as it stands in sequence.json."""
+        """What renders, and what the writers of films and files take."""
         from endotsr.export.scene import MovingScene
-        from endotsr.runs.files import finite
 
-        return MovingScene(finite(self.sequence_record), self.model)
+        return MovingScene(self.sequence_record, self.model)
 
     def _training(self) -> "TrainingState":
         state = self._state
@@ -466,18 +447,6 @@ class Run:
             "lambda_lap": state.lambda_lap,
             "peak_memory_bytes": peak_memory_bytes(),
         }
-
-    def _camera(self, time: float, camera: Camera | int | None) -> Camera:
-        if isinstance(camera, Camera):
-            return camera
-        record = self.sequence_record
-        cameras = corrected_cameras(self.model.frames, record.frame_cameras, record.times)
-        if camera is None:
-            return cameras[nearest_frame(record.times, time)]
-        if not isinstance(camera, Integral) or not 0 <= int(camera) < len(cameras):
-            allowed = f"a Camera, or a frame from 0 to {len(cameras) - 1}"
-            raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
-        return cameras[int(camera)]
 
 
 def _model_of(state: "TrainingState", config: Config, record: SequenceRecord) -> Model:

@@ -160,7 +160,6 @@ def test_a_mistyped_option_is_named_before_the_words_that_are_missing(capsys):
             ["train", "simulated", "--preset", "None"],
             "--preset 'None' is not allowed; allowed: paper, sharp, quick, demo",
         ),
-        (["evaluate", "run", "--paper-row", "x"], "--paper-row 'x' is not allowed; allowed: pulling"),
         (["render", "run", "--frames", "x", "--out", "y"], "--frames 'x' is not allowed; allowed: test, train, all"),
     ],
 )

@@ -21,6 +21,7 @@ from endotsr.simulator.sections import CameraMotion
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate
 from endotsr.splatting.camera import Camera
+from endotsr.untrusted.writing import replace_file
 
 ONE_FRAME = SequenceRecord(
     unit="mm", largest_depth=9.0, static_camera=True, names=["a"], times=[0.0], train_index=[0], test_index=[],
@@ -82,7 +83,7 @@ def test_replacing_a_file_keeps_the_old_one_on_failure(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.raises(OSError):
-        files.replace_file(file, broken)
+        replace_file(file, broken)
     assert json.loads(file.read_text()) == {"psnr": 1.0}
     assert list(tmp_path.iterdir()) == [file]
 

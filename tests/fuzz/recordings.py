@@ -150,9 +150,9 @@ def rig_seeds() -> list[bytes]:
 
 
 def read_rig(path: Path) -> object:
-    from endotsr.sequences.calibrations.stereo_ini import read_rig as read
+    from endotsr.sequences.calibrations import lens_or_rig
 
-    return read(path)
+    return lens_or_rig(path, 64, 48)
 
 
 def trajectory_seeds() -> list[bytes]:

@@ -28,15 +28,15 @@ def quiet_run(tmp_path_factory):
 @pytest.fixture
 def pages(monkeypatch):
     """Every page of the runs of a test; one is due at every iteration."""
-    found, replace = [], live_page.replace_file
+    found, replace = [], live_page.replace_text
 
-    def kept(path, write):
-        replace(path, write)
+    def kept(path, text):
+        replace(path, text)
         found.append(path.read_text(encoding="utf-8"))
 
     monkeypatch.setattr(live_page, "FEWEST_SECONDS", 0.0)
     monkeypatch.setattr(live_page, "MOST_SECONDS", 0.0)
-    monkeypatch.setattr(live_page, "replace_file", kept)
+    monkeypatch.setattr(live_page, "replace_text", kept)
     return found
 
 
@@ -75,7 +75,7 @@ def test_a_page_that_cannot_be_written_stops_no_training(monkeypatch, tmp_path):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(live_page, "replace_file", full)
+    monkeypatch.setattr(live_page, "replace_text", full)
     assert main(train_words(tmp_path / "run", "--no-evaluate")) == 0
     assert not (tmp_path / "run" / "training.html").exists()
 

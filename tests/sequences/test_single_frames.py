@@ -96,4 +96,4 @@ def test_hard_E6_a_depth_picture_on_another_scale_is_noted(tmp_path):
     written = write_synthetic_folder(tmp_path)
     cv2.imwrite(str(tmp_path / "depth" / "frame-000002.depth.png"), written.depth[2] * np.uint16(10))
     notes = read_endonerf(tmp_path, EVERYTHING).notes
-    assert any("far from the usual median, perhaps in another unit: frame-000002.depth.png (" in note for note in notes)
+    assert any("depth-far-off: frame 2: median of frame-000002.depth.png is" in note for note in notes)

@@ -15,7 +15,7 @@ from endotsr.errors import InputError
 from endotsr.opencv import read_png, write_png
 from endotsr.sequences.common import read_common
 from endotsr.sequences.given_depth import depth_of_values
-from endotsr.sequences.make_depth import take_given_depth
+from endotsr.sequences.make_depth import from_files, write_depth
 from endotsr.sequences.recording import Lens
 from endotsr.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
@@ -112,7 +112,7 @@ def test_disparity_of_another_program(tmp_path, ending):
         plane[0] = np.nan
         plane[1] = 0
         write_plane(tmp_path / "raft" / f"{i:06d}{ending}", plane)
-    report = take_given_depth(tmp_path / "clip", tmp_path / "raft", "disparity", 1.0, False)
+    report = write_depth(tmp_path / "clip", from_files(tmp_path / "clip", tmp_path / "raft", "disparity", 1.0))
     sequence = read_common(tmp_path / "clip", SequenceConfig(depth_percentiles=(0.0, 100.0)), 0.2)
     assert not sequence.depth[:, :2].any()
     expected = 30.0 * 4.0 / (2 + column / 16)

@@ -41,7 +41,7 @@ class Told:
 
 def sweep(spec, out, make=lambda job: execute(job, 1), told=None, **options):
     """The sweep in this process; `make` makes one run."""
-    made = lambda jobs, inputs: (make(job) for job in jobs)
+    made = lambda jobs: (make(job) for job in jobs)
     return run_sweep(read_spec(spec), out, made, told or Told(), inputs=Inputs(keep=False), **options)
 
 

@@ -7,10 +7,10 @@ import pytest
 from made_up import moving_scene
 from tradeoff_figures import dials_figure, draw, main_figure
 from tradeoff_study import run_whole_study
+from tradeoff_text import advice, error_over_cutoff
 
 from endotsr.tradeoff.settings import CUTOFFS
 from endotsr.tradeoff.study import described
-from endotsr.tradeoff.text import advice, error_over_cutoff
 
 pytestmark = pytest.mark.slow
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from seam_errors import STEP, seam_errors
 from small_recording import trained, write_recording
 
 from endotsr.errors import InputError
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.recorded import recorded_positions
-from endotsr.windows.follow import STEP, followed, seam, seam_errors
+from endotsr.windows.follow import followed, seam
 from endotsr.windows.plan import Wanted
 from endotsr.windows.scene import WindowFrames, open_windows
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
-from endotsr.cli.sweep import Place, check_place, ended, run_spec
+from endotsr.cli.sweep import ended, run_spec
 from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 
@@ -67,6 +67,7 @@ def run(words: list[str]) -> int:
     """The command."""
     from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
     from endotsr.sweeps.ablation_page import ablation_markdown, write_ablation
+    from endotsr.sweeps.place import Place, check_place
     from endotsr.sweeps.spec import spec_of
 
     options = parse(AblateOptions, words, "ablate")

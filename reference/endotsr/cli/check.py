@@ -34,8 +34,9 @@ def run(words: list[str]) -> int:
     if not options.sequence:
         raise InputError("check: SEQUENCE is missing: a sequence folder")
     from endotsr.report.check_page import check_page
-    from endotsr.runs.files import refuse_unwritable, replace_file, write_json
+    from endotsr.runs.files import refuse_unwritable, write_json
     from endotsr.sequences.checks.check import check_sequence
+    from endotsr.untrusted.writing import replace_text
 
     refuse_unwritable(options.json, options.html)
     checked = check_sequence(Path(options.sequence), options.settings)
@@ -54,5 +55,5 @@ def run(words: list[str]) -> int:
         write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
     if options.html is not None:
         page = check_page(checked)
-        replace_file(options.html, lambda temporary: temporary.write_text(page, encoding="utf-8", newline="\n"))
+        replace_text(options.html, page)
     return 1 if checked.refused else 0

@@ -10,7 +10,9 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable
+from endotsr.sequences.stereo_depth import StereoSettings
 
+STEREO = StereoSettings()
 LARGEST_RATIO = 100.0  # of the farthest tissue over the nearest
 
 if TYPE_CHECKING:
@@ -45,20 +47,7 @@ class DepthOptions:
     """a plane that faces the camera, for a clip of which nothing else is known"""
     unit_scale: float = 1.0
     """length (or pixels of disparity) of one step of the stored numbers, in millimetres"""
-    nearest: float = 20.0
-    """nearest depth that is searched, mm"""
-    farthest: float = 300.0
-    """farthest depth that is searched, mm"""
-    block: Literal[3, 5, 7, 9, 11] = 5
-    """side of the matched blocks, px"""
-    smooth: bool = True
-    """edge-preserving smoothing by weighted least squares"""
-    agreement: float = 1.0
-    """largest difference between the disparities of left and right, px"""
-    confidence: float = 0.5
-    """least confidence of the smoothing, 0 to 1"""
-    temporal: bool = False
-    """median over three frames along the optical flow"""
+    stereo: Annotated[StereoSettings, Option(flat=True)] = STEREO
     replace: bool = False
     """replace depth that exists"""
     json: JsonFile = None
@@ -69,10 +58,8 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(DepthOptions, words, "depth")
     refuse_unwritable(options.json)
-    for name in ("nearest", "farthest", "unit_scale", "agreement"):
-        if not 0 < getattr(options, name) < float("inf"):
-            key = name.replace("_", "-")
-            raise InputError(f"--{key} {getattr(options, name):g} is not allowed; allowed: a number > 0")
+    if not 0 < options.unit_scale < float("inf"):
+        raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
     _refuse_contradictions(options)
     from endotsr.sequences.checks.kinds import KINDS
 
@@ -108,28 +95,21 @@ def _refuse_contradictions(options: DepthOptions) -> None:
 
 def _made(options: DepthOptions) -> "DepthReport":
     """Depth of another program, or that of the stereo pairs."""
-    from endotsr.sequences.make_depth import (
-        make_flat_depth,
-        make_stereo_depth,
-        take_given_depth,
-        take_relative_depth,
-    )
-    from endotsr.sequences.stereo_depth import StereoSettings
+    from endotsr.sequences.common import list_contents
+    from endotsr.sequences.make_depth import from_files, from_pairs, from_relative, write_depth
+    from endotsr.sequences.relative_depth import flat_depth
 
+    folder, given = options.sequence, options.given
     if options.flat:
-        return make_flat_depth(options.sequence, options.replace, _said)
-    if options.given is not None and options.kind == "relative":
-        return take_relative_depth(
-            options.sequence, options.given, options.align, options.farthest_over_nearest, options.trust_depth,
-            options.replace, _said,
-        )  # fmt: skip
-    if options.given is not None and options.kind != "relative":
-        return take_given_depth(
-            options.sequence, options.given, options.kind, options.unit_scale, options.replace, _said
-        )
-    names = ("nearest", "farthest", "block", "smooth", "agreement", "confidence", "temporal")
-    settings = StereoSettings(**{name: getattr(options, name) for name in names})
-    return make_stereo_depth(options.sequence, settings, options.replace, _said)
+        made = flat_depth(list_contents(folder))
+    elif given is not None and options.kind == "relative":
+        farthest, trusted = options.farthest_over_nearest, options.trust_depth
+        made = from_relative(folder, given, options.align, farthest, trusted, options.replace)
+    elif given is not None and options.kind != "relative":
+        made = from_files(folder, given, options.kind, options.unit_scale)
+    else:
+        made = from_pairs(folder, options.stereo)
+    return write_depth(folder, made, options.replace, _said)
 
 
 def _said(done: int, total: int) -> None:

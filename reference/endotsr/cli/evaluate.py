@@ -2,20 +2,21 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.parts.shown import SHOWN, ShownSettings, shown_sequence
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, replace_file, write_json
+from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import RunFolder, open_run
+from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from endotsr.evaluation.records import EvaluationRecord, LabelledMeans, RunEvaluation
+    from endotsr.evaluation.records import EvaluationRecord, RunEvaluation
     from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.render import RenderOut
@@ -51,8 +52,6 @@ class EvaluateOptions:
     """AlexNet LPIPS weights (.npz)"""
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()
     """measure more of a run, each with rows to compare: depth, flicker, right_view"""
-    paper_row: Literal["pulling"] | None = None
-    """also show the published figures of this clip"""
     view: bool = True
     """write the viewer page that the report links to, view.html"""
     compare: bool = False
@@ -73,7 +72,6 @@ class EvaluateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.evaluation.run import PUBLISHED
     from endotsr.kernels.threads import use_threads
     from endotsr.report.spreadsheet import frames_csv
 
@@ -84,13 +82,12 @@ def run(words: list[str]) -> int:
         return _compare(options)
     if options.pictures and options.measures:
         raise InputError("evaluate: --measures beside --pictures is not allowed: they render views of a run")
-    published = (PUBLISHED[options.paper_row],) if options.paper_row else ()
-    metrics = _pictures(options, published) if options.pictures else _run(options, published)
+    metrics = _pictures(options) if options.pictures else _run(options)
     if options.json:
         write_json(options.json, metrics)
     if options.csv:
         text = frames_csv(metrics, metrics.get("label", "this model"))
-        replace_file(options.csv, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
+        replace_text(options.csv, text)
     return 0
 
 
@@ -100,10 +97,9 @@ def _compare(options: EvaluateOptions) -> int:
 
     if not options.methods:
         raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
-    for name in ("pictures", "label", "measures", "paper_row"):
+    for name in ("pictures", "label", "measures"):
         if getattr(options, name):
-            option = name.replace("_", "-")
-            raise InputError(f"evaluate: --{option} beside several methods is not allowed; allowed: evaluate one first")
+            raise InputError(f"evaluate: --{name} beside several methods is not allowed; allowed: evaluate one first")
     compare_methods(
         Comparison(
             options.methods, options.baselines, options.seed, options.sequence, options.settings, options.lpips,
@@ -113,7 +109,7 @@ def _compare(options: EvaluateOptions) -> int:
     return 0
 
 
-def _run(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "EvaluationRecord":
+def _run(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of the run, written to its folder."""
     from endotsr.runs.model import load_model
     from endotsr.runs.sources import load_run_sequence
@@ -126,8 +122,8 @@ def _run(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "E
     if is_windowed(options.run):
         from endotsr.cli.parts.windows import evaluate_windows
 
-        if options.measures or published:
-            raise InputError(f"evaluate: --measures and --paper-row are for a run without windows, not {options.run}")
+        if options.measures:
+            raise InputError(f"evaluate: --measures is for a run without windows, not {options.run}")
         return cast("EvaluationRecord", evaluate_windows(options.run, options.lpips, options.sequence))
     folder = open_run(options.run)
     load_model(folder)  # refuses a run without a usable checkpoint before the sequence is read
@@ -136,14 +132,13 @@ def _run(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "E
         folder,
         sequence,
         options.lpips,
-        published,
         view=options.view,
         measures=options.measures,
         source=options.sequence,
     )
 
 
-def _pictures(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) -> "EvaluationRecord":
+def _pictures(options: EvaluateOptions) -> "EvaluationRecord":
     """Metrics of a folder of pictures."""
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.pictures import find_pictures, measure_pictures
@@ -155,7 +150,6 @@ def _pictures(options: EvaluateOptions, published: tuple["LabelledMeans", ...]) 
     found = find_pictures(options.pictures, sequence)
     print(f"{options.pictures}: {len(found.files)} pictures, paired {found.pairing}")
     metrics = measure_pictures(found, sequence, options.label, weights)
-    metrics["published"] = list(published)
     print(held_out_table(metrics))
     return metrics
 
@@ -164,7 +158,6 @@ def evaluate_run(
     folder: RunFolder,
     sequence: "Sequence",
     lpips: Path | None = None,
-    published: tuple["LabelledMeans", ...] = (),
     *,
     view: bool = True,
     measures: tuple[str, ...] = (),
@@ -183,9 +176,7 @@ def evaluate_run(
 
     check_measures(measures, "--measures")
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
-    model, metrics, held_out = measure_folder(
-        folder, sequence, source, weights=weights, published=published, measures=measures
-    )
+    model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
     _write(folder, model, sequence, metrics, held_out, view)
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):

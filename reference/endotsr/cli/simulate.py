@@ -12,10 +12,11 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line, refuse_unwritable, replacing_folder
+from endotsr.runs.files import os_error_line, refuse_unwritable
 from endotsr.runs.folder import refuse_existing
 from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
 from endotsr.simulator.settings import SimulatorSettings
+from endotsr.untrusted.writing import replacing_folder
 
 STILL = named_scene("still")
 PREPARE = "next: endotsr prepare {} --out FOLDER"

@@ -1,6 +1,5 @@
 """`endotsr sweep`: many runs from one file, on this machine or on a Dask cluster."""
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,10 +10,9 @@ from endotsr.cli.parts.progress import StepBar
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
-    from endotsr.sweeps.execute import Outcome
-    from endotsr.sweeps.jobs import Job
+    from endotsr.sweeps.place import Place
     from endotsr.sweeps.spec import Spec
-    from endotsr.sweeps.sweep import Inputs, Rows
+    from endotsr.sweeps.sweep import Rows
 
 
 @dataclass
@@ -43,6 +41,7 @@ class SweepOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
+    from endotsr.sweeps.place import Place, check_place
     from endotsr.sweeps.spec import read_spec
 
     options = parse(SweepOptions, words, "sweep")
@@ -56,52 +55,17 @@ def run(words: list[str]) -> int:
     return ended(run_spec(spec, options.out, place, options.retry), options.out)
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where the runs take place."""
-
-    workers: int | None
-    threads: int | None
-    scheduler: str | None
-
-
-def check_place(command: str, place: Place) -> None:
-    """Raises InputError for a number of workers or threads that is not allowed."""
-    for name in ("workers", "threads"):
-        value = getattr(place, name)
-        if value is not None and value < 1:
-            raise InputError(f"{command}: --{name} {value} is not allowed; allowed: an integer >= 1")
-    if place.scheduler is not None and place.workers is not None:
-        raise InputError(f"{command}: --workers beside --scheduler is not allowed: the cluster has its workers")
-
-
-def run_spec(spec: "Spec", out: Path, place: Place, retry: bool, on_rows=lambda rows: None) -> "Rows":
+def run_spec(spec: "Spec", out: Path, place: "Place", retry: bool, on_rows=lambda rows: None) -> "Rows":
     """The rows of a sweep, made where `place` says, under one progress bar."""
     from endotsr.evaluation.lpips import load_lpips_weights
+    from endotsr.sweeps.place import outcomes_at
     from endotsr.sweeps.sweep import Inputs, run_sweep
 
     load_lpips_weights(spec.lpips)  # weights that cannot be used are refused before the first run
+    inputs = Inputs(keep=place.scheduler is not None)
+    outcomes = lambda jobs: outcomes_at(place, jobs, out, inputs.size, inputs.sequence)
     with StepBar("iterations") as bar:
-
-        def outcomes(jobs: list["Job"], inputs: "Inputs") -> Generator["Outcome | None", None, None]:
-            if place.scheduler is not None:
-                from endotsr.sweeps.cluster import cluster_outcomes
-
-                return cluster_outcomes(place.scheduler, jobs, inputs.sequence, out, place.threads)
-            return _local(jobs, inputs, place)
-
-        inputs = Inputs(keep=place.scheduler is not None)
         return run_sweep(spec, out, outcomes, bar, inputs=inputs, retry=retry, on_rows=on_rows)
-
-
-def _local(jobs: list["Job"], inputs: "Inputs", place: Place) -> Generator["Outcome | None", None, None]:
-    from endotsr.sweeps.capacity import capacity, run_bytes
-    from endotsr.sweeps.local import local_outcomes
-
-    memory = [run_bytes(inputs.size(job), job.config) for job in jobs]
-    found = capacity(memory, workers=place.workers, threads=place.threads)
-    print(f"{len(jobs)} runs, {found.workers} at a time, threads of each: {found.threads} ({found.reason})", flush=True)
-    return local_outcomes(jobs, found.workers, found.threads)
 
 
 def ended(rows: "Rows", out: Path) -> int:

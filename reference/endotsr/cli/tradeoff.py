@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from endotsr.tradeoff.scenes import StudyScene
 
 RESULT = "tradeoff.json"  # in the folder of the measurement
-LEAST_REPEATS = 7
 
 
 @dataclass
@@ -40,10 +39,6 @@ class TradeoffOptions:
     ("1/255", "1e-3": the fastest)"""
     json: JsonFile = None
     """also write the answer to --budget as JSON"""
-    images: bool = False
-    """also keep image and gradients of every setting in DIR/images"""
-    repeats: int = LEAST_REPEATS
-    """timed frames of every setting"""
     threads: int = 2
     """threads, 0 = all cores"""
 
@@ -81,10 +76,6 @@ def _refuse(options: TradeoffOptions) -> None:
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json holds the answer to --budget; the measurement itself is DIR/{RESULT}")
     refuse_unwritable(options.json)
-    if options.repeats < LEAST_REPEATS:
-        raise InputError(
-            f"tradeoff: --repeats {options.repeats} is not allowed; allowed: an integer >= {LEAST_REPEATS}"
-        )
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
 
@@ -93,24 +84,17 @@ def _measure(options: TradeoffOptions) -> dict[str, Any]:
     from endotsr.kernels.threads import use_threads
     from endotsr.report.tables import plain
     from endotsr.tradeoff.study import described, run_study
-    from endotsr.tradeoff.text import COLUMNS, advice, front_rows, made
+    from endotsr.tradeoff.text import COLUMNS, front_rows, made
 
     use_threads(options.threads)
     out = options.out
     refuse_folder(out)
     scene = chosen_scene(options)
-    (out / "images" if options.images else out).mkdir(parents=True, exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     with StepBar("settings") as bar:
-        found = run_study(
-            scene,
-            repeats=options.repeats,
-            images=out / "images" if options.images else None,
-            begin=bar.begin,
-            step=bar.step,
-        )
-    result = described(found)
+        result = described(run_study(scene, begin=bar.begin, step=bar.step))
     write_json(out / RESULT, result)
-    print(made(result), *advice(result), plain(COLUMNS, front_rows(result)), f"figures: {out / RESULT}", sep="\n")
+    print(made(result), plain(COLUMNS, front_rows(result)), f"figures: {out / RESULT}", sep="\n")
     return result
 
 

@@ -115,7 +115,7 @@ def run(words: list[str]) -> int:
 def _train_windows(options: TrainOptions, words: list[str]) -> int:
     """Train a recording in windows, or what is missing of it, and measure it."""
     from endotsr.cli.parts.windows import WindowsWanted, evaluate_windows, train_windows
-    from endotsr.cli.sweep import Place
+    from endotsr.sweeps.place import Place
     from endotsr.windows.make import with_visits
 
     assert options.out is not None

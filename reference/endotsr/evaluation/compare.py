@@ -129,12 +129,20 @@ def _paired(difference: FloatArray, metric: str, seed: int) -> PairedDifference 
 
 def interval(values: FloatArray, seed: int = 0) -> tuple[float, float]:
     """The percentile bootstrap interval of a mean, at CONFIDENCE; one value is its own interval."""
-    from scipy.stats import bootstrap
-
     if values.size < 2:
         return float(values[0]), float(values[0])
+    return bootstrapped((values,), np.mean, seed)
+
+
+def bootstrapped(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> tuple[float, float]:
+    """Percentile bootstrap, at CONFIDENCE, of the average over the samples of their means or medians (`middle`)."""
+    from scipy.stats import bootstrap
+
+    def averaged(*drawn: FloatArray, axis: int = -1) -> FloatArray:
+        return np.mean([middle(sample, axis=axis) for sample in drawn], axis=0)
+
     found = bootstrap(
-        (values,), np.mean, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile",
+        samples, averaged, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile", vectorized=True,
         rng=np.random.default_rng(seed),
     ).confidence_interval  # fmt: skip
     return float(found.low), float(found.high)

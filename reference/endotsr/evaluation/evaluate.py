@@ -123,7 +123,7 @@ def evaluate_model(
         },
         "held_out": held_out,
         "training": inside,
-        "temporal_gap": _difference(inside["mean"], held_out["mean"]),
+        "temporal_gap": difference(inside["mean"], held_out["mean"]),
         "baselines": baselines,
         "lpips_reason": lpips_obstacle(lpips_weights, *sequence.images.shape[2:]),
         "not_finite": held_out["not_finite"] + inside["not_finite"] + sum(b["not_finite"] for b in baselines.values()),
@@ -138,12 +138,10 @@ def _lpips(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], weigh
     return {key: lpips(shown, wanted, weights, how) for key, how in LPIPS_KEYS.items()}
 
 
-def _difference(inside: Means, outside: Means) -> Means:
-    return {key: _minus(value, outside.get(key)) for key, value in inside.items()}
-
-
-def _minus(a: float | None, b: float | None) -> float | None:
-    return None if a is None or b is None else a - b
+def difference(inside: Means, outside: Means) -> Means:
+    """Inside minus outside, metric by metric; None where one of them has no value."""
+    pairs = {key: (value, outside.get(key)) for key, value in inside.items()}
+    return {key: None if a is None or b is None else a - b for key, (a, b) in pairs.items()}
 
 
 def _finite(value: float | None) -> float | None:

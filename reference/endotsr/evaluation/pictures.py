@@ -6,7 +6,6 @@ array keeps what an 8-bit file rounds, so that the picture of a baseline that wa
 that baseline to the last digit. What the compression of a video loses counts as an error of its method.
 """
 
-import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.evaluation.evaluate import FORMAT, baseline_table, evaluate_frames
-from endotsr.evaluation.lpips import LpipsWeights, lpips_obstacle
+from endotsr.evaluation.evaluate import evaluate_model
+from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.records import EvaluationRecord
 from endotsr.kernels.arrays import Array, FloatArray
 from endotsr.opencv import pictures as stored
+from endotsr.runs.sources import digest
 from endotsr.sequences.files import frame_numbers, shortened
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.video_file import VIDEO_ENDINGS, video_facts, video_pictures
@@ -195,37 +195,12 @@ def measure_pictures(
     shape = sequence.images.shape[1:]
     training = [int(i) for i in sequence.train_index if int(i) in pictures.files]
 
-    def render(index: int) -> FloatArray:
-        return pictures.read(index, shape)
-
-    held_out = evaluate_frames(sequence, sequence.test_index, render, weights)
-    inside = evaluate_frames(sequence, training, render)
-    baselines = baseline_table(sequence, weights)
-    return {
-        "format": FORMAT,
-        "label": label or pictures.folder.absolute().name,
-        "frames": {
-            "total": sequence.count,
-            "training": len(sequence.train_index),
-            "held_out": [int(i) for i in sequence.test_index],
-            "training_sample": training,
-            "tissue_fraction": sequence.tissue_fraction,
-        },
-        "held_out": held_out,
-        "training": inside,
-        "baselines": baselines,
-        "published": [],
-        "lpips_reason": lpips_obstacle(weights, *shape[1:]),
-        "not_finite": held_out["not_finite"] + inside["not_finite"] + sum(b["not_finite"] for b in baselines.values()),
-        "pictures": {
-            "folder": str(pictures.folder.absolute()),
-            "pairing": pictures.pairing,
-            "arrays_sha256": {name: _digest(getattr(sequence, name)) for name in ("images", "masks")},
-            "files": {sequence.names[i]: file.name for i, file in pictures.files.items()},
-        },
+    metrics = evaluate_model(sequence, lambda index: pictures.read(index, shape), weights, training)
+    metrics["label"] = label or pictures.folder.absolute().name
+    metrics["pictures"] = {
+        "folder": str(pictures.folder.absolute()),
+        "pairing": pictures.pairing,
+        "arrays_sha256": {name: digest(getattr(sequence, name)) for name in ("images", "masks")},
+        "files": {sequence.names[i]: file.name for i, file in pictures.files.items()},
     }
-
-
-def _digest(array: Array) -> str:
-    """As in the record of a run, so that pictures and runs of the same frames can be told from others."""
-    return hashlib.sha256(array.tobytes()).hexdigest()
+    return metrics

@@ -118,7 +118,6 @@ class EvaluationRecord(TypedDict):
     held_out: FramesMeasured
     training: FramesMeasured
     temporal_gap: NotRequired[Means]
-    published: NotRequired[list[LabelledMeans]]
     components: NotRequired[list[LabelledMeans]]  # with one residual left out
     baselines: dict[str, LabelledFrames]
     lpips_reason: str | None  # None when LPIPS was computed

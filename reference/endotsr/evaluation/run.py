@@ -1,7 +1,7 @@
 """The evaluation of a trained run: its renders against every frame, beside the baselines, as metrics.json.
 
 In: a model, the sequence that it was trained on, and run.json. Out: the dictionary of metrics.json (metrics of the
-frames, components taken out, published figures, what the numbers belong to) and the renders of the held-out frames.
+frames, components taken out, what the numbers belong to) and the renders of the held-out frames.
 Writes nothing.
 """
 
@@ -35,14 +35,6 @@ from endotsr.runs.sources import run_source, true_positions_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 
-PUBLISHED: dict[str, LabelledMeans] = {
-    "pulling": {
-        "label": "Endo-TSR as published, EndoNeRF pulling",
-        "psnr_full": 39.34,
-        "ssim_full": 0.967,
-        "lpips": 0.035,
-    }
-}
 COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, translation residual"}
 CROSS_FADE = "Blend of this model's own renders at the two neighbouring training times"
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
@@ -78,19 +70,16 @@ def measure_run(
     sequence: Sequence,
     record: RunRecord,
     weights: LpipsWeights | None = None,
-    published: tuple[LabelledMeans, ...] = (),
     true_positions: TruePositions | None = None,
 ) -> tuple[RunEvaluation, Mapping[int, RenderOut]]:
     """metrics.json of a run, and the renders of the held-out frames by frame number.
 
     record          run.json of the run
     weights         None: the LPIPS values are None
-    published       rows of figures to keep beside the measured ones: {"label": ..., metric key: value}
     true_positions  of a simulated sequence: the motion is measured too
     """
     found, held_out = measure_model(model, sequence, weights, true_positions)
     metrics = cast(RunEvaluation, found)
-    metrics["published"] = list(published)
     metrics["run"] = about_run(record, model)
     return metrics, held_out
 
@@ -101,7 +90,6 @@ def measure_folder(
     source: str,
     *,
     weights: LpipsWeights | None = None,
-    published: tuple[LabelledMeans, ...] = (),
     measures: tuple[str, ...] = (),
 ) -> tuple[Model, RunEvaluation, Mapping[int, RenderOut]]:
     """The model of the latest checkpoint of a run, and what `measure_run` returns for it.
@@ -111,7 +99,7 @@ def measure_folder(
     """
     model, (_, simulator) = load_model(folder), run_source(folder)
     truth = true_positions_of(source, simulator, folder.config(), sequence)
-    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, published, truth)
+    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, truth)
     if measures:
         metrics["measures"] = measured(measures, model, sequence, source)
     return model, metrics, held_out

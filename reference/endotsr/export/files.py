@@ -12,8 +12,9 @@ from endotsr.export.placement import placed_points, placed_scene
 from endotsr.export.ply import gaussian_vertices, mesh_vertices, point_vertices, write_ply
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import Times, chosen_times
-from endotsr.runs.files import refuse_unwritable, replacing_folder
+from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import refuse_existing
+from endotsr.untrusted.writing import replacing_folder
 
 FILM_ENDINGS = (".mp4", ".webm", ".gif", ".avi", ".mov")
 ENDING = re.compile(r"\.(?=.*[a-z])[a-z0-9]{1,8}")  # of a file; `run.2` and `scale_0.5` are names of folders

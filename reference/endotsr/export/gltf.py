@@ -19,8 +19,8 @@ from endotsr.export.placement import placed_scene
 from endotsr.export.ply import point_vertices
 from endotsr.export.scene import MovingScene
 from endotsr.kernels.arrays import Array, FloatArray
-from endotsr.runs.files import replace_file
 from endotsr.sequences.record import UNKNOWN_RATE
+from endotsr.untrusted.writing import replace_file
 
 LARGEST = 1 << 32  # bytes: a .glb states its length in 32 bits
 FLOAT, SHORT = 5126, 5123  # types of numbers, as glTF names them

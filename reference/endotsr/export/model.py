@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from endotsr.config import config_from_dict
 from endotsr.errors import InputError
 from endotsr.fitting.model import corrected_cameras, spectral_from
-from endotsr.runs.files import replace_file
 from endotsr.runs.model import Model
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS, Gaussians, arrays
 from endotsr.scene.parameters import FrameParameters, pose_at, trained
 from endotsr.sequences.record import SequenceRecord, checked_record, recorded
 from endotsr.untrusted.arrays import RefusedArray, open_npz
 from endotsr.untrusted.json import integer, parsed
+from endotsr.untrusted.writing import replace_file
 
 FORMAT = "endotsr slim model"
 VERSION = 1

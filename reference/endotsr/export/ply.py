@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.constants import Y00
-from endotsr.runs.files import replace_file
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.render import Scene
 from endotsr.untrusted.files import read_bytes
+from endotsr.untrusted.writing import replace_file
 
 PLY_TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1", "uint8": "u1",
              "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2", "uint16": "<u2",

@@ -5,6 +5,7 @@ A ply file is one moment: its scene does not move, and it is seen by a camera th
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
 
 import msgspec
@@ -20,7 +21,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.runs.model import Model, load_model
 from endotsr.scene.gaussians import Gaussians
-from endotsr.sequences.record import SequenceRecord, recorded
+from endotsr.sequences.record import SequenceRecord, nearest_frame, recorded
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut, Scene
 
@@ -64,6 +65,24 @@ class MovingScene:
         model = self.model
         gaussians = self._kept(taken_out)
         return render_at(gaussians, model.spectral, model.config, camera, time, frames=model.frames)
+
+    def picture(self, time: float, camera: Camera | int | None, taken_out: tuple[str, ...]) -> RenderOut:
+        """As `render`, with everything checked; a camera can be that of a frame: its number, or None for the nearest.
+
+        Raises: InputError for a time, a frame or a component that does not exist.
+        """
+        if not 0.0 <= time <= 1.0:
+            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
+        for name in taken_out:
+            if name not in COMPONENTS:
+                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
+        if not isinstance(camera, Camera):
+            frame, last = nearest_frame(self.record.times, time) if camera is None else camera, self.record.count - 1
+            if not isinstance(frame, Integral) or not 0 <= int(frame) <= last:
+                allowed = f"a Camera, or a frame from 0 to {last}"
+                raise InputError(f"render: camera = {camera!r} is not allowed; allowed: {allowed}")
+            camera = self.cameras[int(frame)]
+        return self.render(float(time), camera, taken_out)
 
     def at(self, time: float, taken_out: tuple[str, ...] = ()) -> Scene:
         """The deformed Gaussians at a time; the exposure of a frame is no part of them."""

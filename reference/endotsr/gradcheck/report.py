@@ -7,6 +7,7 @@ from typing import Any
 
 from endotsr.gradcheck.checker import BlockReport, PairReport
 from endotsr.gradcheck.precision import PrecisionReport
+from endotsr.report.tables import plain
 
 HEADER = ("stage", "equation", "block", "probes", "refused", "unresolved", "worst rel. error", "step", "verdict")
 _LEFT = (0, 1, 2, 8)
@@ -17,7 +18,7 @@ _RED, _RESET = "\x1b[31m", "\x1b[0m"
 def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] = (), colour: bool = False) -> str:
     """Aligned plain text: a line per block, then the pair's float32 line; reasons of failures at the end."""
     single = {p.name: p for p in precisions}
-    rows: list[tuple[str, ...]] = [HEADER]
+    rows: list[tuple[str, ...]] = []
     reasons: list[str] = []
     for report in reports:
         rows += [_row(report, block, first=i == 0) for i, block in enumerate(report.blocks)]
@@ -27,9 +28,9 @@ def table(reports: Iterable[PairReport], precisions: Iterable[PrecisionReport] =
         if report.name in single:
             rows.append(_single_row(single[report.name]))
             reasons += [f"{report.name}: {reason}" for reason in single[report.name].failures]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
-    lines = [_line(row, widths, colour) for row in rows]
-    lines.insert(1, "  ".join("-" * width for width in widths))
+    lines = plain(HEADER, rows, _LEFT, rule=True).splitlines()
+    if colour:
+        lines[2:] = [_coloured(line, row[-1]) for line, row in zip(lines[2:], rows, strict=True)]
     return "\n".join(lines + ([""] + reasons if reasons else []))
 
 
@@ -85,11 +86,8 @@ def _number(value: float) -> str:
     return f"{value:.1e}" if math.isfinite(value) else str(value)
 
 
-def _line(row: tuple[str, ...], widths: list[int], colour: bool) -> str:
-    cells = [c.ljust(w) if i in _LEFT else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths))]
-    if colour and row is not HEADER:
-        cells[-1] = f"{_COLOURS.get(row[-1], _RED)}{row[-1]}{_RESET}"
-    return "  ".join(cells).rstrip()
+def _coloured(line: str, verdict: str) -> str:
+    return f"{line.removesuffix(verdict)}{_COLOURS.get(verdict, _RED)}{verdict}{_RESET}"
 
 
 def _plain(value) -> Any:

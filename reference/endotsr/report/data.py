@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.evaluation.records import EvaluationRecord, FrameMetrics, LabelledMeans
+from endotsr.evaluation.records import EvaluationRecord, FrameMetrics
 from endotsr.fitting.records import LogEntry
 from endotsr.kernels.arrays import FloatArray
 
@@ -68,7 +68,6 @@ class ReportData:
     evaluation: EvaluationRecord = field(default_factory=lambda: cast(EvaluationRecord, {}))  # metrics.json
     log: list[LogEntry] = field(default_factory=list)  # log.jsonl
     frames: tuple[FramePictures, ...] = ()
-    reference_rows: tuple[LabelledMeans, ...] = ()  # published figures
     components: tuple[FreeTable, ...] = ()
     facts: Facts = field(default_factory=dict)  # sequence, seed, machine, time, memory ...
     configuration: str = ""  # TOML

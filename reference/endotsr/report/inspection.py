@@ -13,7 +13,7 @@ from endotsr.effects.plan import Plan
 from endotsr.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.report import curves, figures, parts, tables
 from endotsr.report.style import Theme
-from endotsr.runs.files import replace_file
+from endotsr.untrusted.writing import replace_text
 
 SMALL = ("none", "good", "degree 0")
 
@@ -21,7 +21,7 @@ SMALL = ("none", "good", "degree 0")
 def write_inspection(path: Path, title: str, inspection: Inspection, plan: Plan) -> None:
     """Write the page, complete or not at all. Raises OSError as the file system reports it."""
     content = inspection_html(title, inspection, plan)
-    replace_file(Path(path), lambda temporary: temporary.write_text(content, encoding="utf-8", newline="\n"))
+    replace_text(Path(path), content)
 
 
 def inspection_html(title: str, inspection: Inspection, plan: Plan) -> str:

@@ -21,10 +21,10 @@ from endotsr.report import parts
 from endotsr.report.curves import read_log
 from endotsr.report.figures import bytes_image
 from endotsr.report.line_chart import ChartCurve, chart_svg
-from endotsr.runs.files import replace_file
 from endotsr.runs.folder import RunFolder
 from endotsr.runs.machine import now
 from endotsr.sequences.sequence import Sequence
+from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState
@@ -134,7 +134,7 @@ def lead_to_report(folder: Path) -> None:
 
 
 def _replace(folder: Path, page: str) -> None:
-    replace_file(folder / LIVE_PAGE, lambda temporary: temporary.write_text(page, encoding="utf-8", newline="\n"))
+    replace_text(folder / LIVE_PAGE, page)
 
 
 def _kept(entry: LogEntry) -> LogEntry:

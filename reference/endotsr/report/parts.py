@@ -144,7 +144,6 @@ th:first-child{text-align:left;position:sticky;left:0;background:var(--panel)}
 tbody th{font-weight:500}
 tbody tr:last-child>*{border-bottom:0}
 tr.model>*{background:var(--tint)!important;font-weight:650}
-tr.reference>*{color:var(--soft);font-style:italic}
 td.best,td .best{color:var(--accent);font-weight:650}
 figure{margin:0}
 .preview img{width:auto;max-width:100%}.preview figcaption{margin-top:.35rem}

@@ -19,14 +19,15 @@ from endotsr.report.curves import curves_png, read_log
 from endotsr.report.data import FramePictures, Preview, ReportData
 from endotsr.report.figures import triptych, triptych_picture
 from endotsr.report.live_page import REPORT, lead_to_report
-from endotsr.report.page import write_report
 from endotsr.report.pictures import rgb_bytes
 from endotsr.report.run_text import component_table, facts
-from endotsr.runs.files import replace_file, replacing_folder, write_json
+from endotsr.report.sections import write_report
+from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.names import file_name
+from endotsr.untrusted.writing import replace_file, replacing_folder
 
 MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the report: some 0.25 MB each
 
@@ -112,7 +113,6 @@ def _report_data(
         evaluation=metrics,
         log=log,
         frames=frames,
-        reference_rows=tuple(metrics.get("published", ())),
         components=(component_table(metrics),),
         facts=facts(metrics),
         configuration=config_to_toml(folder.config()),

@@ -42,14 +42,13 @@ def facts(metrics: RunEvaluation) -> Facts:
 
 
 def held_out_table(metrics: EvaluationRecord) -> str:
-    """The held-out means of model, baselines and published figures as text.
+    """The held-out means of model and baselines as text.
 
     metrics   of `evaluation.run.measure_run`, or of `evaluation.pictures.measure_pictures`, which has a `label`
     """
     rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
     rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
     rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
-    rows += [(entry["label"], entry) for entry in metrics.get("published", ())]
     columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
     width = max(len(label) for label, _ in rows)
     frames = len(metrics["held_out"]["per_frame"])

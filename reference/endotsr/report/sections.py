@@ -1,17 +1,23 @@
-"""The sections of the report, top to bottom; each is a function of the data and is empty when its data is missing."""
+"""One self-contained HTML page about a run: numbers, baselines, pictures, curves, and how it was made.
+
+Its sections stand here from top to bottom; each is a function of the data and is empty when its data is missing. The
+page embeds every picture, needs no script and no other file, follows the reader's light or dark colour scheme and is
+readable on a phone. It links to the viewer page beside it, if there is one.
+"""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from endotsr.evaluation.evaluate import left_out
 from endotsr.evaluation.records import Means
-from endotsr.report import curves, figures
-from endotsr.report import parts as parts
+from endotsr.report import curves, figures, parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
 from endotsr.report.run_text import pose_sentence, trajectory_sentence
 from endotsr.report.tables import html_table
+from endotsr.untrusted.writing import replace_text
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
@@ -90,21 +96,17 @@ def moving(data: ReportData) -> str:
 
 
 def held_out(data: ReportData) -> str:
-    """The table of held-out metrics: model, baselines, published rows; values of 8 bits are folded."""
+    """The table of held-out metrics: model and baselines; values of 8 bits are folded."""
     rows: list[MetricsRow] = []
     if mean := _mean(data, "held_out"):
         rows.append(("This model", mean, "model"))
     if faded := data.evaluation.get("cross_fade"):
         rows.append((faded["label"], faded["mean"], ""))
     rows += [(label, mean, "") for label, mean in _baseline_rows(data)]
-    rows += [(str(row.get("label", "published")), row, "reference") for row in data.reference_rows]
     columns = [c for c in COLUMNS if any(row.get(c[0]) is not None for _, row, _ in rows)]
     if not columns:
         return ""
-    note = (
-        "Mean over the held-out frames. Baselines use training frames only. Best measured value of a column in colour; "
-        "published rows are quoted, not measured here."
-    )
+    note = "Mean over the held-out frames. Baselines use training frames only. Best value of a column in colour."
     table = _held_out_table(rows, [c for c in columns if c in DECIDING] or columns)
     title = "Held-out frames against baselines without a model"
     return parts.section(title, table, _absent_reasons(data), _eight_bit(rows, columns), note=note)
@@ -115,9 +117,9 @@ def _held_out_table(rows: list[MetricsRow], columns: list[Column]) -> str:
     cells = [
         [
             parts.text(label),
-            *(_metric(row.get(key), n, None if kind == "reference" else best[key]) for key, _, n, _ in columns),
+            *(_metric(row.get(key), n, best[key]) for key, _, n, _ in columns),
         ]
-        for label, row, kind in rows
+        for label, row, _ in rows
     ]
     return html_table(["Held-out frames", *(c[1] for c in columns)], cells, [kind for _, _, kind in rows])
 
@@ -133,7 +135,7 @@ def _eight_bit(rows: list[MetricsRow], columns: list[Column]) -> str:
 
 
 def _best(rows: list[MetricsRow], key: str, sign: int) -> float | None:
-    values = [row[key] for _, row, kind in rows if kind != "reference" and row.get(key) is not None]
+    values = [row[key] for _, row, _ in rows if row.get(key) is not None]
     return max(values, key=lambda v: sign * v) if len(values) > 1 else None
 
 
@@ -310,3 +312,18 @@ def footer(data: ReportData) -> str:
 
 
 SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)
+
+
+def write_report(path: Path, data: ReportData) -> None:
+    """Write the page to `path`: complete or not at all (an older file stays until the new one is whole).
+
+    Raises   OSError as the file system reports it
+    """
+    content = report_html(data)
+    replace_text(Path(path), content)
+
+
+def report_html(data: ReportData) -> str:
+    """The page as text."""
+    body = [make(data) for make in SECTIONS]
+    return parts.page(data.title, "\n".join(part for part in body if part))

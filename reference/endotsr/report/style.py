@@ -9,7 +9,7 @@ import io
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from endotsr.runs.files import replace_file
+from endotsr.untrusted.writing import replace_file
 
 
 class Theme(NamedTuple):

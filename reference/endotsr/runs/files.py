@@ -1,21 +1,18 @@
-"""Files that are replaced whole, and checks of output paths before the work begins."""
+"""Checks of output paths before the work begins, and JSON files."""
 
-import contextlib
 import errno
 import json
 import math
 import os
 import secrets
-import shutil
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from endotsr.errors import InputError
 from endotsr.untrusted import json as json_files
-from endotsr.untrusted.files import rename
 from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.writing import replace_text
 
 
 def refuse_folder(path: Path) -> None:
@@ -64,48 +61,7 @@ def refuse_unwritable(*files: Path | None) -> None:
 
 def write_json(path: Path, data: Any) -> None:
     """Write JSON with null for every number that is not finite; the file is replaced whole."""
-    text = json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n"
-    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
-
-
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step.
-
-    Raises: OSError of the file system, with `path` in place of the temporary name.
-    """
-    # A name that nobody can put a link at beforehand; it keeps the ending, by which writers choose the format.
-    temporary = path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
-    try:
-        write(temporary)
-        rename(temporary, path)
-    except BaseException as error:
-        with contextlib.suppress(OSError):  # of a folder that is missing or is none
-            temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
-            error.filename = str(path)
-        raise
-
-
-@contextlib.contextmanager
-def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
-    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails.
-
-    replace   False: a folder that has appeared at `path` in the meantime is kept, and InputError raised
-    """
-    if path.is_symlink():
-        raise InputError(f"{path}: is a link; allowed: a folder, or a name that is free")
-    temporary = path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
-    temporary.mkdir()
-    try:
-        yield temporary
-        if not replace and os.path.lexists(path):
-            raise InputError(f"{path}: exists already; choose another --out")
-        if path.exists():
-            shutil.rmtree(path)
-        rename(temporary, path)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
+    replace_text(path, json.dumps(finite(data), indent=2, ensure_ascii=False) + "\n")
 
 
 def read_json(path: Path, needed: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -26,9 +26,10 @@ import msgspec
 
 from endotsr.config import Config, config_to_toml, load_config, with_fixed_length
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, replacing_folder, write_json
+from endotsr.runs.files import os_error_line, read_json, refuse_folder, refuse_link, write_json
 from endotsr.runs.records import RunRecord, checked_run_record
 from endotsr.sequences.record import SequenceRecord, read_sequence_record
+from endotsr.untrusted.writing import replacing_folder
 
 
 class RunBusy(InputError):

@@ -90,10 +90,10 @@ def _digests(sequence: Sequence) -> dict[str, str]:
     import numpy as np
 
     poses = np.array([[*c.rotation.ravel(), *c.translation, c.fx, c.fy, c.cx, c.cy] for c in sequence.cameras])
-    return {name: _digest(getattr(sequence, name)) for name in ARRAYS} | {"cameras": _digest(poses)}
+    return {name: digest(getattr(sequence, name)) for name in ARRAYS} | {"cameras": digest(poses)}
 
 
-def _digest(array) -> str:
+def digest(array) -> str:
     """SHA-256 of the bytes of an array, frame by frame: a long clip is not copied whole."""
     digest = hashlib.sha256()
     for frame in array:

@@ -20,12 +20,13 @@ from endotsr.config import Config, config_to_toml
 from endotsr.errors import InputError
 from endotsr.fitting.divergence import Diverged
 from endotsr.fitting.records import LogEntry
-from endotsr.runs.files import os_error_line, replace_file
+from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.records import ExtendedEntry, ResumedEntry, RunRecord, new_record
 from endotsr.runs.stopping import finishing, stop_asked
+from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -123,9 +124,7 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
         if folder.checkpoint.exists():
             save_training(folder, load_training(folder, before), config)
         text = config_to_toml(config)
-        replace_file(
-            folder.path / "config.toml", lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n")
-        )
+        replace_text(folder.path / "config.toml", text)
         entry: ExtendedEntry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
         folder.update({"extended": [*folder.record().get("extended", []), entry]})
 

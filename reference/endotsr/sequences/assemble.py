@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.sequences.checks.guard import guarded, with_coverage
-from endotsr.sequences.depth_files import far_off
-from endotsr.sequences.files import shortened
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction
 from endotsr.sequences.read_frames import FrameFiles, Frames, read_frames
 from endotsr.sequences.sequence import Sequence
@@ -25,7 +23,6 @@ from endotsr.sequences.world import fitting_world, moved_cameras, world_note
 from endotsr.splatting.camera import Camera, camera_centre
 
 LEAST_SIDE = 16  # pixels; the three-level pyramid needs this many
-FAR_OFF = 4.0  # times the usual median depth; measured medians of a sequence lie within 1.2
 NO_MASKS = "no masks: every pixel counts as tissue, instruments included"
 
 
@@ -118,13 +115,11 @@ def _depth_note(depth: NDArray[np.float32], near: float, files: list[Path], unit
         raise InputError(f"{where}: the largest depth is {farthest:g}, in front of the near plane at {near:g}")
     empty = [i for i, row in enumerate(rows) if not row.known]
     behind = before / known
-    distant = [f"{files[i].name} ({ratio:.3g} times)" for i, ratio in far_off(depth, FAR_OFF)]
     return (
         f"depth in {unit}, {nearest:g} to {farthest:g} after clipping;"
         f" missing on {1 - known / depth.size:.4f} of the pixels"
         + (f"; frames without any: {', '.join(map(str, empty))}" if empty else "")
         + (f"; {behind:.1%} of it lies in front of the near plane at {near:g}" if behind else "")
-        + (f"; far from the usual median, perhaps in another unit: {shortened(distant)}" if distant else "")
     )
 
 

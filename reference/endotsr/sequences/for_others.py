@@ -17,7 +17,7 @@ from endotsr.opencv import write_png
 from endotsr.sequences.common import open_common
 from endotsr.sequences.recording import CameraPose, Lens, Recording
 from endotsr.sequences.sequence_file import DEPTH, IMAGES, OPENGL, inverse_pose, read_sequence_file
-from endotsr.sequences.writing import replace_text
+from endotsr.untrusted.writing import replace_text
 
 Other = Literal["nerfstudio", "colmap"]
 KEPT, MODEL = "masks_kept", "sparse/0"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.sequences.recording import Lens
+from endotsr.sequences.smaller import nearest_pixels
 
 Kind = Literal["depth", "disparity"]
 
@@ -34,19 +35,6 @@ def depth_of_values(
             numbers = -numbers
         focal = lens.fx * values.shape[1] / lens.width
         numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
-    depth = at_size(np.maximum(numbers, 0.0), lens, where).astype(np.float32)
+    depth = nearest_pixels(np.maximum(numbers, 0.0), lens.width, lens.height, where).astype(np.float32)
     depth[~np.isfinite(depth)] = 0.0
     return depth
-
-
-def at_size(values: NDArray, lens: Lens, where: object) -> NDArray:
-    """The numbers at the size of the sequence, nearest pixel: no depth between two surfaces is made up.
-
-    Raises:  InputError for another proportion.
-    """
-    height, width = values.shape
-    if abs(width * lens.height - height * lens.width) > max(width, lens.width):
-        raise InputError(f"{where}: {width}x{height} pixels, the pictures have {lens.width}x{lens.height}")
-    row = ((np.arange(lens.height) + 0.5) * height / lens.height).astype(np.intp)
-    column = ((np.arange(lens.width) + 0.5) * width / lens.width).astype(np.intp)
-    return values[row][:, column]

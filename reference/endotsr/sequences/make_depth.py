@@ -4,8 +4,6 @@ Comes in: the folder; goes out: `depth/` and the section [depth] of its `sequenc
 frame. The new folder takes its place when it is whole.
 """
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -15,26 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.opencv import write_png
-from endotsr.sequences.common import Contents, list_contents, open_common
+from endotsr.sequences.common import list_contents, open_common
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.given_depth import Kind, depth_of_values
-from endotsr.sequences.prepare import step_of_depth
+from endotsr.sequences.prepare import step_of_depth, write_levels
 from endotsr.sequences.recording import ARBITRARY, PicturePair, Recording
-from endotsr.sequences.relative_depth import Align, MadeDepth, flat_depth, relative_depth
-from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, Assumed, DepthEntry, SequenceFile, sequence_text
+from endotsr.sequences.relative_depth import Align, MadeDepth, relative_depth
+from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
-from endotsr.sequences.writing import new_folder, replace_text
+from endotsr.untrusted.writing import replace_text, replacing_folder
 
 OnFrame = Callable[[int, int], None]
-
-
-class DepthFrame(NamedTuple):
-    """Depth of one frame as it is written."""
-
-    depth: NDArray[np.float32]  # (H, W) 0 = none
-    name: str
 
 
 class DepthReport(NamedTuple):
@@ -45,7 +35,7 @@ class DepthReport(NamedTuple):
     median: float  # of the medians of the frames
 
 
-def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[DepthFrame]:
+def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[NDArray[np.float32]]:
     """Depth of every frame from its stereo pair. Raises InputError without right pictures or baseline."""
     if recording.lens is None or not recording.baseline:
         raise InputError(
@@ -61,42 +51,54 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[De
             raise InputError(f"{recording.where}: no right pictures (images_right/); allowed: a stereo sequence")
         found = stereo_depth(pair.left, pair.right, lens, baseline, settings).depth
         if not settings.temporal:
-            yield DepthFrame(found, recording.names[i])
+            yield found
             continue
         pairs, depths = [*pairs, pair][-3:], [*depths, found][-3:]
         if i:
             middle = len(depths) - 2
-            yield DepthFrame(_consistent(depths, pairs, middle), recording.names[i - 1])
+            yield _consistent(depths, pairs, middle)
     if settings.temporal:
-        yield DepthFrame(_consistent(depths[-2:], pairs[-2:], len(depths[-2:]) - 1), recording.names[-1])
+        yield _consistent(depths[-2:], pairs[-2:], len(depths[-2:]) - 1)
 
 
 def _consistent(depths: list[NDArray[np.float32]], pairs: list[PicturePair], middle: int) -> NDArray[np.float32]:
     return temporal_median(depths, [pair.left for pair in pairs], middle)
 
 
-def given_frames(contents: Contents, source: Path, kind: Kind, scale: float) -> Iterator[DepthFrame]:
-    """Depth of every frame from the files of another program. Raises InputError."""
-    files = list_pictures(source, DEPTH_ENDINGS)
+def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
+    """Depth from the stereo pairs of a folder. Raises InputError, of a single frame when it is asked for."""
+    smooth = " and weighted least squares" if settings.smooth else ""
+    method = f"semi-global matching, left-right check{smooth}{', median along the flow' if settings.temporal else ''}"
+    return MadeDepth(stereo_frames(open_common(folder), settings), method, "")
+
+
+def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDepth:
+    """Depth from the files of another program, one a frame. Raises InputError as `from_pairs`."""
+    contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
-    lens = contents.file.camera.lens(contents.folder)
+    lens = contents.file.camera.lens(folder)
     baseline = contents.file.camera.baseline * contents.file.to_scene(contents.file.unit)
-    for image, file in zip(contents.images, files):
-        yield DepthFrame(depth_of_values(read_plane(file), kind, scale, lens, baseline, file), image.stem)
+    frames = (depth_of_values(read_plane(file), kind, scale, lens, baseline, file) for file in files)
+    return MadeDepth(frames, f"{kind} from {source.name}", "")
+
+
+def from_relative(folder: Path, source: Path, align: Align, farthest: float, trusted: bool, replace: bool) -> MadeDepth:
+    """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
+    contents = list_contents(folder)
+    if contents.depth and not replace:
+        raise InputError(
+            f"{folder}: has depth already; allowed: --replace, which takes scale and shift from it and fills the rest"
+        )
+    return relative_depth(contents, source, align, farthest, trusted)
 
 
 def write_depth(
-    folder: Path,
-    frames: Iterator[DepthFrame],
-    method: str,
-    replace: bool = False,
-    on_frame: OnFrame = lambda i, n: None,
-    assumed: Assumed = "",
+    folder: Path, made: MadeDepth, replace: bool = False, on_frame: OnFrame = lambda i, n: None
 ) -> DepthReport:
     """Write the depth of a sequence and enter it into its `sequence.toml`.
 
+    made      lengths of the sequence are in an arbitrary unit where anything of it is assumed
     replace   whether depth that exists may be replaced
-    assumed   what is not measured: lengths of the sequence are then in an arbitrary unit
 
     Raises:  InputError; the folder is as before then.
     """
@@ -104,80 +106,19 @@ def write_depth(
     if (contents.file.depth or (folder / DEPTH).exists()) and not replace:
         raise InputError(f"{folder}: has depth already; allowed: --replace")
     coverage, medians, step = [], [], 0.0
-    staged = folder / f".new-{DEPTH}"
-    shutil.rmtree(staged, ignore_errors=True)
-    with new_folder(staged) as place:
-        for k, frame in enumerate(frames):
-            known = frame.depth[frame.depth > 0]
+    with replacing_folder(folder / DEPTH) as place:
+        for k, depth in enumerate(made.frames):
+            known = depth[depth > 0]
             if known.size:
                 step = step or step_of_depth(float(np.percentile(known, 99.8)))
                 medians.append(float(np.median(known)))
-            coverage.append(known.size / frame.depth.size)
-            levels = np.rint(frame.depth / (step or 1.0))
-            stored = np.where(frame.depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16)
-            write_png(place / f"{contents.images[k].stem}.png", stored)
+            coverage.append(known.size / depth.size)
+            write_levels(place / f"{contents.images[k].stem}.png", depth, step or 1.0)
             on_frame(k + 1, len(contents.images))
         if not medians:
             raise InputError(f"{folder}: no frame has any depth; is the baseline, the unit or the range wrong?")
-    unit = ARBITRARY if contents.file.arbitrary or assumed else "mm"
-    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=method, assumed=assumed)
-    found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if assumed else contents.file.unit)
-    _put_in_place(folder, staged, found)
-    return DepthReport(found, coverage, float(np.median(medians)))
-
-
-def _put_in_place(folder: Path, staged: Path, found: SequenceFile) -> None:
-    """The new depth and the file that describes it; the old depth goes last."""
-    old = folder / f".old-{os.getpid()}-{DEPTH}"
-    if (folder / DEPTH).exists():
-        os.rename(folder / DEPTH, old)
-    os.rename(staged, folder / DEPTH)
+    unit = ARBITRARY if contents.file.arbitrary or made.assumed else "mm"
+    entry = DepthEntry(folder=DEPTH, unit=unit, scale=step, method=made.method, assumed=made.assumed)
+    found = msgspec.structs.replace(contents.file, depth=entry, unit=unit if made.assumed else contents.file.unit)
     replace_text(folder / FILE_NAME, sequence_text(found))
-    shutil.rmtree(old, ignore_errors=True)
-
-
-def make_stereo_depth(
-    folder: Path, settings: StereoSettings, replace: bool, on_frame: OnFrame = lambda i, n: None
-) -> DepthReport:
-    """Depth from the stereo pairs of a folder. Raises InputError."""
-    smooth = " and weighted least squares" if settings.smooth else ""
-    method = f"semi-global matching, left-right check{smooth}{', median along the flow' if settings.temporal else ''}"
-    return write_depth(folder, stereo_frames(open_common(folder), settings), method, replace, on_frame)
-
-
-def take_given_depth(
-    folder: Path, source: Path, kind: Kind, scale: float, replace: bool, on_frame: OnFrame = lambda i, n: None
-) -> DepthReport:
-    """Depth from the files of another program. Raises InputError."""
-    frames = given_frames(list_contents(folder), source, kind, scale)
-    return write_depth(folder, frames, f"{kind} from {source.name}", replace, on_frame)
-
-
-def take_made_depth(folder: Path, made: MadeDepth, replace: bool, on_frame: OnFrame = lambda i, n: None) -> DepthReport:
-    """Depth of `relative_depth`. Raises InputError."""
-    names = [image.stem for image in list_contents(folder).images]
-    frames = (DepthFrame(plane, name) for plane, name in zip(made.frames, names))
-    return write_depth(folder, frames, made.method, replace, on_frame, made.assumed)
-
-
-def make_flat_depth(folder: Path, replace: bool, on_frame: OnFrame = lambda i, n: None) -> DepthReport:
-    """A plane in every frame. Raises InputError."""
-    return take_made_depth(folder, flat_depth(list_contents(folder)), replace, on_frame)
-
-
-def take_relative_depth(
-    folder: Path,
-    source: Path,
-    align: Align,
-    farthest: float,
-    trusted: bool,
-    replace: bool,
-    on_frame: OnFrame = lambda i, n: None,
-) -> DepthReport:
-    """Depth from the relative inverse depth of a network; see `relative_depth`. Raises InputError."""
-    contents = list_contents(folder)
-    if contents.depth and not replace:
-        raise InputError(
-            f"{folder}: has depth already; allowed: --replace, which takes scale and shift from it and fills the rest"
-        )
-    return take_made_depth(folder, relative_depth(contents, source, align, farthest, trusted), replace, on_frame)
+    return DepthReport(found, coverage, float(np.median(medians)))

@@ -5,8 +5,6 @@ proposals: `proposed = true` in `sequence.toml`, or the file `proposal.json` bes
 """
 
 import json
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,7 +20,8 @@ from endotsr.sequences.propose_masks import Proposal, overlay, propose_masks
 from endotsr.sequences.recording import Picture, Recording
 from endotsr.sequences.sequence_file import FILE_NAME, MASKS, MaskEntry, sequence_text
 from endotsr.sequences.sources import PROPOSAL
-from endotsr.sequences.writing import new_folder, replace_text
+from endotsr.sequences.writing import new_folder
+from endotsr.untrusted.writing import replace_text, replacing_folder
 
 OVERLAY = "proposed_masks.png"
 MOST_WITHOUT = 0.5  # of the frames: a proposal that leaves more of them without tissue is wrong
@@ -83,17 +82,10 @@ def enter_masks(folder: Path, replace: bool = False) -> Proposal:
         proposal = proposal._replace(excluded=united, reason=f"{proposal.reason}; united with the mask of all frames")
     if not proposal.found:
         return proposal
-    staged = folder / f".new-{MASKS}"
-    shutil.rmtree(staged, ignore_errors=True)
-    with new_folder(staged) as place:
+    with replacing_folder(folder / MASKS) as place:
         _write_masks(place, [file.stem for file in contents.images], proposal)
     found = msgspec.structs.replace(contents.file, masks=MaskEntry(proposed=True))
-    old = folder / f".old-{os.getpid()}-{MASKS}"
-    if (folder / MASKS).exists():
-        os.rename(folder / MASKS, old)
-    os.rename(staged, folder / MASKS)
     replace_text(folder / FILE_NAME, sequence_text(found))
-    shutil.rmtree(old, ignore_errors=True)
     write_png(folder / OVERLAY, overlays(recording, proposal))
     return proposal
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.sequences.arrays import read_npy
+from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.splatting.camera import Camera, camera_centre
 
 POSE_FILES = ("poses_bounds.npy", "pose_bounds.npy")
 LARGEST_POSES = 1 << 26  # bytes: half a million frames
 ALLOWED_POSES = "allowed: an .npy file of numbers, (frames, 17)"
 FLIP = np.array([1.0, -1.0, -1.0])  # LLFF axes to OpenCV axes, and back
-ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1 accepted for a rotation written with few digits
 STATIC_TOLERANCE = 1e-9  # ruling: a camera moves if a pose entry varies by more
 
 
@@ -77,11 +77,7 @@ def _camera(row: NDArray[np.float64], width: int, height: int, where: str) -> Ca
     if focal <= 0:
         raise InputError(f"{where}: focal length {focal:g}, must be positive")
     axes = matrix[:, :3] * FLIP  # camera-to-world, OpenCV axes
-    if np.abs(axes.T @ axes - np.eye(3)).max() > ROTATION_TOLERANCE:
-        raise InputError(f"{where}: the first three columns are not perpendicular unit vectors")
-    if np.linalg.det(axes) < 0:
-        raise InputError(f"{where}: the first three columns are a mirror image, not a rotation")
-    rotation = np.ascontiguousarray(axes.T) + 0.0  # + 0 turns -0 into 0
+    rotation = np.ascontiguousarray(checked_rotation(axes, where).T) + 0.0  # + 0 turns -0 into 0
     return Camera(
         rotation, -rotation @ matrix[:, 3] + 0.0, float(focal), float(focal), width / 2, height / 2, width, height
     )

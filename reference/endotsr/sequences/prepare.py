@@ -41,7 +41,7 @@ from endotsr.sequences.splits import evenly_spaced
 from endotsr.sequences.stated_depth import refuse_no_lengths
 from endotsr.sequences.straighten import Straightener, straightener
 from endotsr.sequences.trajectory import filled
-from endotsr.sequences.writing import new_folder, replaced_folder
+from endotsr.sequences.writing import new_folder
 
 DEPTH_LEVELS = 65535 // 8  # of the 16 bits for the usual largest depth of a frame; eight times more still fits
 LARGEST = 99.8  # percentile of a frame that counts as its largest depth; single values may be outliers
@@ -79,7 +79,7 @@ def prepare(
     chosen = select_frames(recording, settings, notes)
     chosen, poses = _poses_and_masks(recording, chosen, settings.gaps, notes)
     refuse_no_lengths(recording, chosen)
-    with replaced_folder(Path(out), FILE_NAME) if replace else new_folder(Path(out)) as folder:
+    with new_folder(Path(out), FILE_NAME if replace else "") as folder:
         found = _write_frames(recording, folder, chosen, poses, settings, notes, on_frame)
         write_sequence_file(found, folder)
     return found, notes
@@ -189,10 +189,10 @@ def _write_frames(
         depth = _depth(recording, i, straight, poses[k] if poses else None, settings.points, pair.left.shape[:2])
         if depth is not None and depth.any():
             depth_scale = depth_scale or step_of_depth(float(np.percentile(depth[depth > 0], LARGEST)))
-            saturated += _write_depth(folder, k, depth, depth_scale)
+            saturated += write_levels(_depth_file(folder, k), depth, depth_scale)
         elif recording.depth is not None or (recording.points is not None and settings.points != "none"):
             without_depth.append(i)
-            _write_depth(folder, k, np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
+            write_levels(_depth_file(folder, k), np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
         on_frame(k + 1, len(chosen))
     assert straight is not None
     notes += notes_of(frame_findings(facts, str(recording.where)))
@@ -268,12 +268,15 @@ def _write_mask(folder: Path, k: int, mask: NDArray[np.bool_]) -> None:
     write_png(folder / MASKS / f"{k:06d}.png", np.where(mask, 0, 255).astype(np.uint8))
 
 
-def _write_depth(folder: Path, k: int, depth: NDArray[np.float32], step: float) -> int:
-    """16-bit steps; where there is depth, at least 1. Returns the number of pixels that do not fit and are cut off."""
+def _depth_file(folder: Path, k: int) -> Path:
     (folder / DEPTH).mkdir(exist_ok=True)
+    return folder / DEPTH / f"{k:06d}.png"
+
+
+def write_levels(path: Path, depth: NDArray[np.float32], step: float) -> int:
+    """16-bit steps; where there is depth, at least 1. Returns the number of pixels that do not fit and are cut off."""
     levels = np.rint(depth / step)
-    stored = np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16)
-    write_png(folder / DEPTH / f"{k:06d}.png", stored)
+    write_png(path, np.where(depth > 0, np.clip(levels, 1, 65535), 0).astype(np.uint16))
     return int(np.count_nonzero(levels > 65535))
 
 

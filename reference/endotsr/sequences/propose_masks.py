@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.opencv import area_resize, dense_flow
 from endotsr.sequences.recording import Picture
+from endotsr.sequences.smaller import nearest_pixels
 
 WORKING = 320  # px, the longer side of the pictures that are searched
 FLOOR = 12.0  # grey levels: the redness of a black pixel is noise
@@ -229,11 +230,8 @@ def _widened(plane: BoolArray) -> BoolArray:
 
 
 def _enlarged(plane: BoolArray, size: tuple[int, ...]) -> BoolArray:
-    """The mask at the size of its picture, nearest pixel."""
-    height, width = size
-    row = ((np.arange(height) + 0.5) * plane.shape[0] / height).astype(np.intp)
-    column = ((np.arange(width) + 0.5) * plane.shape[1] / width).astype(np.intp)
-    return plane[row][:, column]
+    """The mask at the size of its picture."""
+    return nearest_pixels(plane, size[1], size[0], "mask")
 
 
 def overlay(picture: Picture, excluded: BoolArray) -> Picture:

@@ -38,6 +38,16 @@ class RecordedCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     width: Side
     height: Side
 
+    @property
+    def camera(self) -> "Camera":
+        """The same with arrays."""
+        import numpy as np
+
+        from endotsr.splatting.camera import Camera
+
+        rotation, translation = np.array(self.rotation, np.float64), np.array(self.translation, np.float64)
+        return Camera(rotation, translation, self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+
 
 class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
     """Names, times, split and cameras of a sequence. Keys of a file that are not listed are left alone."""
@@ -67,14 +77,7 @@ class SequenceRecord(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def frame_cameras(self) -> "list[Camera]":
         """The camera of every frame; one and the same object where it does not move."""
-        import numpy as np
-
-        from endotsr.splatting.camera import Camera
-
-        found = [
-            Camera(np.array(c.rotation), np.array(c.translation), c.fx, c.fy, c.cx, c.cy, c.width, c.height)
-            for c in self.cameras
-        ]
+        found = [entry.camera for entry in self.cameras]
         return found * self.count if self.static_camera else found
 
 

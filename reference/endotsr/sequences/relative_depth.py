@@ -23,8 +23,8 @@ from endotsr.sequences.checks.depth import light_correlation, light_finding
 from endotsr.sequences.common import Contents, open_common
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, list_pictures, shortened
-from endotsr.sequences.given_depth import at_size
 from endotsr.sequences.sequence_file import Assumed
+from endotsr.sequences.smaller import nearest_pixels
 
 Align = Literal["auto", "frame", "sequence"]
 FEWEST, MOST = 20, 400  # pixels that both know: needed for a line, and used for its robust estimate
@@ -100,7 +100,7 @@ def relative_depth(contents: Contents, source: Path, align: Align, farthest: flo
     lens = contents.file.camera.lens(contents.folder)
 
     def relative(i: int) -> FloatArray:
-        return at_size(read_plane(files[i]).astype(np.float64), lens, files[i])
+        return nearest_pixels(read_plane(files[i]).astype(np.float64), lens.width, lens.height, files[i])
 
     if contents.depth and contents.file.depth and not contents.file.depth.assumed:
         return _aligned(contents, relative, source, align)

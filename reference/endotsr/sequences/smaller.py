@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.errors import InputError
 from endotsr.sequences.depth_files import reduced_depth
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.sequence import Sequence
@@ -52,3 +53,18 @@ def halved(sequence: Sequence, memory: float) -> Sequence:
     )
     cameras = smaller_cameras(sequence.cameras, width, height)  # (20.6)
     return replace(sequence, images=images, masks=masks, depth=depth, cameras=cameras)
+
+
+def nearest_pixels(plane: NDArray, width: int, height: int, where: object) -> NDArray:
+    """A plane (H, W) at another size: of every pixel the nearest one, so that no value between two is made up.
+
+    Raises:  InputError for other proportions.
+    """
+    rows, columns = plane.shape
+    if (rows, columns) == (height, width):
+        return plane
+    if abs(columns * height - rows * width) > max(columns, width, rows, height):  # more than rounding makes
+        raise InputError(f"{where}: {columns}x{rows} pixels, the pictures have {width}x{height}: other proportions")
+    row = ((np.arange(height) + 0.5) * rows / height).astype(np.intp)
+    column = ((np.arange(width) + 0.5) * columns / width).astype(np.intp)
+    return plane[row][:, column]

@@ -26,6 +26,7 @@ from endotsr.sequences.recording import (
     colour_picture,
     grey_plane,
 )
+from endotsr.sequences.smaller import nearest_pixels
 from endotsr.sequences.source_options import SourceOptions
 
 PROPOSAL = "proposal.json"  # beside a folder of masks: a program proposed them
@@ -98,21 +99,9 @@ def mask_reader(
         if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT:
             raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
         tissue = plane == 0 if excluded_value == "white" else plane > 0
-        return resized_mask(tissue, width, height, path)
+        return nearest_pixels(tissue, width, height, path)
 
     return mask
-
-
-def resized_mask(mask: NDArray[np.bool_], width: int, height: int, where: object) -> NDArray[np.bool_]:
-    """The mask at another size, nearest pixel. Raises InputError for other proportions."""
-    rows, columns = mask.shape
-    if (rows, columns) == (height, width):
-        return mask
-    if abs(columns * height - rows * width) > max(columns, width):
-        raise InputError(f"{where}: {columns}x{rows} pixels, the pictures have {width}x{height}: other proportions")
-    row = ((np.arange(height) + 0.5) * rows / height).astype(np.intp)
-    column = ((np.arange(width) + 0.5) * columns / width).astype(np.intp)
-    return mask[row][:, column]
 
 
 def beside(frames: list[Path], files: list[Path]) -> list[Path | None]:

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.config import Section
+from endotsr.config import Fraction, Positive, Section
 from endotsr.errors import InputError
 from endotsr.opencv.stereo import match_pair
 from endotsr.sequences.recording import Lens, Picture
@@ -23,17 +23,17 @@ MOST = 512  # searched disparities; more would be a wrong calibration
 class StereoSettings(Section, frozen=True, kw_only=True):
     """How depth is made from stereo pairs."""
 
-    nearest: float = 20.0
+    nearest: Positive = 20.0
     """nearest depth that is searched, in the unit of the sequence"""
-    farthest: float = 300.0
+    farthest: Positive = 300.0
     """farthest depth that is searched"""
     block: Literal[3, 5, 7, 9, 11] = 5
     """side of the matched blocks, px"""
     smooth: bool = True
     """edge-preserving smoothing by weighted least squares"""
-    agreement: float = 1.0
+    agreement: Positive = 1.0
     """largest difference between the disparities of left and right, px"""
-    confidence: float = 0.5
+    confidence: Fraction = 0.5
     """least confidence of the smoothing, 0 to 1"""
     temporal: bool = False
     """median over three frames along the optical flow"""

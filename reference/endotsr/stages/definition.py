@@ -6,6 +6,7 @@ definition and the comparison of the golden values with it.
 
 import importlib
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,28 +16,20 @@ from numpy.typing import NDArray
 from endotsr.config import Config, DensityConfig, LossConfig
 from endotsr.definition import (
     adam,
-    calibration,
     compositing,
     covariance,
     density_control,
-    depth,
-    dictionary,
     initialisation,
-    laplacian,
-    masked_ssim,
-    matern,
     objective,
-    pose,
     projection,
     render,
-    schedules,
     train,
     view,
 )
 from endotsr.definition import scene as moving
 from endotsr.fitting.model import raster_settings
 from endotsr.opencv import canny_edges
-from endotsr.stages.optimiser import CONSTANT_LENS, RESIDUAL_RATES, SERIES
+from endotsr.stages.optimiser import CONSTANT_LENS, SERIES
 from endotsr.stages.registry import all_stages
 from endotsr.stages.requests import Tape, camera_of, config_of, initialisation_of, model_of, raster_of, sequence_of
 from endotsr.stages.stage import Found, Inputs, Settings, Stage
@@ -73,19 +66,29 @@ def definition_stages() -> dict[str, Stage]:
 
 
 def twins() -> dict[str, Twin]:
-    """The twin of every stage that the definition computes; that of a plain pair is found by its names."""
+    """The twin of every stage that the definition computes; those that name their module are found by its name."""
     stages = all_stages()
-    return {name: twin_of(stage) for name, stage in stages.items() if name in TWINS or stage.plain}
+    return {n: twin_of(s) for n, s in stages.items() if n in TWINS or s.plain or isinstance(s.forward, partial)}
 
 
 def twin_of(stage: Stage) -> Twin:
-    """The twin of a stage. Raises KeyError for a stage that is written out and is not in `TWINS`."""
-    pair = stage.plain
-    if pair is None:
+    """The twin of a stage: its functions with the module of the definition that has the name of the compiled one.
+
+    Raises: KeyError for a stage that names no module and is not in `TWINS`.
+    """
+    package, _, name = stage.function.rpartition(".")
+    if stage.name in TWINS:
         return TWINS[stage.name]
-    module = importlib.import_module(f"endotsr.definition.{pair.forward.__module__.rpartition('.')[2]}")
-    own = pair._replace(forward=getattr(module, pair.forward.__name__), reverse=getattr(module, pair.reverse.__name__))
-    return Twin(own.forward, own.run, own.back)
+    module = importlib.import_module(f"endotsr.definition.{package.rpartition('.')[2]}")
+    if (pair := stage.plain) is not None:
+        forward, reverse = (getattr(module, function.__name__) for function in (pair.forward, pair.reverse))
+        own = pair._replace(forward=forward, reverse=reverse)
+        return Twin(forward, own.run, own.back)
+    if not isinstance(stage.forward, partial):
+        raise KeyError(stage.name)
+    parts = (stage.forward, stage.reverse, stage.extra)
+    bound = (partial(part.func, module) if isinstance(part, partial) else None for part in parts)
+    return Twin(getattr(module, name), *bound)  # type: ignore[arg-type]
 
 
 def _trace_of(stage: Stage) -> Callable[[Inputs, Settings, Any], Any]:
@@ -100,77 +103,7 @@ def _of(arrays: Inputs, names: tuple[str, ...]) -> list[Any]:
     return [arrays[name] for name in names]
 
 
-# ---- the paper ----
-
-
-def _frequencies(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    return {"omega": dictionary.frequencies(settings["count"], settings["low"], settings["high"])}, None
-
-
-def _atoms(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    statistics = dictionary.atom_statistics(inputs["times"][inputs["train_index"]], inputs["omega"])
-    phi_bar, saved = dictionary.normalise_forward(inputs["phi"], statistics)
-    return {"phi_bar": phi_bar}, saved
-
-
-def _atoms_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return {"d_phi": dictionary.normalise_reverse(cotangents["phi_bar"], saved)}
-
-
-def _statistics(inputs: Inputs, settings: Settings, saved: Any) -> Found:
-    return {"mean": saved.mean, "rms": np.where(saved.dead, 0, saved.rms), "dead": saved.dead}
-
-
-def _matern(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    rho = matern.matern_weights(inputs["omega"], settings["correlation_length"])
-    penalty, saved = matern.matern_penalty_forward(inputs["motion_coefficients"], rho)
-    return {"penalty": penalty}, saved
-
-
-def _matern_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return {"d_motion_coefficients": matern.matern_penalty_reverse(cotangents["penalty"], saved)}
-
-
-def _laplacian(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    masks = laplacian.support_masks(inputs["mask"], settings["levels"], settings["upsampling"])
-    images = inputs["rendered"], inputs["observed"]
-    loss, saved = laplacian.laplacian_loss_forward(*images, masks, settings["upsampling"])
-    return {"loss": loss}, saved
-
-
-def _laplacian_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return {"d_rendered": laplacian.laplacian_loss_reverse(cotangents["loss"], saved)}
-
-
-def _bands(inputs: Inputs, settings: Settings, saved: Any) -> Found:
-    bands = laplacian.laplacian_levels(inputs["observed"], settings["levels"], settings["upsampling"]).bands
-    found = {f"band_{j}": band for j, band in enumerate(bands, start=1)}
-    return found | {f"valid_{j}": valid for j, valid in enumerate(saved.masks.bands, start=1)}
-
-
-def _calibration(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    g_rgb, g_lap = (np.array([calibration.rms(view) for view in inputs[f"d_{name}"]]) for name in _GRADIENT_IMAGES)
-    views = [(str(k), *pair) for k, pair in enumerate(zip(g_rgb, g_lap))]
-    try:
-        weight, refused = calibration.calibrate(views, settings["gradient_ratio"]).lambda_lap, False
-    except ValueError:
-        weight, refused = 0.0, True
-    return {"g_rgb": g_rgb, "g_lap": g_lap, "lambda_lap": weight, "refused": np.array(refused)}, None
-
-
-_GRADIENT_IMAGES = ("photometric", "laplacian")
-
-
 # ---- from raw Gaussians to images ----
-
-
-def _covariance(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    shape, saved = covariance.covariance_forward(inputs["quaternion"], inputs["log_scale"])
-    return shape._asdict(), saved
-
-
-def _covariance_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return covariance.covariance_reverse(covariance.Shape(**cotangents), saved)._asdict()
 
 
 def _projection(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
@@ -216,40 +149,6 @@ def _render_reverse(cotangents: Inputs, saved: Any) -> Found:
     found = render.render_reverse(*_of(cotangents, IMAGES), saved=saved)._asdict()
     d_rotation, d_translation = found.pop("d_camera")
     return found | {"d_rotation_matrix": d_rotation, "d_translation": d_translation}
-
-
-# ---- losses and corrections ----
-
-
-def _ssim(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    target = masked_ssim.ssim_target(inputs["observed"], inputs["mask"])
-    ssim, saved = masked_ssim.masked_ssim_forward(inputs["rendered"], target)
-    return {"ssim": ssim}, saved
-
-
-def _ssim_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return {"d_rendered": masked_ssim.masked_ssim_reverse(cotangents["ssim"], saved)}
-
-
-def _depth(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    target = depth.depth_target(inputs["prior_depth"], inputs["mask"])
-    loss, saved = depth.normalised_depth_forward(inputs["rendered_depth"], target)
-    return {"loss": loss}, saved
-
-
-def _depth_reverse(cotangents: Inputs, saved: Any) -> Found:
-    return {"d_rendered_depth": depth.normalised_depth_reverse(cotangents["loss"], saved)}
-
-
-def _pose(inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
-    given = _of(inputs, ("rotation", "translation", "rotation_vector", "offset"))
-    rotation, translation, saved = pose.pose_forward(*given)
-    return {"corrected_rotation": rotation, "corrected_translation": translation}, saved
-
-
-def _pose_reverse(cotangents: Inputs, saved: Any) -> Found:
-    given = _of(cotangents, ("corrected_rotation", "corrected_translation"))
-    return pose.pose_reverse(*given, saved=saved)._asdict()
 
 
 # ---- the whole method ----
@@ -303,26 +202,6 @@ def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     for gradient in inputs["gradients"]:
         state, parameters = adam.adam_update(state, parameters, {"p": gradient}, {"p": settings["rate"]}, *numbers)
     return {"parameter_after": parameters["p"], "first": state["p"][0], "second": state["p"][1]}, None
-
-
-def _schedule(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    config, iterations = config_of(settings, np.dtype(np.float64)), [int(i) for i in inputs["iteration"]]
-    rows: list[dict[str, Any]] = []
-    for i in iterations:
-        row: dict[str, Any] = dict.fromkeys(RESIDUAL_RATES, 0.0) | schedules.learning_rates(i, config)
-        for name, parts in (("harmonics", ("base", "rest")), ("fdm_weight", ("position", "other"))):
-            row |= {f"{name}_{part}": rate for part, (_, rate) in zip(parts, row.pop(name))}
-        rows.append(row)
-    assert isinstance(config.loss.lambda_lap, float)
-    return {f"rate_{name}": np.array([row[name] for row in rows]) for name in rows[0]} | {
-        "laplacian_weight": config.loss.lambda_lap
-        * np.array([schedules.laplacian_ramp(i, config) for i in iterations]),
-        "degree": np.array([schedules.active_degree(i, config) for i in iterations]),
-        "residuals": np.array([schedules.residuals_active(i, config) for i in iterations]),
-        "smoothness": np.array([schedules.smoothness_active(i, config) for i in iterations]),
-        "gathers": np.array([schedules.statistics_active(i, config) for i in iterations]),
-        "densifies": np.array([schedules.densify_now(i, config) for i in iterations]),
-    }, None
 
 
 def _density(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
@@ -395,14 +274,6 @@ def _sizes(state: Any) -> dict[str, NDArray]:
 
 
 TWINS: dict[str, Twin] = {
-    "frequencies": Twin(dictionary.frequencies, _frequencies),
-    "atoms": Twin(dictionary.normalise_forward, _atoms, _atoms_reverse, _statistics),
-    "matern": Twin(
-        matern.matern_penalty_forward, _matern, _matern_reverse, lambda inputs, settings, saved: {"rho": saved.rho}
-    ),
-    "laplacian": Twin(laplacian.laplacian_loss_forward, _laplacian, _laplacian_reverse, _bands),
-    "calibration": Twin(calibration.calibrate, _calibration),
-    "covariance": Twin(covariance.covariance_forward, _covariance, _covariance_reverse),
     "projection": Twin(
         projection.projection_forward,
         _projection,
@@ -416,13 +287,9 @@ TWINS: dict[str, Twin] = {
         _render_reverse,
         lambda inputs, settings, saved: {"visible": saved.visible},
     ),
-    "masked_ssim": Twin(masked_ssim.masked_ssim_forward, _ssim, _ssim_reverse),
-    "normalised_depth": Twin(depth.normalised_depth_forward, _depth, _depth_reverse),
-    "pose": Twin(pose.pose_forward, _pose, _pose_reverse),
     "scene": Twin(moving.scene_at, _scene),
     "objective": Twin(view.view_gradients, _objective, _objective_reverse, _images_and_terms),
     "adam": Twin(adam.adam_update, _adam),
-    "schedule": Twin(schedules.learning_rates, _schedule),
     "density": Twin(density_control.densify, _density),
     "initialisation": Twin(initialisation.initialise, _initialisation),
     "training": Twin(train.iterate, _training),

@@ -1,17 +1,13 @@
 """Stages of the Laplacian loss (5) and the calibration of its weight (7)."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.calibration import calibrate, rms
-from endotsr.equations.laplacian import (
-    LaplacianSaved,
-    SupportMasks,
-    laplacian_levels,
-    laplacian_loss_forward,
-    laplacian_loss_reverse,
-    support_masks,
-)
+from endotsr.equations import calibration, laplacian
+from endotsr.equations.laplacian import SupportMasks, laplacian_levels, support_masks
 from endotsr.equations.pyramid import Upsampling
 from endotsr.errors import CalibrationError
 from endotsr.stages.stage import Found, Inputs, Settings, Stage, Variant, split_blocks
@@ -23,25 +19,25 @@ IMAGE_SHAPE = (3, 19, 22)  # odd and even; sizes 19x22, 10x11, 5x6, 3x3
 # ---- equation (5) ----
 
 
-def _laplacian(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[LaplacianSaved, SupportMasks]]:
+def _laplacian(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Any, Any]]:
     rule = settings["upsampling"]
-    masks = support_masks(inputs["mask"], settings["levels"], rule)
-    loss, saved = laplacian_loss_forward(inputs["rendered"], inputs["observed"], masks, rule)
+    masks = module.support_masks(inputs["mask"], settings["levels"], rule)
+    loss, saved = module.laplacian_loss_forward(inputs["rendered"], inputs["observed"], masks, rule)
     return {"loss": loss}, (saved, masks)
 
 
-def _laplacian_reverse(cotangents: Inputs, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
-    return {"d_rendered": laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
+def _laplacian_reverse(module: Any, cotangents: Inputs, saved: tuple[Any, Any]) -> Found:
+    return {"d_rendered": module.laplacian_loss_reverse(float(cotangents["loss"]), saved[0])}
 
 
-def _bands(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]) -> Found:
+def _bands(module: Any, inputs: Inputs, settings: Settings, saved: tuple[Any, Any]) -> Found:
     """Bands of the observed image and their valid pixels."""
-    pyramid = laplacian_levels(inputs["observed"], settings["levels"], settings["upsampling"])
+    pyramid = module.laplacian_levels(inputs["observed"], settings["levels"], settings["upsampling"])
     bands = {f"band_{j}": band for j, band in enumerate(pyramid.bands, start=1)}
     return bands | {f"valid_{j}": valid for j, valid in enumerate(saved[1].bands, start=1)}
 
 
-def _laplacian_trace(inputs: Inputs, settings: Settings, saved: tuple[LaplacianSaved, SupportMasks]):
+def _laplacian_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any]):
     return {f"signs_{j}": sign for j, sign in enumerate(saved[0].signs, start=1)}
 
 
@@ -82,14 +78,14 @@ def _variant(rule: Upsampling) -> Variant:
 # ---- equation (7) ----
 
 
-def _calibration(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+def _calibration(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     """One row a view; the gradients come as images, so that the RMS is part of the case."""
-    g_rgb = [rms(view) for view in inputs["d_photometric"]]
-    g_lap = [rms(view) for view in inputs["d_laplacian"]]
+    g_rgb = [module.rms(view) for view in inputs["d_photometric"]]
+    g_lap = [module.rms(view) for view in inputs["d_laplacian"]]
     views = [(str(k), a, b) for k, (a, b) in enumerate(zip(g_rgb, g_lap))]
     try:
-        weight, refused = calibrate(views, settings["gradient_ratio"]).lambda_lap, False
-    except CalibrationError:
+        weight, refused = module.calibrate(views, settings["gradient_ratio"]).lambda_lap, False
+    except (CalibrationError, ValueError):  # the definition knows no error of the package
         weight, refused = 0.0, True
     return {
         "g_rgb": np.array(g_rgb),
@@ -105,9 +101,9 @@ STAGES = [
         equation="5",
         text="pyramid of the observed image, valid pixels, loss",
         function="endotsr.equations.laplacian.laplacian_loss_forward",
-        forward=_laplacian,
-        reverse=_laplacian_reverse,
-        extra=_bands,
+        forward=partial(_laplacian, laplacian),
+        reverse=partial(_laplacian_reverse, laplacian),
+        extra=partial(_bands, laplacian),
         trace=_laplacian_trace,
         variants=(_variant("co_sited"), _variant("half_pixel")),
     ),
@@ -116,6 +112,6 @@ STAGES = [
         equation="7",
         text="Laplacian weight from gradient images",
         function="endotsr.equations.calibration.calibrate",
-        forward=_calibration,
+        forward=partial(_calibration, calibration),
     ),
 ]

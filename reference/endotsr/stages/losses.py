@@ -1,17 +1,14 @@
 """Stages of the base losses (B6) to (B9). In a gradient check the observed frame, its mask and the prior are fixed."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.losses.depth import (
-    DepthSaved,
-    DepthTarget,
-    depth_target,
-    normalised_depth_forward,
-    normalised_depth_reverse,
-)
+from endotsr.losses import depth, masked_ssim
+from endotsr.losses.depth import depth_target
 from endotsr.losses.masked_l1 import MaskedL1Saved, masked_l1_forward, masked_l1_reverse
-from endotsr.losses.masked_ssim import SsimSaved, masked_ssim_forward, masked_ssim_reverse, ssim_target
 from endotsr.losses.smoothness import SmoothnessSaved, smoothness_forward, smoothness_reverse
 from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant
 
@@ -55,13 +52,14 @@ def _l1_inputs(rng: Random) -> dict[str, NDArray]:
 # ---- masked SSIM ----
 
 
-def _ssim(inputs: Inputs, settings: Settings) -> tuple[Found, SsimSaved]:
-    ssim, saved = masked_ssim_forward(inputs["rendered"], ssim_target(inputs["observed"], inputs["mask"]))
+def _ssim(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+    target = module.ssim_target(inputs["observed"], inputs["mask"])
+    ssim, saved = module.masked_ssim_forward(inputs["rendered"], target)
     return {"ssim": ssim}, saved
 
 
-def _ssim_reverse(cotangents: Inputs, saved: SsimSaved) -> Found:
-    return {"d_rendered": masked_ssim_reverse(float(cotangents["ssim"]), saved)}
+def _ssim_reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
+    return {"d_rendered": module.masked_ssim_reverse(float(cotangents["ssim"]), saved)}
 
 
 def _ssim_inputs(rng: Random) -> dict[str, NDArray]:
@@ -71,20 +69,20 @@ def _ssim_inputs(rng: Random) -> dict[str, NDArray]:
 # ---- normalised depth ----
 
 
-def _depth(inputs: Inputs, settings: Settings) -> tuple[Found, tuple[DepthSaved, DepthTarget]]:
-    target = depth_target(inputs["prior_depth"], inputs["mask"])
-    loss, saved = normalised_depth_forward(inputs["rendered_depth"], target)
+def _depth(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, tuple[Any, Any]]:
+    target = module.depth_target(inputs["prior_depth"], inputs["mask"])
+    loss, saved = module.normalised_depth_forward(inputs["rendered_depth"], target)
     return {"loss": loss}, (saved, target)
 
 
-def _depth_reverse(cotangents: Inputs, saved: tuple[DepthSaved, DepthTarget]) -> Found:
-    return {"d_rendered_depth": normalised_depth_reverse(float(cotangents["loss"]), saved[0])}
+def _depth_reverse(module: Any, cotangents: Inputs, saved: tuple[Any, Any]) -> Found:
+    return {"d_rendered_depth": module.normalised_depth_reverse(float(cotangents["loss"]), saved[0])}
 
 
-def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[DepthSaved, DepthTarget]) -> dict[str, NDArray]:
-    depth = inputs["rendered_depth"]
-    residual = depth / depth.max() - saved[1].normalised
-    return {"peak": np.array(int(depth.argmax())), "sign": np.sign(residual).astype(int)}
+def _depth_trace(inputs: Inputs, settings: Settings, saved: tuple[Any, Any]) -> dict[str, NDArray]:
+    rendered = inputs["rendered_depth"]
+    residual = rendered / rendered.max() - saved[1].normalised
+    return {"peak": np.array(int(rendered.argmax())), "sign": np.sign(residual).astype(int)}
 
 
 def _priors(dtype: np.dtype) -> dict[str, NDArray]:
@@ -142,8 +140,8 @@ STAGES = [
         equation="B7",
         text="masked SSIM",
         function="endotsr.losses.masked_ssim.masked_ssim_forward",
-        forward=_ssim,
-        reverse=_ssim_reverse,
+        forward=partial(_ssim, masked_ssim),
+        reverse=partial(_ssim_reverse, masked_ssim),
         variants=(Variant("masked_ssim", _ssim_inputs, fixed=_frame),),
     ),
     Stage(
@@ -151,8 +149,8 @@ STAGES = [
         equation="B8",
         text="normalised depth",
         function="endotsr.losses.depth.normalised_depth_forward",
-        forward=_depth,
-        reverse=_depth_reverse,
+        forward=partial(_depth, depth),
+        reverse=partial(_depth_reverse, depth),
         trace=_depth_trace,
         variants=(Variant("normalised_depth", _depth_inputs, fixed=_priors),),
     ),

@@ -3,6 +3,7 @@
 None of them has a gradient.
 """
 
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -10,17 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config, DensityConfig
+from endotsr.fitting import schedules
 from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
 from endotsr.fitting.objective import calibrate_on
-from endotsr.fitting.schedules import (
-    active_degree,
-    densify_now,
-    laplacian_ramp,
-    learning_rates,
-    residuals_active,
-    smoothness_active,
-    statistics_active,
-)
 from endotsr.fitting.state import TrainingState, workshop
 from endotsr.fitting.trainer import training_step
 from endotsr.scene.density_control import densify, empty_statistics, gather_statistics, scene_extent
@@ -44,27 +37,27 @@ def _adam(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     return {"parameter_after": parameter, "first": state.first["p"], "second": state.second["p"]}, None
 
 
-def _rates(iteration: int, config: Config) -> dict[str, float]:
+def _rates(module: Any, iteration: int, config: Config) -> dict[str, float]:
     """Rates by group; those of the residuals are 0 while there are none."""
-    rates: dict[str, Any] = dict.fromkeys(RESIDUAL_RATES, 0.0) | learning_rates(iteration, config)
+    rates: dict[str, Any] = dict.fromkeys(RESIDUAL_RATES, 0.0) | module.learning_rates(iteration, config)
     for name, parts in (("harmonics", ("base", "rest")), ("fdm_weight", ("position", "other"))):
         for part, (_, rate) in zip(parts, rates.pop(name)):
             rates[f"{name}_{part}"] = rate
     return rates
 
 
-def _schedule(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+def _schedule(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     config, iterations = config_of(settings, np.dtype(np.float64)), [int(i) for i in inputs["iteration"]]
-    rows = [_rates(i, config) for i in iterations]
+    rows = [_rates(module, i, config) for i in iterations]
     found: dict[str, Any] = {f"rate_{name}": np.array([row[name] for row in rows]) for name in rows[0]}
     assert isinstance(config.loss.lambda_lap, float)
     return found | {
-        "laplacian_weight": np.array([config.loss.lambda_lap * laplacian_ramp(i, config) for i in iterations]),
-        "degree": np.array([active_degree(i, config) for i in iterations], np.int64),
-        "residuals": np.array([residuals_active(i, config) for i in iterations]),
-        "smoothness": np.array([smoothness_active(i, config) for i in iterations]),
-        "gathers": np.array([statistics_active(i, config) for i in iterations]),
-        "densifies": np.array([densify_now(i, config) for i in iterations]),
+        "laplacian_weight": np.array([config.loss.lambda_lap * module.laplacian_ramp(i, config) for i in iterations]),
+        "degree": np.array([module.active_degree(i, config) for i in iterations], np.int64),
+        "residuals": np.array([module.residuals_active(i, config) for i in iterations]),
+        "smoothness": np.array([module.smoothness_active(i, config) for i in iterations]),
+        "gathers": np.array([module.statistics_active(i, config) for i in iterations]),
+        "densifies": np.array([module.densify_now(i, config) for i in iterations]),
     }, None
 
 
@@ -165,7 +158,7 @@ STAGES = [
         equation="B10",
         text="rates, weights and switches of some iterations",
         function="endotsr.fitting.schedules.learning_rates",
-        forward=_schedule,
+        forward=partial(_schedule, schedules),
     ),
     Stage(
         name="density",

@@ -1,23 +1,26 @@
 """Stage of the correction of a camera pose (B16)."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.equations.pose import PoseSaved, pose_forward, pose_reverse
+from endotsr.equations import pose
 from endotsr.stages.stage import Found, Inputs, Settings, Stage, Variant
 
 ALWAYS_DOUBLE = "a pose is computed in float64, whatever the precision of its inputs"
 
 
-def _pose(inputs: Inputs, settings: Settings) -> tuple[Found, PoseSaved]:
-    rotation, translation, saved = pose_forward(
+def _pose(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+    rotation, translation, saved = module.pose_forward(
         inputs["rotation"], inputs["translation"], inputs["rotation_vector"], inputs["offset"]
     )
     return {"corrected_rotation": rotation, "corrected_translation": translation}, saved
 
 
-def _reverse(cotangents: Inputs, saved: PoseSaved) -> Found:
-    return pose_reverse(cotangents["corrected_rotation"], cotangents["corrected_translation"], saved)._asdict()
+def _reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
+    return module.pose_reverse(cotangents["corrected_rotation"], cotangents["corrected_translation"], saved)._asdict()
 
 
 def _inputs(rng: np.random.Generator, angle: float) -> dict[str, NDArray]:
@@ -37,8 +40,8 @@ STAGES = [
         equation="B16",
         text="correction of a camera pose",
         function="endotsr.equations.pose.pose_forward",
-        forward=_pose,
-        reverse=_reverse,
+        forward=partial(_pose, pose),
+        reverse=partial(_reverse, pose),
         variants=(
             Variant("pose", lambda rng: _inputs(rng, 1.7), single=ALWAYS_DOUBLE),
             Variant("pose_small", lambda rng: _inputs(rng, 0.02), single=ALWAYS_DOUBLE),

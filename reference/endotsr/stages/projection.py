@@ -1,9 +1,13 @@
 """Stages from raw Gaussians to the screen: covariance (B2), projection (B3), colour from harmonics (B4)."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.splatting.covariance import CovarianceSaved, Shape, covariance_forward, covariance_reverse
+from endotsr.splatting import covariance
+from endotsr.splatting.covariance import Shape, covariance_forward
 from endotsr.splatting.harmonics import HarmonicsSaved, harmonics_forward, harmonics_reverse
 from endotsr.splatting.projection import Projected, ProjectionSaved, projection_forward, projection_reverse
 from endotsr.splatting.settings import EXACT, PAPER, RasterSettings
@@ -17,13 +21,13 @@ Random = np.random.Generator
 # ---- covariance (B2) ----
 
 
-def _covariance(inputs: Inputs, settings: Settings) -> tuple[Found, CovarianceSaved]:
-    shape, saved = covariance_forward(inputs["quaternion"], inputs["log_scale"])
+def _covariance(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+    shape, saved = module.covariance_forward(inputs["quaternion"], inputs["log_scale"])
     return shape._asdict(), saved
 
 
-def _covariance_reverse(cotangents: Inputs, saved: CovarianceSaved) -> Found:
-    return covariance_reverse(Shape(**cotangents), saved)._asdict()
+def _covariance_reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
+    return module.covariance_reverse(module.Shape(**cotangents), saved)._asdict()
 
 
 def _covariance_inputs(rng: Random) -> dict[str, NDArray]:
@@ -114,8 +118,8 @@ STAGES = [
         equation="B2",
         text="rotation and semi-axes",
         function="endotsr.splatting.covariance.covariance_forward",
-        forward=_covariance,
-        reverse=_covariance_reverse,
+        forward=partial(_covariance, covariance),
+        reverse=partial(_covariance_reverse, covariance),
         variants=(Variant("covariance", _covariance_inputs),),
     ),
     Stage(

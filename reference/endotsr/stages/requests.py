@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import Config, InitialisationConfig, ModelConfig, config_from_dict, without_former_keys
-from endotsr.equations.dictionary import AtomStatistics, atom_statistics
 from endotsr.fitting.model import Spectral, spectral_from
 from endotsr.scene.gaussians import Gaussians
 from endotsr.sequences.sequence import Sequence
@@ -22,11 +21,6 @@ from endotsr.splatting.settings import LegacyDeviations, RasterSettings
 from endotsr.stages.stage import Inputs, Settings
 
 COMPOSITORS: tuple[Compositor, ...] = ("definition", "blocks")
-
-
-def statistics_of(inputs: Inputs) -> AtomStatistics:
-    """Statistics over the training stamps of a request."""
-    return atom_statistics(inputs["times"][inputs["train_index"]], inputs["omega"].astype(np.float64))
 
 
 def raster_of(settings: Settings) -> RasterSettings:

@@ -1,22 +1,16 @@
 """Stages of the Fourier components: frequencies and atoms (1), (1b), appearance (2), motion (3), Matern prior (4)."""
 
 from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.equations import dictionary, matern
 from endotsr.equations.appearance import appearance_forward, appearance_reverse
-from endotsr.equations.dictionary import (
-    NormaliseSaved,
-    dictionary_forward,
-    dictionary_reverse,
-    frequencies,
-    normalise_forward,
-    normalise_reverse,
-)
-from endotsr.equations.matern import MaternSaved, matern_penalty_forward, matern_penalty_reverse, matern_weights
+from endotsr.equations.dictionary import dictionary_forward, dictionary_reverse, frequencies
 from endotsr.equations.motion import motion_forward, motion_reverse
-from endotsr.stages.requests import statistics_of
 from endotsr.stages.stage import Found, Inputs, PlainPair, Settings, Stage, Variant, split_blocks
 
 Random = np.random.Generator
@@ -34,8 +28,8 @@ def _each_atom(name: str) -> Mapping[str, Mapping[str, object]]:
 # ---- equation (1) ----
 
 
-def _frequencies(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
-    return {"omega": frequencies(settings["count"], settings["low"], settings["high"])}, None
+def _frequencies(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, None]:
+    return {"omega": module.frequencies(settings["count"], settings["low"], settings["high"])}, None
 
 
 def _dictionary_inputs(rng: Random) -> dict[str, NDArray]:
@@ -45,17 +39,21 @@ def _dictionary_inputs(rng: Random) -> dict[str, NDArray]:
 # ---- equation (1b) ----
 
 
-def _atoms(inputs: Inputs, settings: Settings) -> tuple[Found, NormaliseSaved]:
-    phi_bar, saved = normalise_forward(inputs["phi"], statistics_of(inputs))
+def _over_stamps(module: Any, inputs: Inputs) -> Any:
+    return module.atom_statistics(inputs["times"][inputs["train_index"]], inputs["omega"].astype(np.float64))
+
+
+def _atoms(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+    phi_bar, saved = module.normalise_forward(inputs["phi"], _over_stamps(module, inputs))
     return {"phi_bar": phi_bar}, saved
 
 
-def _atoms_reverse(cotangents: Inputs, saved: NormaliseSaved) -> Found:
-    return {"d_phi": normalise_reverse(cotangents["phi_bar"], saved)}
+def _atoms_reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
+    return {"d_phi": module.normalise_reverse(cotangents["phi_bar"], saved)}
 
 
-def _statistics(inputs: Inputs, settings: Settings, saved: NormaliseSaved) -> Found:
-    found = statistics_of(inputs)
+def _statistics(module: Any, inputs: Inputs, settings: Settings, saved: Any) -> Found:
+    found = _over_stamps(module, inputs)
     return {"mean": found.mean, "rms": np.where(found.dead, 0.0, found.rms), "dead": found.dead}
 
 
@@ -92,22 +90,23 @@ def _motion_inputs(rng: Random) -> dict[str, NDArray]:
 # ---- equation (4) ----
 
 
-def _weights(inputs: Inputs, settings: Settings) -> NDArray:
-    return matern_weights(inputs["omega"].astype(np.float64), settings["correlation_length"])
+def _weights(module: Any, inputs: Inputs, settings: Settings, saved: Any = None) -> Found:
+    return {"rho": module.matern_weights(inputs["omega"].astype(np.float64), settings["correlation_length"])}
 
 
-def _matern(inputs: Inputs, settings: Settings) -> tuple[Found, MaternSaved]:
-    penalty, saved = matern_penalty_forward(inputs["motion_coefficients"], _weights(inputs, settings))
+def _matern(module: Any, inputs: Inputs, settings: Settings) -> tuple[Found, Any]:
+    rho = _weights(module, inputs, settings)["rho"]
+    penalty, saved = module.matern_penalty_forward(inputs["motion_coefficients"], rho)
     return {"penalty": penalty}, saved
 
 
-def _matern_reverse(cotangents: Inputs, saved: MaternSaved) -> Found:
-    return {"d_motion_coefficients": matern_penalty_reverse(float(cotangents["penalty"]), saved)}
+def _matern_reverse(module: Any, cotangents: Inputs, saved: Any) -> Found:
+    return {"d_motion_coefficients": module.matern_penalty_reverse(float(cotangents["penalty"]), saved)}
 
 
 def _matern_inputs(rng: Random) -> dict[str, NDArray]:
     # rho spans five decades; this scale gives all atoms equal weight, so that none is lost in the rounding of another
-    rho = matern_weights(frequencies(FREQUENCIES, 1.0, 16.0), LENGTH)
+    rho = matern.matern_weights(frequencies(FREQUENCIES, 1.0, 16.0), LENGTH)
     scale = 0.5 / np.sqrt(np.tile(rho, 2))[:, None]
     return {"motion_coefficients": scale * rng.normal(0.0, 1.0, (3, 2 * FREQUENCIES, GAUSSIANS))}
 
@@ -118,7 +117,7 @@ STAGES = [
         equation="1",
         text="log-spaced frequencies",
         function="endotsr.equations.dictionary.frequencies",
-        forward=_frequencies,
+        forward=partial(_frequencies, dictionary),
     ),
     PlainPair(dictionary_forward, dictionary_reverse, "t omega", "phi").stage(
         "dictionary",
@@ -131,9 +130,9 @@ STAGES = [
         equation="1b",
         text="statistics over the training stamps and normalised atoms",
         function="endotsr.equations.dictionary.normalise_forward",
-        forward=_atoms,
-        reverse=_atoms_reverse,
-        extra=_statistics,
+        forward=partial(_atoms, dictionary),
+        reverse=partial(_atoms_reverse, dictionary),
+        extra=partial(_statistics, dictionary),
         variants=(Variant("normalise", _atoms_inputs, fixed=_stamps),),
     ),
     PlainPair(appearance_forward, appearance_reverse, "appearance_coefficients phi_bar beta", "residual").stage(
@@ -160,9 +159,9 @@ STAGES = [
         equation="4",
         text="Matern weights and penalty",
         function="endotsr.equations.matern.matern_penalty_forward",
-        forward=_matern,
-        reverse=_matern_reverse,
-        extra=lambda inputs, settings, saved: {"rho": _weights(inputs, settings)},
+        forward=partial(_matern, matern),
+        reverse=partial(_matern_reverse, matern),
+        extra=partial(_weights, matern),
         variants=(
             Variant(
                 "matern_penalty",

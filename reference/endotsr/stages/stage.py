@@ -55,7 +55,8 @@ class Stage(NamedTuple):
     equation  label of the specification ("1" ... "7" for the paper, "B..." for the base model); "" = none
     text      what it computes, in a few words
     function  dotted name of the forward function of the package
-    forward   (inputs, settings) -> (outputs that can be differentiated, saved)
+    forward   (inputs, settings) -> (outputs that can be differentiated, saved); as a `partial` on the module whose
+              functions it calls, that of the definition can take its place
     reverse   (cotangents by output name, saved) -> gradients, named `d_` and the input; None = not differentiated
     extra     (inputs, settings, saved) -> further outputs, which are not differentiated
     trace     (inputs, settings, saved) -> the discrete decisions of the forward pass (order, contributors, clamps,

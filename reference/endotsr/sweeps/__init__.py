@@ -3,9 +3,9 @@
 spec       a SPEC.toml, checked                 jobs      the runs of a spec, and what their folders say
 execute    one run: trained, continued, measured       capacity  workers, threads and memory of this machine
 local      the runs on a pool of processes      cluster   the same runs on an existing Dask cluster
-sweep      both, resumable run by run           results   the table of the runs as JSON, CSV and Markdown
+place      one of the two, as a command asks    sweep     all of it, resumable run by run
+results    the table of the runs as JSON, CSV and Markdown
 ablation   the configurations of the paper's claims, and paired differences with intervals
-figures    those differences as a picture       cost      how long a sweep takes on how many workers
 
 A run folder is the only record of a run: what is finished is read from there, so that a killed sweep loses nothing.
 """

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.evaluation.compare import CONFIDENCE, RESAMPLES
+from endotsr.evaluation.compare import CONFIDENCE, bootstrapped
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sweeps.execute import FINISHED
 from endotsr.sweeps.row import Level, RunRow
@@ -175,7 +175,10 @@ def estimate(pairs: list[RunPair], seed: int = 0) -> Estimate:
         groups.setdefault(pair.sequence, []).append(pair.difference)
     samples = tuple(np.array(values) for values in groups.values())
     mean, median = (float(np.mean([middle(sample) for sample in samples])) for middle in (np.mean, np.median))
-    of_mean, of_median = (_bootstrap(samples, middle, seed) for middle in (np.mean, np.median))
+    known = min(map(len, samples)) >= 2
+    of_mean, of_median = (
+        bootstrapped(samples, middle, seed) if known else (None, None) for middle in (np.mean, np.median)
+    )
     return Estimate(mean, *_student(samples), *of_mean, median, *of_median, len(pairs), len(samples))
 
 
@@ -192,23 +195,6 @@ def _student(samples: tuple[FloatArray, ...]) -> Limits:
     freedom = variances.sum() ** 2 / sum(v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True))
     half = float(t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(variances.sum()) / len(samples))
     return middle - half, middle + half
-
-
-def _bootstrap(samples: tuple[FloatArray, ...], middle: Any, seed: int) -> Limits:
-    """Percentile bootstrap of the average over the samples of their means or medians."""
-    from scipy.stats import bootstrap
-
-    if min(map(len, samples)) < 2:
-        return None, None
-
-    def averaged(*drawn: FloatArray, axis: int = -1) -> FloatArray:
-        return np.mean([middle(sample, axis=axis) for sample in drawn], axis=0)
-
-    found = bootstrap(
-        samples, averaged, n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile", vectorized=True,
-        rng=np.random.default_rng(seed),
-    ).confidence_interval  # fmt: skip
-    return float(found.low), float(found.high)
 
 
 def levels(rows: Iterable[RunRow]) -> list[Level]:

@@ -8,11 +8,12 @@ from typing import Any, cast
 
 from endotsr.report import style
 from endotsr.report.tables import markdown
-from endotsr.runs.files import replace_file, write_json
+from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.sweeps.ablation import Increment, increments, levels
 from endotsr.sweeps.execute import FAILED, FINISHED
 from endotsr.sweeps.row import AblationRecord, IncrementRow, RunRow
+from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
 FILES = ("ablation.json", "ablation.md", "ablation.png")
@@ -60,7 +61,7 @@ def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> Ablatio
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
     text = ablation_markdown(record) + "\n"
-    replace_file(out / FILES[1], lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
+    replace_text(out / FILES[1], text)
     if record["increments"]:
         draw(record, out / FILES[2])
     return record

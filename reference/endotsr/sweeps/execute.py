@@ -16,6 +16,7 @@ from endotsr.fitting.records import LogEntry
 from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunBusy, RunFolder, create_run, open_run
 from endotsr.runs.machine import now
+from endotsr.runs.training import Observer
 from endotsr.sequences.sequence import Sequence
 from endotsr.sweeps.jobs import Job, finished_folder, measured_at_the_end, refuse_other_settings
 from endotsr.sweeps.locks import file_lock, run_lock
@@ -39,25 +40,16 @@ class Outcome(NamedTuple):
     ends_sweep: bool = False  # no other run can succeed either: the disk is full, say
 
 
-class Silent:
+class Silent(Observer):
     """An observer that says nothing, and stops the run when it is asked to."""
 
     def __init__(self, stop: Callable[[], bool] = lambda: False) -> None:
         self._stop = stop
 
-    def begin(self, state: "TrainingState") -> None:
-        """As `runs.training.Observer`."""
-
     def update(self, entry: LogEntry) -> None:
-        """As `runs.training.Observer`. Raises KeyboardInterrupt if the run is to stop."""
+        """Raises KeyboardInterrupt if the run is to stop."""
         if self._stop():
             raise KeyboardInterrupt
-
-    def say(self, message: str) -> None:
-        """As `runs.training.Observer`."""
-
-    def close(self) -> None:
-        """As `runs.training.Observer`."""
 
 
 def execute(

@@ -10,11 +10,12 @@ from typing import Any, cast
 from endotsr.errors import InputError
 from endotsr.report.spreadsheet import csv_text
 from endotsr.report.tables import markdown
-from endotsr.runs.files import read_json, replace_file, write_json
+from endotsr.runs.files import read_json, write_json
 from endotsr.runs.machine import now
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job
 from endotsr.sweeps.row import RunRow
+from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
 FILES = ("results.json", "results.csv", "results.md")
@@ -92,9 +93,7 @@ def write_results(out: Path, rows: list[RunRow]) -> None:
     """results.json, results.csv and results.md, each replaced whole. Raises OSError."""
     write_json(out / FILES[0], {"format": FORMAT, "date": now(), "rows": rows})
     for name, text in zip(FILES[1:], (results_csv(rows), results_markdown(rows) + "\n"), strict=True):
-        replace_file(
-            out / name, lambda temporary, text=text: temporary.write_text(text, encoding="utf-8", newline="\n")
-        )
+        replace_text(out / name, text)
 
 
 def results_csv(rows: list[RunRow]) -> str:

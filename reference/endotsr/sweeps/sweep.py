@@ -72,7 +72,8 @@ class Inputs:
         return self._sizes[job.input_key]
 
 
-Outcomes = Callable[[list[Job], Inputs], Generator[Outcome | None, None, None]]
+Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
+"""Makes runs, anywhere: their outcomes come in any order, None when there is none."""
 
 
 class SweepPlan(NamedTuple):
@@ -114,7 +115,7 @@ def run_sweep(
 ) -> Rows:
     """Make every run that is not finished; the table is written before the first and after each of them.
 
-    outcomes   makes the runs that are left, anywhere; its outcomes come in any order, None when there is none
+    outcomes   makes the runs that are left
     on_rows    called with the rows after each run
     Raises:    InputError for what cannot be used, for a sweep that is running already, and for a full disk;
                KeyboardInterrupt with a line that says how to continue.
@@ -130,35 +131,38 @@ def run_sweep(
         on_rows(list(rows.values()))
         for name, reason in plan.failed.items():
             reporter.say(f"failed before: {name}: {reason}")
+        jobs = {job.name: job for job in plan.left}
+        advice = lambda: f"{_count(rows)} runs are finished; the same command continues"
         try:
-            with contextlib.closing(_made(plan, outcomes, inputs, reporter, watch)) as made:
-                for job in made:
+            with contextlib.closing(as_they_end(plan.left, outcomes, reporter, watch, advice)) as made:
+                for outcome in made:
+                    job = jobs[outcome.name]
+                    rows[job.name] = finished_row(job) if outcome.status == FINISHED else open_row(job, outcome)
                     write_results(out, list(rows.values()))
                     on_rows(list(rows.values()))
                     reporter.say(_line(rows, job))
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"{_count(rows)} runs are finished; the same command continues") from None
+            raise KeyboardInterrupt(advice()) from None
         return list(rows.values())
 
 
-def _made(
-    plan: SweepPlan, outcomes: Outcomes, inputs: Inputs, reporter: Reporter, watch: "Watch"
-) -> Generator[Job, None, None]:
-    """The jobs as they end, with their rows replaced and the progress shown; closed, it ends what still runs."""
-    if not plan.left:
+def as_they_end(
+    jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: "Watch", advice: Callable[[], str]
+) -> Generator[Outcome, None, None]:
+    """Outcomes as they come, with the progress shown; closed, it ends what still runs.
+
+    Raises: InputError with `advice` for an outcome after which no other run can succeed.
+    """
+    if not jobs:
         return
-    jobs = {job.name: job for job in plan.left}
-    with contextlib.closing(outcomes(plan.left, inputs)) as found:
+    with contextlib.closing(outcomes(jobs)) as found:
         for outcome in found:
             reporter.step(watch.progress())
             if outcome is None:
                 continue
             if outcome.ends_sweep:
-                raise InputError(f"{outcome.reason}; {_count(plan.rows)} runs are finished; the same command continues")
-            job = jobs[outcome.name]
-            finished = outcome.status == FINISHED
-            plan.rows[job.name] = finished_row(job) if finished else open_row(job, outcome)
-            yield job
+                raise InputError(f"{outcome.reason}; {advice()}")
+            yield outcome
     reporter.step(watch.progress())
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from endotsr.config import DEMO, ModelConfig, with_iterations
 from endotsr.scene.gaussians import Gaussians, arrays
-from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera, scale_camera
 
 SIMULATED_WIDTH, SIMULATED_HEIGHT = 128, 96
@@ -92,21 +91,15 @@ def simulated_scene(
 
 def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
     """The latest checkpoint of a run at its middle held-out frame. Raises InputError for a run that has none."""
-    from endotsr.errors import InputError
     from endotsr.fitting.model import corrected_cameras
     from endotsr.runs.folder import open_run
     from endotsr.runs.model import load_model
-    from endotsr.runs.sources import load_run_sequence
 
     folder = open_run(path)
     model = load_model(folder)
     record = folder.sequence_record()
     cameras = corrected_cameras(model.frames, record.frame_cameras, record.times)
     frame = record.test_index[len(record.test_index) // 2]
-    try:
-        noise = sensor_noise(load_run_sequence(folder))
-    except InputError:  # the pictures are not available: the noise is left out
-        noise = None
     return StudyScene(
         Path(path).resolve().name,
         f"run after {model.iteration} iterations, held-out frame {frame}",
@@ -116,30 +109,13 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
         record.times[frame],
         scaled(cameras[frame], scale),
         model.config.raster.near,
-        noise,
+        None,
     )
 
 
 def scaled(camera: Camera, scale: float) -> Camera:
     """The camera with a picture `scale` times as wide and high, in whole pixels."""
     return scale_camera(camera, max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
-
-
-def sensor_noise(sequence: Sequence) -> float | None:
-    """Standard deviation of the noise, display units: median absolute second difference in time over tissue pixels,
-    scaled to a normal distribution. None without three frames or without tissue.
-
-    Motion adds to it, so it is an upper bound on the noise of a moving scene.
-    """
-    found = []
-    for i in range(1, sequence.count - 1):
-        a, b, c = (sequence.images[j].astype(np.int32) for j in (i - 1, i, i + 1))
-        seen = sequence.masks[i - 1] & sequence.masks[i] & sequence.masks[i + 1]
-        if seen.any():
-            found.append(np.abs(a - 2 * b + c)[:, seen].ravel())
-    if not found:
-        return None
-    return float(np.median(np.concatenate(found)) / (0.6745 * np.sqrt(6.0)) / 255.0)
 
 
 def in_precision(gaussians: Gaussians, dtype: str) -> Gaussians:

@@ -5,7 +5,6 @@ The result is one JSON-able dictionary, `tradeoff.json`; `text` and `budget` rea
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -60,7 +59,7 @@ def run_study(
     *,
     repeats: int = REPEATS,
     plan: NamedSettings | None = None,
-    images: Path | None = None,
+    keep: Callable[[str, RenderedFrame], object] = lambda file, found: None,
     begin: Callable[[int], None] = lambda steps: None,
     step: Progress = lambda steps: None,
 ) -> dict[str, Any]:
@@ -68,7 +67,7 @@ def run_study(
 
     repeats   timed frames of every setting, after one that warms up
     plan      the settings; None = presets and joint sweep
-    images    folder to keep the image and the gradients of every setting in, or None
+    keep      is called with image and gradients of every setting, under the `file` of its point or "reference"
     begin     is called once with the number of steps, `step` with the number of completed ones
     returns   tradeoff.json without date and machine (`described` adds them)
     """
@@ -77,15 +76,13 @@ def run_study(
     aim = reference_setting(scene)
     reference, reference_visits = frame(prepare(scene, aim))
     step(1)
-    if images is not None:
-        _keep(images, "reference", reference)
+    keep("reference", reference)
     prepared = [prepare(scene, setting) for setting in plan.names]
     points = []
     for number, (ready, (setting, name)) in enumerate(zip(prepared, plan.names.items())):
         found, visits = (reference, reference_visits) if setting == aim else frame(ready)
         points.append(_point(name, number, ready, found, reference, visits))
-        if images is not None:
-            _keep(images, points[-1]["file"], found)
+        keep(points[-1]["file"], found)
         step(1)
     for point, times in zip(points, _timed(prepared, repeats, step), strict=True):
         point["forward"], point["both"] = (_spread(column) for column in times.T)
@@ -125,11 +122,6 @@ def setting_dict(setting: Setting) -> dict[str, Any]:
     """A setting as plain data, without its kernels."""
     raster = setting.raster._asdict() | {"deviations": setting.raster.deviations._asdict()}
     return {name: value for name, value in setting._asdict().items() if name != "kernels"} | {"raster": raster}
-
-
-def _keep(folder: Path, name: str, found: RenderedFrame) -> None:
-    np.save(folder / f"{name}.npy", found.colour)
-    np.savez(folder / f"{name}_gradients.npz", **found.gradients)  # type: ignore[arg-type]
 
 
 def _timed(prepared: list[Prepared], repeats: int, step: Progress) -> NDArray[np.float64]:

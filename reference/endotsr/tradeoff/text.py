@@ -1,4 +1,4 @@
-"""The results in `tradeoff.json` as three sentences of advice, and as rows of a table."""
+"""The results in `tradeoff.json` as rows of a table, and numbers in words."""
 
 from typing import Any
 
@@ -10,75 +10,9 @@ def levels(error: float) -> str:
     return f"{error * LEVELS:.2g}/255"
 
 
-def small(number: float) -> str:
-    """A cutoff or a stop: 1/255, 1/1024, 1e-4."""
-    return f"1/{round(1 / number)}" if number > 5e-4 else f"{number:.0e}".replace("e-0", "e-")
-
-
 def milliseconds(seconds: float) -> str:
     """A time in milliseconds as text."""
     return f"{seconds * 1e3:.3g} ms"
-
-
-def advice(result: dict[str, Any]) -> list[str]:
-    """Three sentences, each with the figures of this measurement."""
-    by_name = {p["name"]: p for p in result["points"]}
-    paper = by_name[result["presets"]["paper"]]
-    chosen = eight_bit_setting(result)
-    sentences = [
-        f"For pictures and for training take `paper`: it errs by {levels(paper['error']['rms'])} on average and by "
-        f"{levels(paper['error']['max'])} at the worst pixel{_against_noise(paper, result)}."
-    ]
-    if chosen is not None:
-        raster = chosen["setting"]["raster"]
-        sentences.append(
-            f"For an image that is right to the last of 8 bits, lower the cutoff to {small(raster['alpha_cutoff'])} "
-            f"and the stop to {small(raster['transmittance_stop'])}, in float32: "
-            f"{chosen['visits'] / paper['visits']:.1f} times the visits of `paper`, and a largest error of "
-            f"{levels(chosen['error']['max'])}."
-        )
-    if result["joint"]:
-        sentences.append(
-            f"Below a largest error of {levels(float32_floor(result))} float32 ends and float64 begins, whose error "
-            f"falls with the cutoff, here at most {error_over_cutoff(result):.1f} times it; `exact` is for certifying, "
-            "never for work."
-        )
-    return sentences
-
-
-def eight_bit_setting(result: dict[str, Any]) -> dict[str, Any] | None:
-    """The cheapest float32 setting of the sweep whose largest error is below half a step of 8 bit."""
-    kept = [p for p in _joint(result, "float32") if p["error"]["max"] <= result["lines"]["eight_bit"]]
-    return min(kept, key=lambda p: (p["visits"], p["error"]["max"]), default=None)
-
-
-def error_over_cutoff(result: dict[str, Any]) -> float:
-    """Largest error over the cutoff, in float64, where the cutoff decides: at the tightest stop, below it."""
-    rasters = [(p["error"]["max"], p["setting"]["raster"]) for p in _joint(result, "float64")]
-    ratios = [
-        error / raster["alpha_cutoff"]
-        for error, raster in rasters
-        if raster["transmittance_stop"] <= 1e-6 and raster["alpha_cutoff"] > raster["transmittance_stop"]
-    ]
-    return max(ratios, default=float("nan"))
-
-
-def float32_floor(result: dict[str, Any]) -> float:
-    """The smallest largest error of the sweep in float32."""
-    return min((p["error"]["max"] for p in _joint(result, "float32")), default=float("nan"))
-
-
-def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:
-    noise = result["lines"]["sensor_noise"]
-    if noise is None:
-        return ""
-    words = "below" if point["error"]["rms"] < noise else "above"
-    return f", its average {words} the sensor noise of {levels(noise)}"
-
-
-def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:
-    names = set(result["joint"])
-    return [p for p in result["points"] if p["name"] in names and p["setting"]["precision"] == precision]
 
 
 def front_rows(result: dict[str, Any], cost: str = "forward") -> list[list[str]]:

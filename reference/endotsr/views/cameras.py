@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
+from endotsr.sequences.between import camera_between
+from endotsr.sequences.record import RecordedCamera
+from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.splatting.camera import Camera
-from endotsr.untrusted.json import read_json
+from endotsr.untrusted.json import read_json, typed
 
 TURNING = ("orbit", "sway")
 PATHS = ("observed", *TURNING)
-ORTHONORMAL = 1e-3  # largest entry of R R^T - I that still counts as the rounding of a written rotation
 LARGEST_SIDE = 16384  # pixels of a rendered picture
 
 
@@ -93,21 +94,11 @@ def read_cameras(file: Path, like: Camera) -> list[Camera]:
 def _camera(entry: Any, like: Camera, where: str) -> Camera:
     if not isinstance(entry, dict):
         raise InputError(f"{where}: {type(entry).__name__}; allowed: an object with rotation and translation")
-    unknown = [key for key in entry if key not in Camera._fields]
-    if unknown:
-        raise InputError(f"{where}: unknown key {unknown[0]}; allowed: {', '.join(Camera._fields)}")
-    rotation = _numbers(entry, "rotation", (3, 3), where)
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(rotation) < 0:
-        raise InputError(f"{where}: rotation is no rotation matrix; allowed: orthonormal rows, determinant 1")
-    named = {key: float(_numbers(entry, key, (), where)) for key in ("fx", "fy", "cx", "cy") if key in entry}
-    for key in ("fx", "fy"):
-        if named.get(key, 1.0) <= 0:
-            raise InputError(f"{where}: {key} = {named[key]:g} is not allowed; allowed: a number > 0")
+    lens = {key: getattr(like, key) for key in ("fx", "fy", "cx", "cy", "width", "height")}
+    found = typed(lens | entry, RecordedCamera, where).camera
     for key in ("width", "height"):
-        if key in entry:
-            checked_side(entry[key], f"{where}: {key}")
-            named[key] = entry[key]
-    return like._replace(rotation=rotation, translation=_numbers(entry, "translation", (3,), where), **named)
+        checked_side(getattr(found, key), f"{where}: {key}")
+    return found._replace(rotation=checked_rotation(found.rotation, f"{where}: rotation"))
 
 
 def checked_side(side: Any, where: str) -> None:
@@ -116,39 +107,14 @@ def checked_side(side: Any, where: str) -> None:
         raise InputError(f"{where} = {side!r} is not allowed; allowed: an integer from 1 to {LARGEST_SIDE}")
 
 
-def _numbers(entry: dict[str, Any], key: str, shape: tuple[int, ...], where: str) -> NDArray[np.float64]:
-    size = "x".join(map(str, shape)) or "one"
-    if key not in entry:
-        raise InputError(f"{where}: {key} is missing; allowed: {size} number{'s' if shape else ''}")
-    try:
-        found = np.array(entry[key], np.float64)
-    except (TypeError, ValueError):
-        found = np.array(np.nan)
-    if found.shape != shape or not np.isfinite(found).all():
-        raise InputError(f"{where}: {key} = {entry[key]!r} is not allowed; allowed: {size} finite number(s)")
-    return found
-
-
 def along(cameras: list[Camera], count: int) -> list[Camera]:
     """`count` cameras along the given ones, the first and the last included; as many as given are those given.
 
-    Positions of the optical centre and intrinsics are interpolated linearly, rotations on the sphere (slerp). The size
-    is that of the first camera.
+    Between two of them it is `camera_between`; the size is that of the first camera.
     """
     if len(cameras) == count:
         return list(cameras)
-    if len(cameras) == 1:
-        return cameras * count
-    from scipy.spatial.transform import Rotation, Slerp
-
-    keys, wanted = np.linspace(0, 1, len(cameras)), np.linspace(0, 1, count) if count > 1 else np.zeros(1)
-    rotations = Slerp(keys, Rotation.from_matrix([c.rotation for c in cameras]))(wanted).as_matrix()
-    centres = np.array([-np.asarray(c.rotation).T @ c.translation for c in cameras])
-    lenses = np.array([(c.fx, c.fy, c.cx, c.cy) for c in cameras])
-    centre = np.stack([np.interp(wanted, keys, column) for column in centres.T], axis=1)
-    lens = np.stack([np.interp(wanted, keys, column) for column in lenses.T], axis=1)
-    like = cameras[0]
-    return [
-        like._replace(rotation=r, translation=-r @ o, fx=float(fx), fy=float(fy), cx=float(cx), cy=float(cy))
-        for r, o, (fx, fy, cx, cy) in zip(rotations, centre, lens)
-    ]
+    last, size = len(cameras) - 1, {"width": cameras[0].width, "height": cameras[0].height}
+    places = np.linspace(0, last, count) if count > 1 else [0.0]
+    pairs = [(k := min(int(place), max(last - 1, 0)), min(k + 1, last), place - k) for place in places]
+    return [camera_between(cameras[a], cameras[b], fraction)._replace(**size) for a, b, fraction in pairs]

@@ -12,8 +12,8 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.report.figures import ByteImage
-from endotsr.runs.files import replace_file
 from endotsr.sequences.record import UNKNOWN_RATE
+from endotsr.untrusted.writing import replace_file
 
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256

@@ -19,9 +19,9 @@ from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.scene import MovingScene
 from endotsr.fitting.model import raster_settings
 from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode_transparent
-from endotsr.runs.files import replace_file
 from endotsr.sequences.record import SequenceRecord
 from endotsr.sequences.sequence import Sequence
+from endotsr.untrusted.writing import replace_file
 from endotsr.views.cameras import pivot_depth_of
 from endotsr.views.panels import ERROR_SCALE
 from endotsr.views.trajectories import Trajectories, header, key_times, packed, trajectories

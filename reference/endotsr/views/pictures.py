@@ -19,12 +19,13 @@ from endotsr.export.times import chosen_times
 from endotsr.opencv import write_png
 from endotsr.report.figures import ByteImage
 from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
-from endotsr.runs.files import refuse_unwritable, replacing_folder, write_json
+from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import refuse_existing
 from endotsr.runs.sources import load_run_sequence
 from endotsr.sequences.sequence import Frame, Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
+from endotsr.untrusted.writing import replacing_folder
 from endotsr.views.cameras import TURNING, pivot_depth_of
 from endotsr.views.film import check_film, film_rate, write_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side

@@ -7,7 +7,7 @@ whose neighbour has failed starts cold. Finished windows are kept, and one that 
 """
 
 import contextlib
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,16 @@ import msgspec
 
 from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations
 from endotsr.errors import InputError
-from endotsr.runs.files import replacing_folder
 from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
+from endotsr.sweeps.capacity import Size
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job, finished_folder
 from endotsr.sweeps.locks import file_lock
-from endotsr.sweeps.sweep import Reporter, Watch
+from endotsr.sweeps.sweep import Outcomes, Reporter, Watch, as_they_end
+from endotsr.untrusted.writing import replacing_folder
 from endotsr.windows.carry import CarriedStart
 from endotsr.windows.plan import Wanted, check_wanted, planned_windows
 from endotsr.windows.record import FOLDER, Window, WindowsRecord, read_record, write_record
@@ -33,7 +34,6 @@ LOCK = "windows.lock"
 SETTINGS = "config.toml"
 VISITS = 36  # least iterations of a cold window per training frame, unless the length is given
 WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
-Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
 
 
 def plan_recording(
@@ -93,7 +93,7 @@ def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outc
 
     The job of a warm window is made when its neighbour is trained, whose Gaussians are the most that it may hold.
 
-    outcomes   makes runs, anywhere; its outcomes come in any order, None when there is none
+    outcomes   makes runs
     Raises:    InputError for a folder that cannot be used, one that is trained already, and a full disk;
                KeyboardInterrupt with a line that says how to continue.
     """
@@ -172,15 +172,15 @@ def no_larger(config: Config, gaussians: int | None) -> Config:
     return msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=max(1, gaussians)))
 
 
-def size_of(job: Job) -> tuple[int, int, int]:
-    """Frames, width and height of a window, as far as memory depends on them; the folder's first picture is read."""
+def size_of(job: Job) -> Size:
+    """The size of a window; the folder's first picture is read."""
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.source_options import SourceOptions
 
     first, end, step = (int(word) for word in job.config.sequence.frames.split(":"))
     lens, scale = open_recording(Path(job.source), SourceOptions()).lens, job.config.sequence.scale
     assert lens is not None
-    return len(range(first, end, step)), round(lens.width * scale), round(lens.height * scale)
+    return Size(len(range(first, end, step)), round(lens.width * scale), round(lens.height * scale))
 
 
 def frame_range(selected: str, window: Window) -> str:
@@ -215,15 +215,9 @@ def _made(jobs: list[Job], outcomes: Outcomes, reporter: Reporter, watch: Watch,
             left.append(job)
         else:
             found[job.name] = Outcome(job.name, FINISHED)
-    if not left:
-        return
-    with contextlib.closing(outcomes(left)) as made:
+    advice = lambda: "the same command with --resume continues"
+    with contextlib.closing(as_they_end(left, outcomes, reporter, watch, advice)) as made:
         for outcome in made:
-            reporter.step(watch.progress())
-            if outcome is None:
-                continue
-            if outcome.ends_sweep:
-                raise InputError(f"{outcome.reason}; the same command with --resume continues")
             found[outcome.name] = outcome
             reporter.say(_line(next(job for job in left if job.name == outcome.name), outcome))
     for job in left:  # a pool that was stopped names no outcome

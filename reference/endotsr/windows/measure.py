@@ -19,7 +19,14 @@ from typing import Any
 import numpy as np
 
 from endotsr.evaluation.baselines import BASELINES, unit_image
-from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model, labelled, measured_rows
+from endotsr.evaluation.evaluate import (
+    EVERY_TRAINING_FRAME,
+    FORMAT,
+    difference,
+    evaluate_model,
+    labelled,
+    measured_rows,
+)
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.records import EvaluationRecord, FramesMeasured
 from endotsr.kernels.arrays import FloatArray
@@ -53,7 +60,6 @@ def measure_windows(
     ]
     metrics["left_out"] = [{"first": g.first, "end": g.end, "reason": g.reason} for g in scene.plan.left_out]
     metrics["seams"] = _seams(scene, frames) if seams else None
-    metrics["published"] = []
     return metrics
 
 
@@ -96,10 +102,6 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
         name: labelled(label, _joined_rows([part["baselines"][name] for part in parts]))
         for name, (label, _) in BASELINES.items()
     }
-    gap = {
-        key: None if value is None or (other := held_out["mean"].get(key)) is None else value - other
-        for key, value in training["mean"].items()
-    }
     return {
         "format": FORMAT,
         "frames": {
@@ -111,7 +113,7 @@ def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
         },
         "held_out": held_out,
         "training": training,
-        "temporal_gap": gap,
+        "temporal_gap": difference(training["mean"], held_out["mean"]),
         "baselines": baselines,
         "lpips_reason": parts[0]["lpips_reason"],
         "not_finite": sum(part["not_finite"] for part in parts),

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.runs.files import replace_file, replacing_folder
 from endotsr.sequences.sequence import Sequence
 from endotsr.untrusted.names import plain_line
+from endotsr.untrusted.writing import replace_file, replacing_folder
 from endotsr.views.page import (
     SECONDS,
     about_frames,

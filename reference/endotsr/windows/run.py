@@ -3,15 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from endotsr.errors import InputError
-from endotsr.export.scene import COMPONENTS
 from endotsr.kernels.arrays import FloatArray
 from endotsr.runs.folder import RunFolder
-from endotsr.sequences.record import SequenceRecord, nearest_frame
+from endotsr.sequences.record import SequenceRecord
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.windows.scene import WindowedScene, WindowFrames, open_windows
@@ -52,20 +49,7 @@ class WindowedRun:
         In an overlap the renders of both windows are blended, with weights linear in time.
         Raises: InputError for a time that no window shows, and for a frame or component that does not exist.
         """
-        if not 0.0 <= time <= 1.0:
-            raise InputError(f"render: time = {time!r} is not allowed; allowed: a number in [0, 1]")
-        for name in without:
-            if name not in COMPONENTS:
-                raise InputError(f"render: without = {name!r} is not allowed; allowed: {', '.join(COMPONENTS)}")
-        if not isinstance(camera, Camera):
-            place = nearest_frame(self.sequence_record.times, time) if camera is None else camera
-            last = len(self.scene.frames) - 1
-            if not isinstance(place, Integral) or not 0 <= int(place) <= last:
-                raise InputError(
-                    f"render: camera = {camera!r} is not allowed; allowed: a Camera, or a frame from 0 to {last}"
-                )
-            camera = self.scene.cameras[int(place)]
-        return self.scene.render(float(time), camera, without)
+        return self.scene.picture(time, camera, without)
 
     def follow(self, points: FloatArray, frame: int, frames: Sequence[int]) -> FloatArray:
         """Positions (F, 3, P) of points (3, P) that are tissue at one frame, at other frames; scene units, world axes.

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from endotsr.cli.parts.shown import ShownSettings, shown_sequence
 from endotsr.errors import InputError
-from endotsr.runs.files import read_json, replace_file, write_json
+from endotsr.runs.files import read_json, write_json
+from endotsr.untrusted.writing import replace_text
 from endotsr.windows.record import is_windowed
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def compare_methods(asked: Comparison) -> None:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
         text = comparison_csv(rows)
-        replace_file(asked.csv, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
+        replace_text(asked.csv, text)
 
 
 def _named(word: str) -> tuple[str, Path]:

@@ -1,11 +1,9 @@
 """`endotsr train --windows`, and the evaluation of such a run."""
 
-from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from endotsr.cli.parts.progress import StepBar
-from endotsr.cli.sweep import Place, check_place
 from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.report.words import duration
@@ -14,8 +12,7 @@ from endotsr.runs.sources import SIMULATED
 
 if TYPE_CHECKING:
     from endotsr.evaluation.records import EvaluationRecord
-    from endotsr.sweeps.execute import Outcome
-    from endotsr.sweeps.jobs import Job
+    from endotsr.sweeps.place import Place
 
 AUTO = "auto"
 
@@ -29,13 +26,14 @@ class WindowsWanted(NamedTuple):
     windows: str  # a number of frames, or auto
     overlap: int
     chain: int
-    place: Place
+    place: "Place"
 
 
 def train_windows(asked: WindowsWanted, *, resume: bool) -> int:
     """Plan the windows, unless a run is resumed, and train them; 0, or 1 if a window failed."""
     from endotsr.sweeps.execute import FINISHED
-    from endotsr.windows.make import make_windows
+    from endotsr.sweeps.place import check_place, outcomes_at
+    from endotsr.windows.make import make_windows, size_of
     from endotsr.windows.record import read_record
 
     check_place("train", asked.place)
@@ -46,8 +44,9 @@ def train_windows(asked: WindowsWanted, *, resume: bool) -> int:
         print(f"left out: frames {gap.first}:{gap.end}: {gap.reason}")
     for window in record.windows:
         print(f"window {window.name}: frames {window.first}:{window.end}, {window.start} start, {window.begins}")
+    outcomes = lambda jobs: outcomes_at(asked.place, jobs, asked.out, size_of, what="windows")
     with StepBar("iterations") as bar:
-        found = make_windows(asked.out, lambda jobs: _outcomes(jobs, asked), bar)
+        found = make_windows(asked.out, outcomes, bar)
     return 0 if all(outcome.status == FINISHED for outcome in found) else 1
 
 
@@ -67,26 +66,6 @@ def _frames(text: str) -> int:
     if not (text.isascii() and text.isdecimal()):
         raise InputError(f"train: --windows {text!r} is not allowed; allowed: auto, or a number of frames")
     return int(text)
-
-
-def _outcomes(jobs: list["Job"], asked: WindowsWanted) -> Generator["Outcome | None", None, None]:
-    """Make the runs of one wave, here or on a cluster, whose workers read the recording themselves."""
-    from endotsr.sweeps.capacity import Size, capacity, run_bytes
-    from endotsr.sweeps.local import local_outcomes
-
-    place = asked.place
-    if place.scheduler is not None:
-        from endotsr.sweeps.cluster import cluster_outcomes
-
-        return cluster_outcomes(place.scheduler, jobs, None, asked.out, place.threads)
-    from endotsr.windows.make import size_of
-
-    memory = [run_bytes(Size(*size_of(job)), job.config) for job in jobs]
-    found = capacity(memory, workers=place.workers, threads=place.threads)
-    print(
-        f"{len(jobs)} windows, {found.workers} at a time, threads of each: {found.threads} ({found.reason})", flush=True
-    )
-    return local_outcomes(jobs, found.workers, found.threads)
 
 
 def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:

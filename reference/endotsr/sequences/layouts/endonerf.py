@@ -1,6 +1,5 @@
 """EndoNeRF folders: `images/`, `depth/`, `masks/` and `poses_bounds.npy`."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +7,14 @@ from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.endonerf import UNIT, input_hashes, read_endonerf, select_files
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.masks import tissue_masks
 from endotsr.sequences.poses import POSE_FILES, cameras_from_rows, read_pose_rows
-from endotsr.sequences.recording import CameraPose, Lens, PicturePair, Recording, colour_picture, grey_plane
+from endotsr.sequences.recording import CameraPose, Lens, Recording, colour_picture, grey_plane
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import stated_depth, stated_masks
+from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_depth, stated_masks
 
 RIGHT = "images_right"
 
@@ -37,11 +35,6 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
     if right:
         check_pairing(files.images, right)
 
-    def pictures(wanted: list[int]) -> Iterator[PicturePair]:
-        for i in wanted:
-            other = colour_picture(read_picture(right[i]), right[i]) if right else None
-            yield PicturePair(colour_picture(read_picture(files.images[i]), files.images[i]), other)
-
     def mask(i: int) -> NDArray[np.bool_]:
         plane = grey_plane(read_picture(files.masks[i]), files.masks[i])
         return tissue_masks([plane], [str(files.masks[i])], options.excluded_value)[0]
@@ -51,10 +44,9 @@ def open_endonerf(folder: Path, options: SourceOptions) -> Recording:
         layout="endonerf",
         where=folder,
         names=[file.stem for file in files.images],
-        pictures=pictures,
+        pictures=pictures_from_files(files.images, right),
         masks=stated_masks(options, files.images, width, height) or (mask if files.masks else None),
-        depth=stated_depth(options, files.images)
-        or (lambda i: depth_plane(read_plane(files.depth[i]), 1.0, files.depth[i])),
+        depth=stated_depth(options, files.images) or depth_reader([*files.depth], 1.0),
         unit=UNIT,
         lens=Lens(first.fx, first.fy, first.cx, first.cy, width, height),
         baseline=options.baseline,

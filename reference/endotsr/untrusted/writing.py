@@ -1,0 +1,67 @@
+"""Files and folders that appear whole or not at all, under temporary names that nobody can put a link at beforehand.
+
+In: a path, and what fills it. Out: the file or folder, in place of an older one.
+"""
+
+import contextlib
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from endotsr.errors import InputError
+from endotsr.untrusted.files import rename
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` fill a temporary file beside `path`, then put it in place of `path` in one step.
+
+    Raises: OSError of the file system, with `path` in place of the temporary name.
+    """
+    temporary = _beside(path)  # it keeps the ending, by which writers choose the format
+    try:
+        write(temporary)
+        rename(temporary, path)
+    except BaseException as error:
+        with contextlib.suppress(OSError):  # of a folder that is missing or is none
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (temporary, str(temporary)):
+            error.filename = str(path)
+        raise
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Replace a text file in one step. Raises OSError as `replace_file`."""
+    replace_file(path, lambda temporary: temporary.write_text(text, encoding="utf-8", newline="\n"))
+
+
+@contextlib.contextmanager
+def replacing_folder(path: Path, *, replace: bool = True) -> Iterator[Path]:
+    """A temporary folder beside `path` that is renamed to `path` after the block, or removed if the block fails.
+
+    replace   False: a folder that has appeared at `path` in the meantime is kept, and InputError raised
+
+    A folder that is replaced stays until the new one has its name.
+    """
+    if path.is_symlink():
+        raise InputError(f"{path}: is a link; allowed: a folder, or a name that is free")
+    temporary, old = _beside(path), _beside(path)
+    temporary.mkdir()
+    try:
+        yield temporary
+        if not replace and os.path.lexists(path):
+            raise InputError(f"{path}: exists already; choose another --out")
+        if path.exists():
+            rename(path, old)
+        rename(temporary, path)
+    except BaseException:
+        if old.exists() and not path.exists():
+            rename(old, path)
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".partial-{secrets.token_hex(4)}-{path.name}")
