@@ -83,9 +83,13 @@ def inner(sequence: Sequence) -> Sequence:
 
 
 def measured(
-    key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str]
+    key: str,
+    runs: dict[str, tuple[str, str, int]],
+    iterations: int,
+    clips: dict[str, str],
+    changes: dict[str, dict[str, dict[str, Any]]] = CHANGES,
 ) -> dict[str, float]:
-    """Train one run (scene, row of `CHANGES`, seed), and measure it; trajectories where their truth is known."""
+    """Train one run (scene, row of `changes`, seed), and measure it; trajectories where their truth is known."""
     import endotsr
 
     scene, label, seed = runs[key]
@@ -94,7 +98,7 @@ def measured(
         "initialisation": POINTS,
         "density": {"gradient_threshold": DEMO.density.gradient_threshold},
     }
-    for section, values in CHANGES[label].items():
+    for section, values in changes[label].items():
         sections[section] = sections.get(section, {}) | values
     config = endotsr.make_config("paper" if label == PAPER else "sharp", iterations=iterations, **sections)
     metrics = endotsr.train(scene_of(scene, clips), config, on_message=lambda text: None).evaluate()

@@ -254,16 +254,6 @@ class Config(Section, frozen=True, kw_only=True):
 
 
 PAPER = Config()
-SHARP = Config(
-    preset="sharp",
-    model=ModelConfig(initial_width=0.05),
-    loss=LossConfig(ssim_weight=0.2, lambda_lap=1.2),
-    optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),
-    density=DensityConfig(maximum=100_000),
-    initialisation=InitialisationConfig(motion="flow"),
-    training=TrainingConfig(bridge_fraction=0.7, visits_per_frame=128),
-)
-
 # Keys of earlier versions, and the values that mean what the settings mean without them.
 FORMER = {
     "initialisation": {"motion_flow": ("dis",)},
@@ -314,6 +304,17 @@ def lengthened(config: Config, training_frames: int) -> Config:
     return with_iterations(config, wanted) if wanted > config.training.iterations else with_fixed_length(config)
 
 
+SHARP = Config(
+    preset="sharp",
+    model=ModelConfig(initial_width=0.05),
+    loss=LossConfig(ssim_weight=0.7, lambda_lap=1.2),
+    optimiser=OptimiserConfig(deformation_position_factor=3.0, annealed_factor=0.05),
+    density=DensityConfig(maximum=80_000),
+    initialisation=InitialisationConfig(motion="flow"),
+    training=TrainingConfig(bridge_fraction=0.7),
+)
+SHARP = with_iterations(SHARP, 3000)
+SHARP = msgspec.structs.replace(SHARP, training=msgspec.structs.replace(SHARP.training, visits_per_frame=64))
 QUICK = with_iterations(SHARP, 1600)
 QUICK = msgspec.structs.replace(
     QUICK,
@@ -328,7 +329,7 @@ DEMO = msgspec.structs.replace(
     DEMO,
     preset="demo",
     # points and threshold suit its 160x128 pixels
-    density=msgspec.structs.replace(DEMO.density, gradient_threshold=4e-4),
+    density=msgspec.structs.replace(DEMO.density, gradient_threshold=7e-4),
     initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
 )
 PRESETS = {"paper": PAPER, "sharp": SHARP, "quick": QUICK, "demo": DEMO}

@@ -1,7 +1,7 @@
 """The length of a run is exactly what a user gives; only where nobody gives it does it follow the number of frames.
 
-Expected lengths are written out, not computed: `sharp` has 6000 iterations, or 128 for each training frame where these
-are more. 55 frames make 7040, and 47 make 6016, the least number of frames that makes a run longer.
+Expected lengths are written out, not computed: `sharp` has 3000 iterations, or 64 for each training frame where these
+are more. 55 frames make 3520, and 47 make 3008, the least number of frames that makes a run longer.
 """
 
 import msgspec
@@ -19,7 +19,7 @@ from endotsr.runs.folder import open_run
 from endotsr.sweeps.jobs import jobs_of
 from endotsr.sweeps.spec import read_spec, spec_of
 
-GIVEN = (5999, 6000, 6001, 7040)
+GIVEN = (2999, 3000, 3001, 3520)
 FRAMES = (20, 47, 55, 100)
 TINY = ("--initialisation.first-frame-points", "150", "--initialisation.other-frame-points", "40", "--threads", "1")
 
@@ -77,7 +77,7 @@ def ablated(folder, frames: int, *words: str) -> set[int]:
 
 
 @pytest.mark.parametrize(
-    "frames, length", [(20, 6000), (47, 6016), (55, 7040), (64, 8192), (65, 8192), (100, 10240), (400, 20480)]
+    "frames, length", [(20, 3000), (47, 3008), (55, 3520), (64, 4096), (65, 4096), (100, 5120), (400, 10240)]
 )
 def test_a_length_that_nobody_gives_follows_the_number_of_frames(frames, length, tmp_path):
     file = tmp_path / "mine.toml"

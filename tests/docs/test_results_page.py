@@ -5,6 +5,7 @@ from pathlib import Path
 
 import levers
 import pytest
+import similarity
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 TABLES = {"table": levers.table, "motion": levers.motion_table}
@@ -35,3 +36,8 @@ def test_differences_are_paired_by_seed():
     found = {"scenes": {"clip": runs}, "seeds": 2, "iterations": 9, "date": "-", "machine": {"processor": "x"}}
     rows = [line for line in levers.table(found).splitlines() if line.startswith("| clip")]
     assert rows == ["| clip | `sharp` | 35.00 | - |", "| clip | `paper` | -1.00 ± 0.00 | - |"]
+
+
+def test_the_table_of_weights_is_what_the_result_says():
+    found = json.loads(similarity.FILE.read_text(encoding="utf-8"))
+    assert similarity.table(found) in similarity.PAGE.read_text(encoding="utf-8")

@@ -17,8 +17,8 @@ from endotsr.fitting.trainer import training_step
 from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
 from endotsr.sequences.sequence import Sequence
 
-SHARP_LENGTH, SHARP_GAUSSIANS = 7040, 80_000  # of `sharp` on 55 training frames of 640x512
-SLOWEST, LONGEST = -1.0, 3.0  # range of x: 364 iterations, and 19 times those of x = 1
+SHARP_LENGTH, SHARP_GAUSSIANS = 3520, 80_000  # of `sharp` on 55 training frames of 640x512
+SLOWEST, LONGEST = -1.5, 5.0  # range of x: 490 iterations, and 23 times those of x = 1
 COARSE_BELOW = 0.5  # x up to which frames of half size come first
 HALVINGS = 20  # of that range
 WARM, TIMED = 4, 9  # iterations
