@@ -13,9 +13,9 @@
 # %% [markdown]
 # # 1. Time: the Fourier dictionary and its normalised atoms
 #
-# Both residuals of Endo-TSR are functions of the same $2F$ sinusoids of time. This notebook builds them and then
-# centres and scales them over the training stamps. It also shows the one case in which scaling would be wrong: an atom
-# that is zero at every stamp.
+# In a clip the light drifts, and breath and heartbeat move the tissue. Both residuals of Endo-TSR describe such changes
+# by the same $2F$ sinusoids of time. This notebook builds them, centres and scales them over the training stamps, and
+# shows the one case in which scaling would be wrong: an atom that is zero at every stamp.
 #
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
@@ -196,19 +196,33 @@ axes[2].legend(fontsize=8, loc="lower left")
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# $g_X$ always means $\partial\mathcal L/\partial X$. A step $\mathrm d\omega_f$ changes the phase by
-# $2\pi t\,\mathrm d\omega_f$. A step of the phase changes the sine by $+\cos$ and the cosine by $-\sin$:
-# $\mathrm d\phi_f = c_f\,\mathrm d(2\pi\omega_f t)$ and $\mathrm d\phi_{F+f} = -s_f\,\mathrm d(2\pi\omega_f t)$.
-# Together:
+# $g_X$ always means $\partial\mathcal L/\partial X$. A loss gives $g_\phi$ for each atom. We need gradients with
+# respect to the frequencies and to time.
+#
+# **(1.1) The phase.** Time and frequency enter an atom only through the number of turns $p_f=\omega_ft$, and
+# $\mathrm dp_f=t\,\mathrm d\omega_f+\omega_f\,\mathrm dt$.
+#
+# **(1.2) The angle.** The folding subtracts whole turns and quarter turns, which are constant between two jumps. So
+# $\mathrm d\delta=\mathrm dp_f$, and a step of $p_f$ turns the angle by $2\pi\,\mathrm dp_f$.
+#
+# **(1.3) Sine and cosine.** With $s_f$ and $c_f$ for the two atoms of a frequency,
+# $\mathrm d\phi_f=2\pi c_f\,\mathrm dp_f$ and $\mathrm d\phi_{F+f}=-2\pi s_f\,\mathrm dp_f$. One phase moves both atoms,
+# so $g_{p_f}=2\pi\,(g_{\phi_f}c_f-g_{\phi_{F+f}}s_f)$.
+#
+# **(1.4) Frequency and time.** A frequency enters its own phase only, so $g_{\omega_f}=t\,g_{p_f}$. Time enters all
+# $F$ phases, so $g_t=\sum_f\omega_f\,g_{p_f}$.
 #
 # $$
 # g_{\omega_f} = 2\pi t\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr),\qquad
 # g_t = \sum_{f=1}^{F} 2\pi\omega_f\,\bigl(g_{\phi_f}\,c_f - g_{\phi_{F+f}}\,s_f\bigr).
 # $$
 #
-# The statistics are held fixed, so normalisation only scales the gradient:
+# **(1.5) The scale.** $m_k$ and $\rho^{\mathrm{rms}}_k$ are computed once, from the training stamps, and held fixed. So
+# $\mathrm d\bar\phi_k=\mathrm d\phi_k/\rho^{\mathrm{rms}}_k$.
+#
+# **(1.6) The dead atom** is 0 at every time, so no step of $\phi_k$ changes it. Its gradient is 0.
 #
 # $$
 # g_{\phi_k} = \begin{cases} g_{\bar\phi_k}/\rho^{\mathrm{rms}}_k & \text{alive}\\ 0 & \text{dead} \end{cases}
@@ -255,7 +269,7 @@ assert all(report.passed for report in reports)
 # 1. The clip has $n$ frames at $t=k/n$, none held out. Which $n$ make the sine of 16 cycles dead? Which atoms of other
 #    frequencies can be dead for $n\ge20$?
 # 2. Write `dictionary_forward` and `dictionary_reverse`, with the folding above, and let the golden cases judge them:
-#    `--only dictionary`. The case `quarter_turns` refuses the formula as printed.
+#    `--only dictionary` ({doc}`index`). The case `quarter_turns` refuses the formula as printed.
 # 3. The cell below answers this one. The dictionary has 16 atoms. Over 24 frames with three held out there are 21
 #    stamps, which is more than 16. Are all 16 atoms linearly independent over these stamps? Are they with 32 frames,
 #    none held out? Estimate the rank of the normalised dictionary in both cases.

@@ -45,9 +45,13 @@ statistics = atom_statistics(stamps, omega)
 # \Delta h_{0,ci}(t) = \frac{\beta}{Y_{00}}\tanh x_{ci}(t),\qquad Y_{00}=\frac{1}{\sqrt{4\pi}} .
 # $$
 #
-# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$]. The residual is in units of the degree-0
-# harmonic coefficient, to which it is added. Since the colour is $Y_{00}h_0+\dots+\tfrac12$, the division by $Y_{00}$
-# makes the change of the **displayed** colour exactly $\beta\tanh x$.
+# $A$ has the index order [colour channel $c$, atom $k$, Gaussian $i$].
+#
+# **(2.1) The unit.** The residual is added to the degree-0 harmonic coefficient $h_0$, and the displayed colour is
+# $Y_{00}h_0+\dots+\tfrac12$. A displayed change of $\beta\tanh x$ therefore needs
+# $\Delta h_0=\frac{\beta}{Y_{00}}\tanh x$.
+#
+# **(2.2) The bound.** $|\tanh x|\le1$, so no coefficients change a displayed colour by more than $\beta$.
 
 
 # %% tags=["transcription"]
@@ -65,8 +69,7 @@ assert np.abs(Y00 * appearance_forward(1e6 * A, phi_bar, beta)[0]).max() <= beta
 
 # %% [markdown]
 # **Identity at the start.** $A=0$ gives a residual of exactly 0. A model in which the component has just been activated
-# renders the same image, bit by bit. The gradient with respect to $A$ is not 0 there (see below), so $A$ can be
-# trained.
+# renders the same image, bit by bit.
 
 # %%
 zero = np.zeros_like(A)
@@ -152,14 +155,26 @@ axes[2].legend(fontsize=8)
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# $\Delta h_0$ depends on $x$ through $\tanh$, so $g_x=\frac{\beta}{Y_{00}}\tanh'(x)\,g_{\Delta h_0}$. $x$ is bilinear
-# in $A$ and $\bar\phi$. Each coefficient is multiplied by exactly one atom, so $g_A=g_x\,\bar\phi$. Each atom is
-# multiplied by the coefficients of all Gaussians and channels, so $g_{\bar\phi}$ is a sum over both.
+# A loss gives $g_{\Delta h_0}$ for each channel and Gaussian. We need gradients with respect to the coefficients $A$
+# and to the atoms $\bar\phi$.
 #
-# The right panel above shows why the slope is not written as $1-\tanh^2x$. In float32 that is exactly 0 from
-# $x\approx10$ on, and a saturated residual could never change again. Hence:
+# **(2.3) The slope.** $\mathrm d\tanh x=\mathrm dx/\cosh^2x$, so
+# $g_x=\frac{\beta}{Y_{00}}\,g_{\Delta h_0}/\cosh^2x$.
+#
+# **(2.4) A slope that keeps its digits.** $1/\cosh^2x=1-\tanh^2x$. In float32 the right side is exactly 0 from
+# $x\approx10$ on (right panel above), and a saturated residual could never change again. With $e=\exp(-2|x|)$,
+# $\cosh x=(1+e)/(2\sqrt e)$, so the slope is $4e/(1+e)^2$. Nothing cancels in it and nothing overflows.
+#
+# **(2.5) One coefficient** is multiplied by one atom: $\partial x_{ci}/\partial A_{cki}=\bar\phi_k$, so
+# $g_{A_{cki}}=g_{x_{ci}}\bar\phi_k$.
+#
+# **(2.6) One atom** is multiplied by the coefficients of all Gaussians and channels, so its gradient is the sum over
+# both.
+#
+# **(2.7) At the start** $A=0$ and $x=0$, so $e=1$ and the slope is 1. The gradient with respect to $A$ is
+# $\frac{\beta}{Y_{00}}\bar\phi\,g_{\Delta h_0}$ and not 0, so the first step changes $A$.
 #
 # $$
 # g_{x_{ci}} = \frac{\beta}{Y_{00}}\,\frac{4e_{ci}}{(1+e_{ci})^2}\;g_{\Delta h_{0,ci}},\qquad

@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 4. The translation residual and its Matérn prior (component S)
 #
-# Component S adds a Fourier series to the path of each Gaussian. Sixteen free coefficients per axis can also produce
-# implausible motion between the frames. The Matérn-5/2 prior penalises fast motion.
+# Breathing and heartbeat move tissue periodically. Component S therefore adds a Fourier series to the path of each
+# Gaussian. Its sixteen free coefficients per axis can also produce implausible motion between the frames, so a
+# Matérn-5/2 prior penalises fast motion.
 #
 # The equations are {eq}`eq-3` of {doc}`/specification/03_motion` and {eq}`eq-4` of {doc}`/specification/04_matern`.
 
@@ -85,9 +86,20 @@ print(", ".join(f"{at_distance[k]:.2f} at {k:.0f} l" for k in (1, 2, 3)))
 assert round(at_distance[1], 2) == 0.52 and round(at_distance[3], 2) == 0.03
 
 # %% [markdown]
-# The penalty takes the spectral density as the prior variance of a coefficient at frequency $\omega_f$. Up to
-# constants, the negative logarithm of that prior is a sum of squares weighted by $1/S$. Scaled so that the weights have
-# mean 1, this is the equation:
+# The penalty follows from this density in four steps.
+#
+# **(4.1) The prior.** Each coefficient is an independent normal number with mean 0. Its variance is proportional to the
+# spectral density of its frequency, $S(\omega_f)$.
+#
+# **(4.2) Its negative logarithm** is, up to constants, a sum of squares, each divided by its variance. The weight of a
+# square is therefore proportional to $1/S(\omega_f)\propto\tilde\rho_f=\bigl(5/\ell^2+(2\pi\omega_f)^2\bigr)^3$.
+#
+# **(4.3) The scale of the weights** belongs to the setting $\lambda_{\mathrm{msp}}$. Dividing by the mean of
+# $\tilde\rho$ gives weights of mean 1 for every $\ell$, so $\ell$ distributes the penalty over the frequencies and
+# $\lambda_{\mathrm{msp}}$ sets its size.
+#
+# **(4.4) The mean.** The sum runs over 3 directions, $2F$ atoms and $N$ Gaussians. Division by $6NF$ makes the penalty
+# independent of the number of Gaussians, which density control changes.
 #
 # $$
 # \begin{aligned}
@@ -228,24 +240,28 @@ axes[2].legend(fontsize=8)
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# The translation is bilinear, like the argument of the colour residual: each coefficient is multiplied by one atom, and
-# each atom by all coefficients of its index.
+# A loss gives $g_{\Delta\mu}$ for each direction and Gaussian. We need gradients with respect to the coefficients $C$
+# and to the atoms $\phi$. The translation is bilinear, like the argument of the colour residual in (2.5) and (2.6).
+#
+# **(4.5) One coefficient** is multiplied by one atom, so $g_{C_{dki}}=g_{\Delta\mu_{di}}\,\phi_k$.
+#
+# **(4.6) One atom** is multiplied by the coefficients of all Gaussians and directions, so its gradient is a sum over
+# both.
 #
 # $$
 # g_{C_{dki}} = g_{\Delta\mu_{di}}\,\phi_k,\qquad
 # g_{\phi_k} = \sum_{i=1}^{N}\sum_{d=1}^{3} g_{\Delta\mu_{di}}\,C_{dki} .
 # $$
 #
-# The penalty is a weighted sum of squares: $\mathrm dC^2=2C\,\mathrm dC$, and $2/(6NF)=1/(3NF)$.
+# **(4.7) The penalty.** $\mathrm dC^2=2C\,\mathrm dC$, and $2/(6NF)=1/(3NF)$. $\rho$ depends on the settings only and
+# is held fixed.
 #
 # $$
 # g_{C_{d,f,i}} = \frac{\rho_f}{3NF}\,C_{d,f,i}\;g_{\mathcal L_{\mathrm{msp}}},\qquad
 # g_{C_{d,F+f,i}} = \frac{\rho_f}{3NF}\,C_{d,F+f,i}\;g_{\mathcal L_{\mathrm{msp}}} .
 # $$
-#
-# $\rho$ depends on the settings only and is a constant.
 
 
 # %% tags=["transcription"]

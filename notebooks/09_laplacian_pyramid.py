@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 9. The mask-propagating Laplacian pyramid (component L)
 #
-# Fine detail is compared in the bands of a pyramid. The difficulty is the instrument: a filter that reads one of its
-# pixels gives a wrong value. Component L counts a band value only if **no excluded pixel has any weight in it**.
+# In a mean over pixels, a blurred vessel counts no more than a wall that is slightly too dark. Component L therefore
+# compares fine detail by itself, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
+# of its pixels gives a wrong value. L counts a band value only if **no excluded pixel has any weight in it**.
 #
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
 
@@ -192,11 +193,25 @@ for panel in axes.flat:
 plt.show()
 
 # %% [markdown]
-# ## The reverse pass
+# ## The reverse pass, line by line
 #
-# The derivative of $|\cdot|$ is the sign $\sigma_j$, divided by the count; three levels and three channels give the
-# factor 9. The rest is linear, and the reverse of a linear map is its transpose. Each $G_j$ is used in three places: as
-# the fine image of band $j+1$, expanded in band $j$ (with a minus sign), and as the source of $G_{j+1}$:
+# A loss gives $g_{\mathcal L}$. We need the gradient with respect to the render $\hat I$.
+#
+# **(9.1) The absolute value.** $\mathrm d|x|=\operatorname{sign}(x)\,\mathrm dx$. Let $\sigma_j$ be the sign of the
+# difference of the bands. Three levels, three channels and $n_j$ values give each valid value the weight $1/(9n_j)$.
+#
+# **(9.2) A linear map.** The rest is linear. $y=Mx$ gives $g_x=M^\top g_y$, so the reverse pass applies the transposes of
+# $\mathsf D$ and $\mathsf U$.
+#
+# **(9.3) One band.** $P_j=G_{j-1}-\mathsf UG_j$. So $g_{P_j}$ is added to the gradient of $G_{j-1}$, and
+# $-\mathsf U^\top g_{P_j}$ to that of $G_j$.
+#
+# **(9.4) The next level.** $G_{j+1}=\mathsf DG_j$ adds $\mathsf D^\top g_{G_{j+1}}$ to the gradient of $G_j$.
+#
+# **(9.5) From coarse to fine.** $G_3$ occurs in $P_3$ only, so the reverse pass begins there. $G_2$ and $G_1$ collect the
+# three parts of (9.3) and (9.4). $G_0=\hat I$ is the fine image of $P_1$ and the source of $G_1$.
+#
+# **(9.6) Excluded pixels** are set to 0 before the pyramid is built. They are constants, so their gradient is 0.
 #
 # $$
 # \begin{aligned}

@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 12. The optimiser and density control
 #
-# Adam turns gradients into steps, with one rate per kind of parameter. Every hundred iterations density control adapts
-# the number of Gaussians: it adds Gaussians where the screen gradient is large and removes Gaussians whose opacity is
+# The gradients of positions, colours and coefficients differ by orders of magnitude, and the number of Gaussians that a
+# scene needs is not known in advance. Adam turns gradients of any size into steps of a known size. Every hundred
+# iterations density control adds Gaussians where the screen gradient is large and removes Gaussians whose opacity is
 # small.
 #
 # The equations are {eq}`eq-b10` of {doc}`/specification/b10_adam` and {eq}`eq-b11` of
@@ -59,6 +60,21 @@ rng = np.random.default_rng(12)
 # $$
 #
 # The constants are $\beta_1=0.9$, $\beta_2=0.999$, $\epsilon=10^{-15}$. $k$ counts the steps of one array.
+#
+# **(12.1) Two averages.** Written out from $m=0$, the recursion is
+# $m_k=(1-\beta_1)\sum_{j=1}^{k}\beta_1^{k-j}g_j$: an average of the gradients in which old ones fade. $v_k$ is the same
+# average of $g_j^2$; with $\beta_2$ they fade a hundred times more slowly.
+#
+# **(12.2) Their bias.** The weights of the sum add up to $1-\beta_1^k$ and not to 1, because the average begins with 0.
+# The division by $1-\beta_1^k$ makes it a weighted mean, and so does the division by $1-\beta_2^k$ for $v$.
+#
+# **(12.3) The first step depends on the sign only.** For $k=1$ both corrections are exact: the means are $g$ and $g^2$.
+# The step is $\eta\,g/(|g|+\epsilon)$, which is $\eta\operatorname{sign}(g)$ for a gradient of 1 as for one of
+# $10^{-10}$.
+#
+# **(12.4) A common factor cancels.** If all gradients of an array are multiplied by $c>0$, both $m$ and $\sqrt v$ have
+# the factor $c$. The steps stay the same as long as $\epsilon$ is negligible, so a factor on the whole objective
+# changes no step of Adam. It does change the statistic of density control below.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.adam_step))
@@ -85,9 +101,8 @@ for k in (1, 2, 3):
 np.testing.assert_allclose(named["theta"], mine[0], rtol=1e-12)
 
 # %% [markdown]
-# **The first step depends on the sign only.** It is $\eta\,\mathrm{sign}(g)$, for a gradient of 1 as for one of
-# $10^{-10}$. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a full step. Every sum in the package
-# therefore has a fixed order.
+# Step (12.3) has a consequence for the whole package. With $\epsilon=10^{-15}$ even rounding noise moves a parameter by a
+# full step. Every sum therefore has a fixed order. The cell checks (12.3) and (12.4).
 
 # %%
 for size in (1.0, 1e-10):
@@ -95,11 +110,22 @@ for size in (1.0, 1e-10):
     adam_step(p, np.array([size, -size]), np.zeros(2), np.zeros(2), 1, 0.01, *constants)
     np.testing.assert_allclose(p, [-0.01, 0.01], rtol=2e-5)
 
+paths = []
+for factor in (1.0, 1e3):
+    p, m, v = np.zeros(40), np.zeros(40), np.zeros(40)
+    stream = np.random.default_rng(1)
+    for k in range(1, 30):
+        adam_step(p, factor * stream.normal(size=40), m, v, k, 0.01, *constants)
+    paths.append(p)
+np.testing.assert_allclose(*paths, rtol=1e-9)
+
 # %% [markdown]
 # ## The rates
 #
-# The rates of position, deformation and residuals decay exponentially to $\varphi=0.01$ of their start. Those of the
-# residuals start at $K_s$:
+# By (12.3) the rate is the size of a step. A training needs large steps at first and small ones at the end.
+#
+# **(12.5) Exponential decay.** The rates of position, deformation and residuals fall to $\varphi=0.01$ of their start.
+# Every iteration multiplies them by the same factor, $\varphi^{1/T}$. The decay of the residuals starts at $K_s$:
 #
 # $$
 # \eta(i)=\eta_0\,\varphi^{\tau},\qquad
@@ -132,8 +158,11 @@ assert [i for i in range(1, T) if densify_now(i, PAPER)] == list(range(600, 4000
 # ## Density control
 #
 # A large gradient with respect to the screen centre of a Gaussian indicates that one Gaussian covers a region that
-# needs two. The statistic is the mean norm of this gradient, in units of normalised device coordinates, over the views
-# in which the Gaussian is visible:
+# needs two. The statistic is the mean norm of this gradient over the views in which the Gaussian is visible.
+#
+# **(12.6) The unit.** In normalised device coordinates the image reaches from $-1$ to $1$, so
+# $\mathrm du=\frac W2\,\mathrm dx$ and $\mathrm dv=\frac H2\,\mathrm dy$. By the chain rule $g_x=\frac W2g_u$ and
+# $g_y=\frac H2g_v$:
 #
 # $$
 # \bar g_i=\frac{\sum_{\text{visible}}\Bigl\|\bigl(\tfrac W2g_{u_i},\ \tfrac H2g_{v_i}\bigr)\Bigr\|_2}{\sum_{\text{visible}}1}

@@ -24,7 +24,7 @@ def dictionary_forward(t, omega):
     """
     turns = omega * t
     quarters = np.rint(4 * turns.real)
-    angle, which = 2 * np.pi * (turns - quarters / 4), quarters.astype(int) % 4
+    angle, which = 2 * np.pi * (turns - quarters / 4), quarters.astype(int) % 4  # (1.2)
     s, c = np.sin(angle), np.cos(angle)
     phi = np.concatenate([np.choose(which, [s, c, -s, -c]), np.choose(which, [c, -s, -c, s])])
     return phi, DictionarySaved(t, omega)
@@ -34,8 +34,8 @@ def dictionary_reverse(d_phi, saved):
     """Reverse of (1): from d_phi (2F,)."""
     sine, cosine = np.split(dictionary_forward(*saved)[0], 2)
     d_sine, d_cosine = np.split(d_phi, 2)
-    d_turns = 2 * np.pi * (d_sine * cosine - d_cosine * sine)
-    return DictionaryGrads((d_turns * saved.omega).sum(), d_turns * saved.t)
+    d_turns = 2 * np.pi * (d_sine * cosine - d_cosine * sine)  # (1.2), (1.3)
+    return DictionaryGrads((d_turns * saved.omega).sum(), d_turns * saved.t)  # (1.1), (1.4)
 
 
 def atom_statistics(times, omega):
@@ -53,8 +53,8 @@ def normalise_forward(phi, statistics):
 
 
 def normalise_reverse(d_phi_bar, saved):
-    """Reverse of (1b): the statistics are constants."""
-    return d_phi_bar / np.where(saved.dead, np.inf, saved.rms)
+    """Reverse of (1b): the statistics are held fixed."""
+    return d_phi_bar / np.where(saved.dead, np.inf, saved.rms)  # (1.5), (1.6)
 
 
 def normalised_atoms(t, omega, statistics):

@@ -12,18 +12,18 @@ def matern_weights(omega, length):
 
     The kernel divides by the largest frequency first, so that no length overflows; below 1e-40 rho is 1 to rounding.
     """
-    rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3
-    return rho / rho.mean()
+    rho = (5 / max(length, 1e-40) ** 2 + (2 * np.pi * omega) ** 2) ** 3  # (4.2)
+    return rho / rho.mean()  # (4.3)
 
 
 def matern_penalty_forward(motion_coefficients, rho):
     """Equation (4), lower line: scene units squared; the two atoms of a frequency have one weight."""
     n, count = motion_coefficients.shape[2], rho.size
     squares = np.einsum("dkn,dkn->k", motion_coefficients, motion_coefficients)
-    return np.tile(rho, 2) @ squares / (6 * max(n, 1) * count), MaternSaved(motion_coefficients, rho)
+    return np.tile(rho, 2) @ squares / (6 * max(n, 1) * count), MaternSaved(motion_coefficients, rho)  # (4.4)
 
 
 def matern_penalty_reverse(d_penalty, saved):
     """Reverse of (4): d_motion_coefficients (3, 2F, N); rho is a constant."""
     c, rho = saved
-    return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)
+    return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)  # (4.7)
