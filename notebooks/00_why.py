@@ -230,8 +230,8 @@ show("motion")
 #
 # **Motion alone.** No variant of this short run follows the motion: the trajectory error is that of a model at rest.
 # S cannot help, because its learning rate is a tenth of the rate of the deformation. A nevertheless gains on the
-# training frames. It has no motion to offer, so it changes the colours of resting Gaussians until each training frame
-# looks right. The true colour change is zero.
+# training frames. It cannot move a Gaussian, so training changes the colours of resting Gaussians until each training
+# frame looks right. The true colour change is zero.
 
 # %%
 assert min(gain("light", "A")) > 0.3, "A explains light, on held-out frames too"

@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 3. The flexible deformation model (FDM)
 #
-# The base model of Endo-TSR moves, rotates and scales each Gaussian by ten functions of time. Each function is a sum of
-# $B$ time bases. Every basis has three learned numbers: a weight, a centre and a width.
+# Tissue deforms while it is filmed, so a Gaussian must move, turn and change its size over time. The base model of
+# Endo-TSR does this by ten functions of time, each a sum of $B$ time bases. Every basis has three learned numbers: a
+# weight, a centre and a width.
 #
 # The equation is {eq}`eq-b1` of {doc}`/specification/b01_deformation`.
 

@@ -129,7 +129,7 @@ np.testing.assert_allclose(penalty, text, rtol=1e-13)
 # **What does not follow.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are no uniform
 # grid of frequencies. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
 # $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is no Matérn covariance: its correlation at $\ell$ is 0.02 and not 0.52,
-# and it does not decay. What the penalty states is which of two frequencies is dearer, and by how much.
+# and it does not decay. The penalty only says which of two frequencies costs more, and by how much.
 
 # %%
 implied = lambda tau: np.sum(np.cos(2 * np.pi * omega * tau) / rho) / np.sum(1 / rho)
@@ -312,9 +312,9 @@ assert all(report.passed for report in reports)
 #    cycles?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
-# Answer. Nothing forbids it, but it costs, and the canonical position costs nothing: so
-# training leaves the offset there. A drift is drawn mostly by the lowest frequencies, whose
-# weights are 1e-5: it is thousands of times cheaper than a wiggle.
+# Answer. The penalty allows the offset at a cost, and the canonical position represents it at
+# none, so training leaves it there. The lowest frequencies represent most of a drift. Their
+# weights are 1e-5, so a drift costs thousands of times less than a wiggle.
 cost = lambda c: matern_penalty_forward(np.stack([c, 0 * c, 0 * c])[:, :, None], rho)[0]
 Phi_all = np.array([dictionary_forward(t, omega)[0] for t in np.arange(63) / 63])
 low = np.r_[:4, F : F + 4]

@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 5. Quaternions, scales and the covariance
 #
-# The shape of a Gaussian consists of three semi-axes and a rotation. Both are stored raw, so that all real numbers are
-# allowed: the quaternion may have any length, and the axes are stored as logarithms.
+# A few flat or long Gaussians cover a wall or a vessel better than many round ones. The shape of a Gaussian is three
+# semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form in which every
+# number is allowed: the quaternion may have any length, and the axes are logarithms.
 #
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 

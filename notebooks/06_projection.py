@@ -13,8 +13,9 @@
 # %% [markdown]
 # # 6. Perspective projection of a Gaussian
 #
-# The centre of a Gaussian is projected exactly. Its covariance is projected by the first-order expansion of the
-# projection at the centre (EWA). The result is an ellipse on the screen.
+# Only a linear map sends a Gaussian to a Gaussian, and perspective is not linear. The centre is therefore projected
+# exactly, and the covariance by the first-order expansion of the projection at the centre (EWA). The result is an
+# ellipse on the screen.
 #
 # The equation is {eq}`eq-b3` of {doc}`/specification/b03_projection`. The optional correction of the camera pose,
 # {eq}`eq-b16` of {doc}`/specification/b16_pose`, comes before it.

@@ -13,9 +13,10 @@
 # %% [markdown]
 # # 10. The base losses: L1, SSIM, depth and smoothness
 #
-# The base model has four loss terms: the colour of each pixel, the structure of the colours, the depth against the
-# prior depth, and smoothness where nothing is observed. The colour terms read no value under the instrument. The depth
-# term reads two maxima there, and smoothness the render.
+# A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
+# compare it with. The base model has a loss for each: the colour of each pixel (L1), the structure of the colours
+# (SSIM), the depth against the prior depth, and smoothness. The colour terms read no value under the instrument. The
+# depth term reads two maxima there, and smoothness the render.
 #
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
@@ -258,7 +259,7 @@ plt.show()
 #
 # **(10.9) Depth: the maximum.** With the pixels held fixed, $\partial/\partial m$ of the same terms is
 # $-\sum_{p'}\sigma_{p'}\hat D_{p'}/m^2$. It belongs to the pixels $\mathcal P^\star$ that hold the maximum, in equal parts.
-# The maximum $m_D$ of the prior is a constant.
+# The maximum $m_D$ of the prior is held fixed.
 #
 # $$
 # g_{\hat D_p}=\frac{g_{\mathcal L_D}}{n}\left(\frac{\sigma_p}{m}-\frac{[\,p\in\mathcal P^\star]}{|\mathcal P^\star|}\,\frac{1}{m^2}\sum_{p'}\sigma_{p'}\hat D_{p'}\right).
@@ -269,7 +270,7 @@ plt.show()
 # neighbours along an axis is minus the difference of the padded gradients along this axis.
 #
 # **(10.11) Smoothness: a pixel.** A pixel has at most four neighbours; its gradient is the sum over their pairs. The
-# weights $\nu_p\nu_{p'}$ and the edges $E$ are constants. On tissue $\bar D=0$ whatever $\hat D$ is, so the total
+# weights $\nu_p\nu_{p'}$ and the edges $E$ are held fixed. On tissue $\bar D=0$ for every $\hat D$, so the total
 # variation has no gradient there.
 #
 # $$

@@ -245,7 +245,7 @@ assert report.passed
 # %% [markdown]
 # ## Exercise
 #
-# 1. A pixel has no prior depth. Why can no Gaussian start there, and which pixels of an instrument are meant by that?
+# 1. Why can no Gaussian start at a pixel without prior depth? What follows for tissue under an instrument?
 # 2. Write `initialise` for given draws and let the golden cases judge it: `--only initialisation` ({doc}`index`). The
 #    case `one_point` has no neighbour from which a scale could be made.
 # 3. The cell below answers this one. Held-out frames contribute nothing to the initial Gaussians. How would you test

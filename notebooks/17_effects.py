@@ -54,8 +54,8 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # ## Noise first
 #
 # Every test measures in units of the noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes all slow
-# change. Of independent noise of deviation $\sigma$ it has the deviation $\sqrt{1+4+1}\,\sigma$. The median of the
-# absolute values, which is $0.6745$ deviations for a normal distribution, is not misled by a few moving edges.
+# change. Independent noise of deviation $\sigma$ gives it the deviation $\sqrt{1+4+1}\,\sigma$. The median of the
+# absolute values is $0.6745$ deviations for a normal distribution, and a few moving edges hardly change it.
 
 
 # %% tags=["transcription"]
@@ -125,7 +125,7 @@ assert (
 # %% [markdown]
 # ## A camera that moves before a scene at rest
 #
-# The whole picture then flows. In a rigid scene one number a tile explains the flow to all frames: its inverse depth
+# The whole picture then flows. In a rigid scene one number per tile explains the flow to all frames: its inverse depth
 # $\rho$. With the pose $(R_k,\mathbf t_k)$ from the reference camera to camera $k$, a point at the place $\mathbf x$ of
 # the reference is seen at the projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and
 # what is left is motion of the tissue. Depth is not needed.
@@ -172,8 +172,8 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # A clip of $n$ frames carries at most $n/2$ cycles: at equal steps, every faster sinusoid agrees with a slower one. The
 # rank of the dictionary over the stamps, centred and scaled to RMS 1, need not show this: the slower sinusoid is seldom
 # one of the eight, so that the rank is full for 20 frames and 16 cycles. The plan therefore limits three things: the
-# highest frequency, the rank, and the condition. The condition is the largest over the smallest singular value, by
-# which noise in the frames becomes noise in the coefficients. It is large for the shortest clips, and varies little
+# highest frequency, the rank, and the condition, which is the largest singular value over the smallest. It bounds how
+# much the fit amplifies noise of the frames in the coefficients. It is large for the shortest clips, and varies little
 # from 33 frames on.
 
 

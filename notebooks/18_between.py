@@ -165,7 +165,7 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 # pictures, $1/255$, is added, so that two equal pairs have $q=\frac12$ and not $0/0$.
 #
 # **(18.9) Excluded pixels.** A pixel of an instrument is no picture of tissue. Where only one of $J_0,J_1$ is tissue,
-# the target is that one. Where one of the four pictures is excluded, the pair that stayed proves nothing, and $q=0$.
+# the target is that one. Where one of the four pictures is excluded, the pair that stayed is no evidence, and $q=0$.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.motion_between))

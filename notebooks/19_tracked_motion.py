@@ -337,7 +337,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: tracks and coefficients are made before the training, and nothing of them is differentiated. From the
+# There is none: tracks and coefficients are made before the training, and neither is differentiated. From the
 # first iteration on the training moves $\mu$ and $C$ by the reverse pass of {eq}`eq-3`, which is the pair to check.
 # (19.6) is the same reverse pass with a quadratic loss at every training time, set to 0.
 

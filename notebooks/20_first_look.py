@@ -55,7 +55,7 @@ rng = np.random.default_rng(20)
 # gradient: the weights of the losses, the size of the frames, the exposure. A budget fixes the number and leaves only
 # the choice to the gradients.
 #
-# **(20.1) A fair part of the room.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. This
+# **(20.1) An equal share.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. This
 # one adds $\lceil\max(0,M-N)/r\rceil$, at the largest gradients.
 #
 # **(20.2) The budget is reached.** After a step without rounding, $M-N-(M-N)/r=(M-N)\frac{r-1}r$ are missing, and

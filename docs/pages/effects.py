@@ -51,7 +51,7 @@ SCENES = {
 
 
 def detect(seeds: int, first: int | None = None) -> dict[str, Any]:
-    """The study of the tests, with seeds that no threshold was set with."""
+    """The study of the tests, with seeds that were not used to set a threshold."""
     from effects_study import FIRST_SEED, answer_of, summary, trials, wrong
 
     chosen = range(FIRST_SEED if first is None else first, (FIRST_SEED if first is None else first) + seeds)

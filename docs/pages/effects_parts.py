@@ -42,7 +42,7 @@ def costs(result: dict[str, Any]) -> str:
         time = f"{measured['saved']:.0%}" if measured else "-"
         memory = f"{measured['memory_saved']:.0%}" if measured else "-"
         rows.append((effect, looks, component, time, memory, worth))
-    table = markdown(("Effect", "What it looks like", "Component", "Time", "Memory", "Worth it with"), rows)
+    table = markdown(("Effect", "What it looks like", "Component", "Time", "Memory", "Worth it for"), rows)
     parts = result["parts"].values()
     ratios, sizes = [x["off_over_absent"] for x in parts], {x["memory_over_absent"] for x in parts}
     equal = "the same memory" if sizes == {1.0} else "other memory"
@@ -71,7 +71,7 @@ def detections(result: dict[str, Any]) -> str:
     first = result["first_seed"]
     note = (
         f"{result['clips']} simulated clips of {result['frames']} frames, seeds {first} to "
-        f"{first + result['seeds'] - 1}, which no threshold was set with; noise of {255 * result['noise']:.1f} grey "
+        f"{first + result['seeds'] - 1}, none of which was used to set a threshold; noise of {255 * result['noise']:.1f} grey "
         f"levels ({machine(result)})."
     )
     return f"{table}\n\n{note}"
@@ -102,8 +102,8 @@ def answer(result: dict[str, Any]) -> str:
     nothing = abs(real.time) < 0.005 and abs(real.gain) < 0.005
     there = "there is nothing to save" if nothing else f"it saves {real.time:.0%} of the time ({real.gain:+.2f} dB)"
     return (
-        f"**On a still clip, `--effects auto` saves {still.time:.0%} of the time and changes the quality by "
-        f"{still.gain:+.2f} dB. On the real clip `{name}`, {there}.**"
+        f"**On a still clip, `--effects auto` saves {still.time:.0%} of the time and changes the held-out "
+        f"PSNR by {still.gain:+.2f} dB. On the real clip `{name}`, {there}.**"
     )
 
 
@@ -157,7 +157,7 @@ def training(result: dict[str, Any]) -> str:
     )
     if result["real"]:
         names = ", ".join(f"`{name}`" for name in result["real"])
-        note += f" Real, at half size with {result['real_iterations']} iterations: {names}."
+        note += f" {names} is a real clip, trained at half size with {result['real_iterations']} iterations."
     return f"{markdown(heads, rows)}\n\n{note}"
 
 

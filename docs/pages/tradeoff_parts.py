@@ -45,8 +45,8 @@ def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
     smaller = paper["error"]["max"] / chosen["error"]["max"]
     more = 100 * (_seconds(result, chosen) / _seconds(result, paper) - 1)
     return (
-        f"**An error {smaller:.0f} times smaller than that of `paper` costs {more:.0f} % more time for a frame; the "
-        f"exact picture takes {_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
+        f"**On the simulated scene {more:.0f} % more time per frame makes the largest error {smaller:.0f} times smaller "
+        f"than with `paper`; the exact picture takes {_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
         f"{_everywhere(result, others)}"
     )
 
@@ -66,8 +66,11 @@ def _everywhere(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> st
     if len(every) < 2 or not kept:
         return ""
     best = min(kept, key=lambda name: (sum(visits for _, visits in kept[name]), name))
-    listed = ", ".join(f"{scene} {100 * (r - 1):+.0f} %" for scene, (r, _) in zip(every, kept[best], strict=True))
-    return f" On all {len(every)} scenes of this page, {best} is right to the last of 8 bits; more time: {listed}."
+    listed = ", ".join(f"{100 * (r - 1):.0f} % ({scene})" for scene, (r, _) in zip(every, kept[best], strict=True))
+    return (
+        f" The setting *{best}* is right to the last of 8 bits on all {len(every)} scenes of this page. Extra time "
+        f"per frame against `paper`: {listed}."
+    )
 
 
 def _seconds(scene: dict[str, Any], point: dict[str, Any]) -> float:
@@ -82,7 +85,7 @@ def preset_lines(result: dict[str, Any]) -> list[str]:
     for name, verdict in judge_presets(result["points"], result["presets"]).items():
         better, reason = verdict["dominated_by"], verdict["reason"]
         if not better:
-            lines.append(f"`{name}`: nothing measured dominates it.")
+            lines.append(f"`{name}`: no measured setting dominates it.")
         else:
             stays = f" It is kept because it {reason}." if reason else " No reason to keep it is listed."
             lines.append(f"`{name}`: dominated by {better[0]}{_more(len(better) - 1)}.{stays}")
@@ -111,7 +114,7 @@ def scenes(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
         "`paper`: RMS",
         "`paper`: largest",
         "error over cutoff, at most",
-        "float32 ends at",
+        "smallest error of float32",
         "8-bit setting: largest",
         "its visits",
         "verdict",

@@ -1,4 +1,4 @@
-"""Three sentences of advice, each with the figures of a measurement of `endotsr tradeoff`."""
+"""Three pieces of advice, each with the figures of a measurement of `endotsr tradeoff`."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ def small(number: float) -> str:
 
 
 def advice(result: dict[str, Any]) -> list[str]:
-    """Three sentences, each with the figures of this measurement."""
+    """Three pieces, each with the figures of this measurement."""
     by_name = {p["name"]: p for p in result["points"]}
     paper = by_name[result["presets"]["paper"]]
     chosen = eight_bit_setting(result)
@@ -29,9 +29,9 @@ def advice(result: dict[str, Any]) -> list[str]:
         )
     if result["joint"]:
         sentences.append(
-            f"Below a largest error of {levels(float32_floor(result))} float32 ends and float64 begins, whose error "
-            f"falls with the cutoff, here at most {error_over_cutoff(result):.1f} times it; `exact` is for certifying, "
-            "never for work."
+            f"For a largest error below {levels(float32_floor(result))} use float64. Its error is here at most "
+            f"{error_over_cutoff(result):.1f} times the cutoff. `exact` serves as the reference and is too slow for "
+            "other work."
         )
     return sentences
 

@@ -24,12 +24,12 @@ def summary(result: dict[str, Any]) -> list[str]:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
             "Chance: each training has one seed. `float64` differs from `base` by rounding alone, and ends "
-            f"{chance:.2f} dB from it. Smaller differences mean nothing here."
+            f"{chance:.2f} dB from it. Smaller differences are noise."
         )
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
         if better:
-            lines.append(f"Faster than *{name}*, and better by more than chance: {', '.join(better)}.")
+            lines.append(f"*{name}* is slower, and worse by more than chance, than: {', '.join(better)}.")
     return lines
 
 

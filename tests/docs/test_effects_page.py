@@ -103,7 +103,7 @@ def test_a_study_goes_on_and_its_result_is_written_once(tmp_path, monkeypatch):
     assert result["first_seed"] == effects_study.FIRST_SEED and result["clips"] == len(clips)
     text = effects.fragments({"detect": result})["detections"]
     first = effects_study.FIRST_SEED
-    assert f"seeds {first} to {first}, which no threshold was set with" in text
+    assert f"seeds {first} to {first}, none of which was used to set a threshold" in text
 
 
 def test_five_of_five_has_a_lower_limit_of_55_percent():
