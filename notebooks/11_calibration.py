@@ -149,7 +149,7 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is a constant of training. The calibration itself measures
+# There is no reverse pass, because $\lambda_{\mathrm{lap}}$ is held fixed in training. The calibration itself measures
 # reverse passes, those of {doc}`09_laplacian_pyramid` and {doc}`10_base_losses`. The next cell checks them:
 
 # %%

@@ -217,7 +217,7 @@ assert losses["warm"].size == 0.4 * losses["cold"].size
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: the blend is part of no loss, and a state that is carried is a constant of the training that it starts.
+# There is none: the blend is part of no loss, and the carried state is held fixed in the training that it starts.
 # The pair to check is the motion {eq}`eq-3` whose coefficients (21.5) fits.
 
 # %%

@@ -32,7 +32,7 @@ class Undifferentiated(NamedTuple):
 UNDIFFERENTIATED = {
     "7": Undifferentiated(
         ("endotsr.equations.calibration.calibrate", "endotsr.fitting.objective.calibrate_on"),
-        "the weight is a constant of training",
+        "the weight is held fixed",
         "tests/equations/test_calibration.py",
     ),
     "b10": Undifferentiated(
@@ -52,7 +52,7 @@ UNDIFFERENTIATED = {
     ),
     "b14": Undifferentiated(
         ("endotsr.sequences.between.frame_between", "endotsr.sequences.between.motion_between"),
-        "a target is a constant of training",
+        "a target is held fixed",
         "tests/sequences/test_between.py",
         "none: dense optical flow is an estimate, and a port may take any",
     ),
@@ -64,7 +64,7 @@ UNDIFFERENTIATED = {
     ),
     "b17": Undifferentiated(
         ("endotsr.fitting.coarse_start.coarse_ends", "endotsr.sequences.smaller.halved"),
-        "the choice of the frames is a constant of training",
+        "the choice of the frames is held fixed",
         "tests/fitting/test_coarse_start.py",
         "none: it is an option of training that is not part of the paper",
     ),

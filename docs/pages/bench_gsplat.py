@@ -24,7 +24,7 @@ JACOBIAN_CLAMP = 1.3  # likewise; measured from the image border, so it equals o
 
 
 class PeerRender(NamedTuple):
-    """One view and the gradients by every array of the scene, under the scene's names and shapes."""
+    """One view and the gradients with respect to every array of the scene, under the scene's names and shapes."""
 
     colour: FloatArray  # (3, H, W)
     depth: FloatArray  # (H, W) sum of z alpha T

@@ -58,6 +58,11 @@ the form with sum and difference
 gradient by
 gradients by
 constants of the derivative
+constant of the derivative
+constant of training
+derivative by
+float32 ends and
+the rest of the house
 """.split("\n")[1:-1]
 
 

@@ -24,6 +24,6 @@ def matern_penalty_forward(motion_coefficients, rho):
 
 
 def matern_penalty_reverse(d_penalty, saved):
-    """Reverse of (4): d_motion_coefficients (3, 2F, N); rho is a constant."""
+    """Reverse of (4): d_motion_coefficients (3, 2F, N); rho is held fixed."""
     c, rho = saved
     return d_penalty * np.tile(rho, 2)[:, None] * c / (3 * max(c.shape[2], 1) * rho.size)  # (4.7)
