@@ -46,6 +46,22 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 # $\operatorname{round}(\mathrm{linspace}(0,n_{\mathrm{train}}-1,16))$. Each is rendered by the base model. Here a
 # blurred frame replaces the base render, because base renders look like blurred frames.
 #
+# **(11.1) Two gradients.** The objective contains
+# $\mathcal L_{\mathrm{rgb}}+\lambda_{\mathrm{lap}}\mathcal L_{\mathrm{lap}}$. Its gradient with respect to the render is the
+# sum of the photometric gradient and of $\lambda_{\mathrm{lap}}$ times the Laplacian gradient. Their sizes decide which
+# term changes the Gaussians more.
+#
+# **(11.2) One size per view** is the root mean square over channels and pixels, $g_{\mathrm{rgb}}(v)$ or
+# $g_{\mathrm{lap}}(v)$. Excluded pixels count in both, with the gradient 0. A weight multiplies the size: the weighted
+# Laplacian gradient has $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)$.
+#
+# **(11.3) One view** has the required ratio if $\lambda_{\mathrm{lap}}\,g_{\mathrm{lap}}(v)=r\,g_{\mathrm{rgb}}(v)$, so
+# $\lambda_{\mathrm{lap}}=r\,\big/\,\bigl(g_{\mathrm{lap}}(v)/g_{\mathrm{rgb}}(v)\bigr)$.
+#
+# **(11.4) All views** share one weight. The median of $g_{\mathrm{lap}}/g_{\mathrm{rgb}}$ replaces the ratio of one view,
+# so a few unusual views do not change the weight. For an even number of views the median is the mean of the two middle
+# ratios, and its inverse is not the median of the inverse ratios.
+#
 # $$
 # \begin{aligned}
 # g_{\bullet}(v) &= \sqrt{\frac{1}{3HW}\sum_{c,p}\left(\frac{\partial\mathcal L_{\bullet}}{\partial\hat I_{v,c,p}}\right)^{2}},\qquad
@@ -56,6 +72,13 @@ sequence = simulate(SimulatorSettings(width=96, height=72, frames=24)).sequence
 #
 # $\mathcal L_{\mathrm{rgb}}$ is the whole photometric term $(1-w)\mathcal L_1+w(1-\mathcal S)$.
 # $\mathcal L_{\mathrm{lap}}$ has weight 1.
+#
+# **(11.5) The size of the L1 gradient is known.** By (10.1) each of the $3n$ tissue values has $\pm1/(3n)$, and the
+# others have 0. The root mean square over $3HW$ values is $1/(3\sqrt{nHW})$ for every render that differs from its frame
+# at every tissue value. Only the SSIM term makes $g_{\mathrm{rgb}}$ depend on the size of the error.
+#
+# **(11.6) Views without a ratio.** A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and
+# named.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.rms))
@@ -93,9 +116,13 @@ for count in (16, 15):  # an even and an odd number of views
     np.testing.assert_allclose(calibrate(sizes[:count], r).lambda_lap, text, rtol=1e-13)
 
 # %% [markdown]
-# After calibration the Laplacian loss has the required gradient in the median view:
+# After calibration the Laplacian loss has the required gradient in the median view. The cell also checks (11.5):
 
 # %%
+l1_alone, _ = gradients(chosen[0], 1.5, 0.0)
+tissue = sequence.masks[chosen[0]]
+size = 1 / (3 * np.sqrt(tissue.sum() * tissue.size))
+np.testing.assert_allclose(rms(l1_alone), size, rtol=1e-3)  # few values are equal by chance
 force = [calibration.lambda_lap * lap / rgb for _, rgb, lap in sizes]
 np.testing.assert_allclose(np.median(force), r, rtol=1e-13)
 np.testing.assert_allclose(
@@ -162,8 +189,8 @@ assert all(report.passed for report in reports)
 # %% [markdown]
 # ## When it cannot work
 #
-# A view with $g_{\mathrm{rgb}}=0$, or with a value that is not finite, is dropped and named. If no view is left, or if
-# the median is 0, an error with the table of all views is raised. The weight is never infinite.
+# If (11.6) leaves no view, or if the median is 0, an error with the table of all views is raised. The weight is never
+# infinite.
 
 # %%
 assert (

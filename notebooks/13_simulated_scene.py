@@ -168,15 +168,30 @@ plt.show()
 # %% [markdown]
 # ## Where Gaussians start
 #
-# A pixel $(i,j)$ with depth $D$ in a training frame becomes a Gaussian at
+# The first Gaussians should show the first frame roughly, so that gradients begin near the tissue. Each pixel $(i,j)$ that
+# is drawn in a training frame, with colour and depth $D$, becomes one Gaussian.
+#
+# **(13.1) The ray.** The projection of chapter 6 has $u=f_xx/z+c_x$. A pixel is sampled at its centre, $u=i+\frac12$, and
+# its depth is $z=D$, so $x=(i+\frac12-c_x)\,D/f_x$. The same holds for $y$.
+#
+# **(13.2) Into the world.** The camera has $(x,y,z)^\top=W\mu+\mathbf d$. $W$ is a rotation, so its inverse is $W^\top$:
 #
 # $$
 # \mu=W^\top\left(\begin{bmatrix}(i+\tfrac12-c_x)\,D/f_x\\(j+\tfrac12-c_y)\,D/f_y\\D\end{bmatrix}-\mathbf d\right)
 # $$
 #
-# with the colour of the pixel, $h_0=(rgb-\tfrac12)/Y_{00}$, opacity 0.1, no rotation, and three equal log-scales
-# $\ln\sqrt{\max(\overline{d^2},10^{-7})}$, where $\overline{d^2}$ is the mean squared distance to the three nearest
-# other points.
+# **(13.3) Colour.** The harmonics above degree 0 start at 0, so the displayed colour is $rgb=Y_{00}h_0+\frac12$ and
+# $h_0=(rgb-\frac12)/Y_{00}$.
+#
+# **(13.4) Size.** All three semi-axes are the root mean square distance to the three nearest other points, so
+# neighbours overlap and leave no holes. Two points may coincide; the floor keeps the logarithm finite:
+# $s=\ln\sqrt{\max(\overline{d^2},10^{-7})}$. A sphere needs no rotation.
+#
+# **(13.5) Opacity** starts at 0.1. By (8.3) a Gaussian has a gradient only as far as light reaches it. Opaque Gaussians
+# would leave no gradient for those behind them.
+#
+# **(13.6) Motion.** The weights of the time bases start at 0 and their centres are evenly spaced: the scene is at rest.
+# By (3.1) the gradient with respect to a weight is not 0 there, so motion can be learned.
 
 
 # %% tags=["transcription"]

@@ -21,7 +21,7 @@ DEFINITION = "\n".join(file.read_text("utf-8") for file in FILES)
 NOTEBOOKS = {int(f.stem[:2]): f.read_text("utf-8") for f in sorted((ROOT / "notebooks").glob("*.py"))}
 STEP = re.compile(r"^# \*\*\((\d+)\.(\d+)\)", re.MULTILINE)
 CITATION = re.compile(r"\((\d+)\.(\d+)\)")
-DERIVED = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 18, 19, 20, 21]
+DERIVED = [*range(1, 14), *range(18, 22)]
 NO_LINE = {
     (2, 2): "says what follows from (2.1)",
     (2, 4): "of the kernel alone: the definition divides by the square of the hyperbolic cosine",
@@ -35,6 +35,8 @@ NO_LINE = {
     (8, 8): "the definition differentiates with respect to the covariance in one step",
     (10, 2): "names what depends on the render",
     (10, 3): "leads to (10.4) to (10.6)",
+    (11, 1): "states what (11.2) and (11.3) compare",
+    (11, 5): "says what (10.1) gives for a whole view",
     (12, 3): "says what (12.2) gives for the first step",
     (12, 4): "says what follows from (12.2)",
     (19, 6): "leads to (19.7)",

@@ -9,7 +9,7 @@ Calibration = namedtuple("Calibration", "lambda_lap ratios")  # The weight, and 
 
 def rms(gradient):
     """Equation (7): root mean square of a gradient image, excluded pixels included."""
-    return np.sqrt((gradient**2).mean())
+    return np.sqrt((gradient**2).mean())  # (11.2)
 
 
 def calibration_views(n_train, count):
@@ -22,7 +22,8 @@ def calibrate(views, gradient_ratio):
 
     Raises: ValueError where no view is left, or where the median is 0.
     """
-    ratios = np.array([laplacian / rgb for _, rgb, laplacian in views if rgb > 0 and np.isfinite(laplacian / rgb)])
+    sizes = [(rgb, laplacian) for _, rgb, laplacian in views if rgb > 0 and np.isfinite(laplacian / rgb)]  # (11.6)
+    ratios = np.array([laplacian / rgb for rgb, laplacian in sizes])
     if ratios.size == 0 or np.median(ratios) == 0:
         raise ValueError("calibration: no view has a ratio, or their median is 0")
-    return Calibration(gradient_ratio / np.median(ratios), ratios)
+    return Calibration(gradient_ratio / np.median(ratios), ratios)  # (11.3), (11.4)

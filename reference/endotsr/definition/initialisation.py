@@ -31,8 +31,8 @@ def lift(sequence, k, pixels):
     """World positions (3, M) and display colours (3, M) of flat pixel indices of frame k."""
     camera, (row, column) = sequence.cameras[k], np.divmod(pixels, sequence.masks.shape[2])
     z = sequence.depth[k, row, column].astype(float)
-    x, y = (column + 0.5 - camera.cx) * z / camera.fx, (row + 0.5 - camera.cy) * z / camera.fy
-    point = camera.rotation.T @ (np.array([x, y, z]) - camera.translation[:, None])
+    x, y = (column + 0.5 - camera.cx) * z / camera.fx, (row + 0.5 - camera.cy) * z / camera.fy  # (13.1)
+    point = camera.rotation.T @ (np.array([x, y, z]) - camera.translation[:, None])  # (13.2)
     return point, sequence.images[k][:, row, column] / 255
 
 
@@ -46,13 +46,14 @@ def gaussians_at(position, colour, model):
     """Gaussians at the start of training, at world positions (3, N) with display colours (3, N)."""
     count, shape = position.shape[1], (10, model.bases, position.shape[1])
     harmonics = np.zeros(((model.harmonics_degree + 1) ** 2, 3, count))
-    harmonics[0] = (colour - 0.5) / Y00
-    log_scale = np.log(np.sqrt(np.maximum(neighbour_distance(position), 1e-7)))
+    harmonics[0] = (colour - 0.5) / Y00  # (13.3)
+    log_scale = np.log(np.sqrt(np.maximum(neighbour_distance(position), 1e-7)))  # (13.4)
     quaternion = np.repeat(np.eye(4)[:, :1], count, axis=1)
-    made = Gaussians(position, quaternion, np.tile(log_scale, (3, 1)), np.full(count, np.log(0.1 / 0.9)), harmonics)
+    opacity_logit = np.full(count, np.log(0.1 / 0.9))  # (13.5)
+    made = Gaussians(position, quaternion, np.tile(log_scale, (3, 1)), opacity_logit, harmonics)
     if not model.deformation:
         return made
-    centre = np.broadcast_to(np.linspace(0, 1, model.bases)[:, None], shape)
+    centre = np.broadcast_to(np.linspace(0, 1, model.bases)[:, None], shape)  # (13.6)
     return made._replace(fdm_weight=np.zeros(shape), fdm_centre=centre, fdm_width=np.full(shape, model.initial_width))
 
 
