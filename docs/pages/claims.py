@@ -12,6 +12,11 @@ To measure, on a machine that has nothing else to do (each command continues whe
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_half --lpips LPIPS.npz --scale 0.5 \
         --iterations 1750 --splits every_second --configurations base A+S+L --no-fixed-count \
         --measures right_view --json docs/results/ablation_pulling_half.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_blocks --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --splits "blocks 2" "end 8" --configurations base A+S+L --no-fixed-count \
+        --json docs/results/ablation_pulling_half_blocks.json
+    endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_fixed --lpips LPIPS.npz --scale 0.5 \
+        --iterations 1750 --configurations A+S A+S+L --json docs/results/ablation_pulling_half_fixed.json
     endotsr ablate ../shared/data/endonerf_pulling --out runs/ablation_pulling --collect --json ...   what is finished
     endotsr ablate simulated --preset demo --out runs/ablation_simulated --json docs/results/ablation_simulated.json
     endotsr ablate simulated --preset paper --iterations 1500 --no-fixed-count --out runs/ablation_simulated_paper \
@@ -40,6 +45,8 @@ PAGE, GUIDE, RESULTS = DOCS / "claims.md", DOCS / "guides" / "sweep.md", DOCS / 
 FILES = {
     "pulling": "ablation_pulling.json",
     "pulling_half": "ablation_pulling_half.json",
+    "pulling_half_blocks": "ablation_pulling_half_blocks.json",
+    "pulling_half_fixed": "ablation_pulling_half_fixed.json",
     "simulated": "ablation_simulated.json",
     "simulated_paper": "ablation_simulated_paper.json",
 }
@@ -70,15 +77,18 @@ def read_runs(folder: Path) -> list[dict[str, Any]]:
 def parts(folder: Path = RESULTS) -> dict[str, str]:
     """Every generated part of both pages by name."""
     found, runs, cost = read(folder), read_runs(folder), folder / COST
+    half = [found[name] for name in FILES if name.startswith("pulling_half")]
     return {
-        "verdicts": claims_verdicts.verdicts(found["pulling"], found["pulling_half"], runs),
+        "verdicts": claims_verdicts.verdicts(found["pulling"], half, runs),
         "right_eye": claims_protocols.right_eye(found["pulling_half"]),
         "power": claims_power.sentences(found["pulling"]),
         "pulling": claims_parts.tables(found["pulling"]),
         "pulling_half": claims_parts.tables(found["pulling_half"]),
+        "pulling_half_blocks": claims_parts.tables(found["pulling_half_blocks"]),
+        "pulling_half_fixed": claims_parts.tables(found["pulling_half_fixed"]),
         "simulated": claims_parts.tables(found["simulated"]),
         "simulated_paper": claims_parts.tables(found["simulated_paper"]),
-        "protocols": claims_parts.protocols([found["pulling"], found["pulling_half"]], runs),
+        "protocols": claims_parts.protocols([found["pulling"], *half], runs),
         "cost": claims_parts.cost(found["pulling"], runs),
         "divided": claims_parts.divided(read_json(cost, "docs/results/sweep_cost.py") if cost.exists() else None),
     }

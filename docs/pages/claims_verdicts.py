@@ -37,7 +37,7 @@ STEPS = COMPARISONS[:3]  # of the paper's cumulative ablation
 Record = Any  # what a file of docs/results holds
 
 
-def verdicts(found: Record | None, half: Record | None, runs: list[Record]) -> str:
+def verdicts(found: Record | None, half: list[Record | None], runs: list[Record]) -> str:
     """Claim by claim: the compared configurations, what is published, verdict, number, interval."""
     rows = [_level_row(found, runs, *level) for level in LEVELS]
     rows += [_increment_row(found, comparison) for comparison in COMPARISONS if comparison.says]

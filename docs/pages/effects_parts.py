@@ -71,8 +71,8 @@ def detections(result: dict[str, Any]) -> str:
     first = result["first_seed"]
     note = (
         f"{result['clips']} simulated clips of {result['frames']} frames, seeds {first} to "
-        f"{first + result['seeds'] - 1}, none of which was used to set a threshold; noise of {255 * result['noise']:.1f} grey "
-        f"levels ({machine(result)})."
+        f"{first + result['seeds'] - 1}, none of which was used to set a threshold; noise of "
+        f"{255 * result['noise']:.1f} grey levels ({machine(result)})."
     )
     return f"{table}\n\n{note}"
 

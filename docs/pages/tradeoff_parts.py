@@ -45,8 +45,9 @@ def promise(result: dict[str, Any], others: dict[str, dict[str, Any]]) -> str:
     smaller = paper["error"]["max"] / chosen["error"]["max"]
     more = 100 * (_seconds(result, chosen) / _seconds(result, paper) - 1)
     return (
-        f"**On the simulated scene {more:.0f} % more time per frame makes the largest error {smaller:.0f} times smaller "
-        f"than with `paper`; the exact picture takes {_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
+        f"**On the simulated scene {more:.0f} % more time per frame makes the largest error {smaller:.0f} times "
+        f"smaller than with `paper`; the exact picture takes "
+        f"{_seconds(result, exact) / _seconds(result, paper):.0f} times the time.**"
         f"{_everywhere(result, others)}"
     )
 

@@ -37,7 +37,7 @@ def test_every_ablation_is_drawn_on_the_page(tmp_path):
 
 
 def test_without_results_every_claim_says_so():
-    text = verdicts(None, None, [])
+    text = verdicts(None, [], [])
     rows = [line for line in text.splitlines()[2:]]
     assert len(rows) == 22 and sum(NOT_YET in row for row in rows) == 15
     assert "not testable" in rows[-8] and all("not measured" in row for row in rows[-7:-1])
@@ -93,9 +93,9 @@ def made_up_record(gain: float) -> dict:
 
 
 def test_a_measured_claim_has_verdict_number_and_interval():
-    line = row_of(verdicts(made_up_record(0.28), None, []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(0.28), [], []), "Temporal appearance gains")
     assert "| A+S - S | +0.29 dB, mean over EndoNeRF | reproduced | +0.290 dB | +0.265 to +0.315 dB |" in line
-    line = row_of(verdicts(made_up_record(-0.5), None, []), "Temporal appearance gains")
+    line = row_of(verdicts(made_up_record(-0.5), [], []), "Temporal appearance gains")
     assert "| not reproduced: the opposite |" in line
     assert "6 of 6 runs" in tables(made_up_record(0.28))
 
@@ -120,7 +120,7 @@ def half_record(gains: list[float]) -> dict:
                                             ([0.3, 0.4], "not decided: 2 of 3 seeds")])  # fmt: skip
 def test_other_frames_are_decided_without_a_published_value(gains, verdict):
     """Against SciPy; the right camera at held-out times has the same differences, at training times none."""
-    table = verdicts(None, half_record(gains), [])
+    table = verdicts(None, [half_record(gains)], [])
     low, high = stats.ttest_1samp(gains, 0.0).confidence_interval(0.95)
     shown = f"{low:+.2f} to {high:+.2f} dB" if len(gains) > 2 else "-"
     for words in ("Every second frame", "The view of the right eye, at held-out"):
