@@ -50,16 +50,16 @@ class Answered:
         self.refused &= self.got.keys()
         self.right: Outputs = {}
         self.saved: Any = None
-        self.ahead: list[str] = []
-        self.back: list[str] = []
+        self.forward_names: list[str] = []
+        self.gradient_names: list[str] = []
 
     def begin(self, stage: Stage) -> None:
         """Compute the right outputs, and tell those of the forward pass from gradients."""
         forward, self.saved = self.forward(stage, self.inputs, self.settings)
         _lock(self.saved)
         self.right = {**forward, **self.reverse(stage, self.inputs, self.saved)}
-        self.ahead = [name for name in self.got if name in forward]
-        self.back = [name for name in self.got if name not in forward]
+        self.forward_names = [name for name in self.got if name in forward]
+        self.gradient_names = [name for name in self.got if name not in forward]
 
     def forward(self, stage: Stage, inputs: Inputs, settings: Settings) -> tuple[Outputs, Any]:
         """Outputs without gradients, and what the reverse pass needs."""
