@@ -48,4 +48,4 @@ def test_the_guide_lists_every_kind():
 def test_the_guide_states_how_many_findings_there_are():
     levels = Counter(kind.level for kind in KINDS.values())
     numbers = f"{levels['refusal']} refusals, {levels['warning']} warnings and {levels['note']} notes"
-    assert f"It knows {len(KINDS)} findings: {numbers}." in " ".join(GUIDE.read_text(encoding="utf-8").split())
+    assert f"There are {len(KINDS)} findings: {numbers}." in " ".join(GUIDE.read_text(encoding="utf-8").split())

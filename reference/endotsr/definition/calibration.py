@@ -22,8 +22,7 @@ def calibrate(views, gradient_ratio):
 
     Raises: ValueError where no view is left, or where the median is 0.
     """
-    sizes = [(rgb, laplacian) for _, rgb, laplacian in views if rgb > 0 and np.isfinite(laplacian / rgb)]  # (11.6)
-    ratios = np.array([laplacian / rgb for rgb, laplacian in sizes])
+    ratios = np.array([fine / rgb for _, rgb, fine in views if rgb > 0 and np.isfinite(fine / rgb)])  # (11.6)
     if ratios.size == 0 or np.median(ratios) == 0:
         raise ValueError("calibration: no view has a ratio, or their median is 0")
     return Calibration(gradient_ratio / np.median(ratios), ratios)  # (11.3), (11.4)

@@ -46,10 +46,9 @@ def gaussians_at(position, colour, model):
     """Gaussians at the start of training, at world positions (3, N) with display colours (3, N)."""
     count, shape = position.shape[1], (10, model.bases, position.shape[1])
     harmonics = np.zeros(((model.harmonics_degree + 1) ** 2, 3, count))
-    harmonics[0] = (colour - 0.5) / Y00  # (13.3)
+    harmonics[0], opacity_logit = (colour - 0.5) / Y00, np.full(count, np.log(0.1 / 0.9))  # (13.3), (13.5)
     log_scale = np.log(np.sqrt(np.maximum(neighbour_distance(position), 1e-7)))  # (13.4)
     quaternion = np.repeat(np.eye(4)[:, :1], count, axis=1)
-    opacity_logit = np.full(count, np.log(0.1 / 0.9))  # (13.5)
     made = Gaussians(position, quaternion, np.tile(log_scale, (3, 1)), opacity_logit, harmonics)
     if not model.deformation:
         return made
