@@ -72,8 +72,8 @@ class Inputs:
         return self._sizes[job.input_key]
 
 
+# Makes runs, anywhere: their outcomes come in any order, None when there is none.
 Outcomes = Callable[[list[Job]], Generator[Outcome | None, None, None]]
-"""Makes runs, anywhere: their outcomes come in any order, None when there is none."""
 
 
 class SweepPlan(NamedTuple):
