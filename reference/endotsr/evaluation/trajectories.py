@@ -70,25 +70,27 @@ def trajectory_error(
     references      frames; default: every sixth training frame
     """
     chosen = training_sample(sequence) if references is None else [int(i) for i in references]
-    scenes = [scene_at(model.gaussians, model.spectral, model.config.model, float(t))[0] for t in sequence.times]
-    found = [
-        _lengths(model, sequence, scenes, true_positions, reference, frame)
-        for reference in chosen
-        for frame in range(sequence.count)
-        if frame != reference
-    ]
-    pairs = np.concatenate(found, axis=1) if found else np.empty((4, 0))
-    return TrajectoryError(*(float(value) for value in pairs.mean(axis=1))) if pairs.size else None
+    moved = [_scene(model, sequence, frame).position for frame in range(sequence.count)]
+    total, pixels = np.zeros(4), 0
+    for reference in chosen:
+        positions = true_positions(reference, reference)
+        tissue = sequence.masks[reference] & np.isfinite(positions).all(axis=0)  # a wound has no material point
+        scene, start, camera = _scene(model, sequence, reference), positions[:, tissue], sequence.cameras[reference]
+        for frame in range(sequence.count):
+            if frame != reference:  # sums, since the lengths of all pairs of a long clip do not fit in memory
+                moves = displacement(scene, scene._replace(position=moved[frame]), camera, model)[:, tissue]
+                truth = true_positions(reference, frame)[:, tissue]
+                total += _lengths(sequence.cameras[frame], start, moves, truth).sum(axis=1)
+                pixels += start.shape[1]
+    return TrajectoryError(*(float(value) for value in total / pixels)) if pixels else None
 
 
-def _lengths(
-    model: Model, sequence: Sequence, scenes: list[Scene], true_positions: TruePositions, reference: int, frame: int
-) -> FloatArray:
-    """(4, tissue pixels of the reference frame): the lengths that `TrajectoryError` names."""
-    camera, positions = sequence.cameras[frame], [true_positions(reference, i) for i in (reference, frame)]
-    tissue = sequence.masks[reference] & np.isfinite(positions[0]).all(axis=0)  # a wound has no material point
-    start, truth = (position[:, tissue] for position in positions)
-    moves = displacement(scenes[reference], scenes[frame], sequence.cameras[reference], model)[:, tissue]
+def _scene(model: Model, sequence: Sequence, frame: int) -> Scene:
+    return scene_at(model.gaussians, model.spectral, model.config.model, float(sequence.times[frame]))[0]
+
+
+def _lengths(camera: Camera, start: FloatArray, moves: FloatArray, truth: FloatArray) -> FloatArray:
+    """(4, points): the lengths that `TrajectoryError` names, seen by the camera of the other frame."""
     place, still, moved = (np.stack(project(camera, point)[:2]) for point in (truth, start, start + moves))
     lengths = (start + moves - truth, moved - place, truth - start, place - still)
     return np.stack([np.sqrt(np.square(vector).sum(axis=0)) for vector in lengths])
