@@ -10,14 +10,14 @@ import time
 
 import msgspec
 
-from endotsr.config import QUICK, SHARP, Config, with_iterations
+from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations
 from endotsr.errors import InputError
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
 from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
 from endotsr.sequences.sequence import Sequence
 
-SHARP_LENGTH, SHARP_GAUSSIANS = 3520, 80_000  # of `sharp` on 55 training frames of 640x512
+SHARP_LENGTH = lengthened(SHARP, 55).training.iterations  # on 55 training frames
 SLOWEST, LONGEST = -1.5, 5.0  # range of x: 490 iterations, and 23 times those of x = 1
 COARSE_BELOW = 0.5  # x up to which frames of half size come first
 HALVINGS = 20  # of that range
@@ -32,7 +32,7 @@ def paced(config: Config, x: float) -> Config:
 
     growing, first, best = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
     timed = with_iterations(config, between(QUICK.training.iterations, SHARP_LENGTH, x))
-    maximum = between(QUICK.density.maximum, SHARP_GAUSSIANS, growing)
+    maximum = between(QUICK.density.maximum, SHARP.density.maximum, growing)
     points = {
         name: between(getattr(first, name), getattr(best, name), growing)
         for name in ("first_frame_points", "other_frame_points")
