@@ -144,7 +144,7 @@ def table(result: dict[str, Any]) -> str:
     rows = []
     for scene, variants in result["scenes"].items():
         for label, runs in variants.items():
-            cells = [_cell(runs, variants[SHARP], key, digits) for key, _, digits in SHOWN]
+            cells = [cell(runs, variants[SHARP], key, digits) for key, _, digits in SHOWN]
             rows.append([scene, label, *cells])
     about = f"Difference from {SHARP} on the same seed, mean ± 95 % interval; {_about(result)}"
     return markdown(["Scene", "Settings", *(name for _, name, _ in SHOWN)], rows) + "\n\n" + about
@@ -155,7 +155,7 @@ def _about(result: dict[str, Any]) -> str:
     return f"{result['seeds']} seeds, {result['iterations']} iterations; {where}."
 
 
-def _cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
+def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, digits: int) -> str:
     """The mean for the row of `sharp`, the paired difference for the others, and a dash where nothing is known."""
     if key not in runs[0]:
         return "-"

@@ -15,9 +15,7 @@ from typing import Any
 
 import kept
 import levers
-import numpy as np
 from marks import read_json, write_marked
-from over_seeds import shown
 
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
@@ -40,27 +38,21 @@ def measured(key: str, runs: dict[str, tuple[str, str, int]], clips: dict[str, s
 
 def table(result: dict[str, Any]) -> str:
     """Paired differences from the former weight, with 95 % intervals: held-out PSNR and trajectory error."""
-    rows = []
-    for label in CHANGES:
-        cells = []
-        for scene in result["scenes"].values():
-            for key, _, digits in levers.SHOWN:
-                if key not in scene[label][0]:
-                    continue
-                if label == FORMER:
-                    cells.append(f"{np.mean([run[key] for run in scene[label]]):.{digits}f}")
-                else:
-                    pairs = zip(scene[label], scene[FORMER], strict=True)
-                    cells.append(shown([run[key] - other[key] for run, other in pairs], digits, "+"))
-        rows.append([label, *cells])
-    head = [
-        f"{name}, {words.rsplit(', ', 1)[1]}"
+    columns = [
+        (f"{name}, {words.rsplit(', ', 1)[1]}", scene, key, digits)
         for name, scene in result["scenes"].items()
-        for key, words, _ in levers.SHOWN
+        for key, words, digits in levers.SHOWN
         if key in scene[FORMER][0]
     ]
+    rows = [
+        [label, *(levers.cell(scene[label], scene[FORMER], key, digits) for _, scene, key, digits in columns)]
+        for label in CHANGES
+    ]
     about = f"{SEEDS} seeds, {ITERATIONS} iterations; {result['machine']['processor']}, {result['date']}."
-    return markdown(["$w$", *head], rows) + f"\n\nThe first row is a level, the others are differences; {about}"
+    return (
+        markdown(["$w$", *(column[0] for column in columns)], rows)
+        + f"\n\nThe first row is a level, the others are differences; {about}"
+    )
 
 
 def main() -> None:
