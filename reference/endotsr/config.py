@@ -314,7 +314,7 @@ SHARP = Config(
     training=TrainingConfig(bridge_fraction=0.7),
 )
 SHARP = with_iterations(SHARP, 3000)
-SHARP = msgspec.structs.replace(SHARP, training=msgspec.structs.replace(SHARP.training, visits_per_frame=64))
+SHARP = msgspec.structs.replace(SHARP, training=msgspec.structs.replace(SHARP.training, visits_per_frame=72))
 QUICK = with_iterations(SHARP, 1600)
 QUICK = msgspec.structs.replace(
     QUICK,

@@ -1,0 +1,36 @@
+"""docs/bench.md: the table of quality against minutes is what the stored runs say."""
+
+import json
+
+import minutes
+import pytest
+
+from endotsr.errors import InputError
+
+
+def test_committed_table_is_what_the_runs_say():
+    result = json.loads(minutes.FILE.read_text(encoding="utf-8"))
+    assert minutes.parts(result)["table"] in minutes.PAGE.read_text(encoding="utf-8")
+
+
+def run(folder, clip, psnr):
+    """A finished run of two iterations."""
+    folder.mkdir()
+    means = {"psnr_full": psnr, "ssim_full": 0.9, "lpips": 0.1}
+    about = {"seed": 0, "iteration": 2, "gaussians": 5, "threads": 1, "started": "2026-01-02T03:04:05",
+             "machine": {"processor": "P"}, "peak_memory_bytes": 1e9,
+             "input": {"source": f"/somewhere/{clip}", "frames": 9, "width": 8, "height": 6}}  # fmt: skip
+    levels = dict.fromkeys(minutes.LEVELS, {"mean": means})
+    (folder / "metrics.json").write_text(json.dumps({"run": about, "held_out": {"mean": means}, "baselines": levels}))
+    (folder / "log.jsonl").write_text('{"seconds": 60.0}\n{"seconds": 30.0}\n')
+    return folder
+
+
+def test_row_is_the_mean_of_its_runs_and_the_time_that_of_the_iterations(tmp_path, monkeypatch):
+    monkeypatch.setattr(minutes, "FILE", tmp_path / "minutes.json")
+    minutes.add([run(tmp_path / "a", "clip", 30.0), run(tmp_path / "b", "clip", 32.0)], "sharp")
+    result = json.loads(minutes.FILE.read_text())
+    assert "| `sharp` | 2 | 1.5 | 2 | 5 | 1.0 | 31.00 | 0.9000 | 0.1000 |" in minutes.table(result)
+    assert "/somewhere" not in minutes.FILE.read_text()
+    with pytest.raises(InputError, match="allowed: the clip of the other rows"):
+        minutes.add([run(tmp_path / "c", "other", 30.0)], "other")
