@@ -14,7 +14,7 @@ from endotsr.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable
 
     from endotsr.evaluation.records import EvaluationRecord, RunEvaluation
     from endotsr.runs.model import Model
@@ -190,7 +190,7 @@ def _write(
     model: "Model",
     sequence: "Sequence",
     metrics: "RunEvaluation",
-    held_out: "Mapping[int, RenderOut]",
+    held_out: "Callable[[int], RenderOut]",
     view: bool,
 ) -> None:
     """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""

@@ -6,7 +6,7 @@ In: the metrics of a run and the renders of its held-out frames. Each file and f
 import math
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,14 +36,14 @@ def write_evaluation(
     folder: RunFolder,
     sequence: Sequence,
     metrics: RunEvaluation,
-    held_out: Mapping[int, RenderOut],
+    held_out: Callable[[int], RenderOut],
     preview: Preview | None = None,
     viewer: str = "",
 ) -> None:
     """Write the files of `endotsr evaluate` in a run folder.
 
-    metrics     of `evaluation.run.measure_run`
-    held_out    frame number -> render
+    metrics     of `evaluation.run.measure_folder`
+    held_out    number of a held-out frame -> render
     preview     moving picture of the report
     viewer      name of the viewer page in the folder, which the report links to; "" = there is none
     """
@@ -59,7 +59,9 @@ def write_evaluation(
     lead_to_report(folder.path)
 
 
-def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: Mapping[int, RenderOut]) -> None:
+def _write_pictures(
+    folder: RunFolder, iteration: int, sequence: Sequence, held_out: Callable[[int], RenderOut]
+) -> None:
     """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
     peers = folder.path / "test" / f"ours_{iteration}"
     if peers.parent.is_symlink():
@@ -68,8 +70,8 @@ def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_
     with replacing_folder(folder.path / "renders") as renders, replacing_folder(peers) as test:
         for name in ("renders", "gt", "masks"):
             (test / name).mkdir()
-        for number, (index, out) in enumerate(held_out.items()):
-            name = file_name(sequence.names[index], "names of the frames")
+        for number, index in enumerate(map(int, sequence.test_index)):
+            out, name = held_out(index), file_name(sequence.names[index], "names of the frames")
             truth, mask = sequence.frame(index).image, sequence.masks[index]
             write_png(renders / f"{name}.png", rgb_bytes(out.colour))
             write_png(renders / f"{name}_comparison.png", triptych_picture(triptych(out.colour, truth, mask)))
@@ -89,7 +91,7 @@ def _report_data(
     folder: RunFolder,
     sequence: Sequence,
     metrics: RunEvaluation,
-    held_out: Mapping[int, RenderOut],
+    held_out: Callable[[int], RenderOut],
     log: list[LogEntry],
 ) -> ReportData:
     run = metrics["run"]
@@ -100,10 +102,10 @@ def _report_data(
             index=i,
             name=sequence.names[i],
             time=float(sequence.times[i]),
-            render=held_out[i].colour,
+            render=held_out(i).colour,
             truth=sequence.frame(i).image,
             mask=sequence.masks[i],
-            depth=held_out[i].depth,
+            depth=held_out(i).depth,
             metrics=rows[i],
         )
         for i in sorted(worst_first(rows)[:MOST_SHOWN])

@@ -44,7 +44,7 @@ def facts(metrics: RunEvaluation) -> Facts:
 def held_out_table(metrics: EvaluationRecord) -> str:
     """The held-out means of model and baselines as text.
 
-    metrics   of `evaluation.run.measure_run`, or of `evaluation.pictures.measure_pictures`, which has a `label`
+    metrics   of `evaluation.run.measure_folder`, or of `evaluation.pictures.measure_pictures`, which has a `label`
     """
     rows = [(metrics.get("label", "this model"), metrics["held_out"]["mean"])]
     rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
