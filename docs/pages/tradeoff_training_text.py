@@ -3,7 +3,7 @@
 from typing import Any
 
 from endotsr.report.tables import plain
-from endotsr.report.words import duration
+from endotsr.report.tables import duration
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:

@@ -41,7 +41,7 @@ from endotsr.errors import InputError
 from endotsr.fitting.records import LogEntry
 from endotsr.runs import folder as run_folders
 from endotsr.runs import sources
-from endotsr.runs.log import RunLog
+from endotsr.runs.log import RunLog, log_until
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
 from endotsr.runs.records import ResumedEntry, RunRecord, new_record
@@ -229,7 +229,6 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
 
     Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
     """
-    from endotsr.report.curves import read_log
     from endotsr.windows.record import is_windowed
     from endotsr.windows.run import WindowedRun
 
@@ -237,7 +236,7 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
         return WindowedRun(Path(path), None if sequence is None else str(sequence))
     folder = run_folders.open_run(Path(path))
     model = load_model(folder)
-    log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]
+    log = log_until(folder.log, model.iteration)
     given = "" if sequence is None else str(sequence)
     return Run(model.config, folder.record(), folder.sequence_record(), log, model, given, _folder=folder)
 

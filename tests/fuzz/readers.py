@@ -234,7 +234,7 @@ def read_record(path: Path) -> object:
     record = folder.record(*REPORTED)
     run_source(folder)
     scene = type("Scene", (), {"count": 3})()
-    return facts({"run": about_run(record, Model(scene, None, DEMO, 5))}), sequence_fingerprint(record)
+    return facts(about_run(record, Model(scene, None, DEMO, 5))), sequence_fingerprint(record)
 
 
 @cache
@@ -246,11 +246,10 @@ def log_seeds() -> list[bytes]:
 
 def read_log(path: Path) -> object:
     """As the report and a resumed training do."""
-    from endotsr.report.curves import read_log as read
     from endotsr.report.curves import series
-    from endotsr.runs.log import RunLog
+    from endotsr.runs.log import RunLog, log_until
 
-    log = [entry for entry in read(path) if entry.get("iteration", 0) <= 5]
+    log = log_until(path, 5)
     found = [series(log, key) for key in ("loss", "l1", "psnr", "seconds")]
     RunLog(path, 5).close()
     return found

@@ -54,6 +54,5 @@ def run(words: list[str]) -> int:
         findings = [finding._asdict() for finding in checked.findings]
         write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
     if options.html is not None:
-        page = check_page(checked)
-        replace_text(options.html, page)
+        replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0

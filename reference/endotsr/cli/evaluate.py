@@ -73,7 +73,7 @@ class EvaluateOptions:
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.kernels.threads import use_threads
-    from endotsr.report.spreadsheet import frames_csv
+    from endotsr.report.comparison import frames_csv
 
     options = parse(EvaluateOptions, words, "evaluate")
     refuse_unwritable(options.json, options.csv)
@@ -86,8 +86,7 @@ def run(words: list[str]) -> int:
     if options.json:
         write_json(options.json, metrics)
     if options.csv:
-        text = frames_csv(metrics, metrics.get("label", "this model"))
-        replace_text(options.csv, text)
+        replace_text(options.csv, frames_csv(metrics, metrics.get("label", "this model")))
     return 0
 
 

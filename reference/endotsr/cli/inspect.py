@@ -10,6 +10,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.untrusted.writing import replace_text
 
 
 @dataclass
@@ -43,7 +44,7 @@ def run(words: list[str]) -> int:
     """The command."""
     from endotsr.effects.inspect import inspect_sequence, inspection_record
     from endotsr.effects.plan import make_plan, plan_record
-    from endotsr.report.inspection import inspection_text, write_inspection
+    from endotsr.report.inspection import inspection_html, inspection_text
     from endotsr.runs.sources import load_sequence
     from endotsr.simulator.settings import SimulatorSettings
 
@@ -59,7 +60,7 @@ def run(words: list[str]) -> int:
     plan = make_plan(inspection, config)
     print(inspection_text(inspection, plan))
     if options.out:
-        write_inspection(options.out, Path(options.sequence).name, inspection, plan)
+        replace_text(options.out, inspection_html(Path(options.sequence).name, inspection, plan))
         print(f"report: {options.out}")
     if options.json:
         write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})

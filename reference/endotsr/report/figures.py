@@ -153,21 +153,15 @@ def colour_table(name: str) -> ByteImage:
 
 
 def encode(image: ByteImage, kind: str = "png") -> bytes:
-    """File bytes of an (H, W, 3) image. kind: `png` (lossless) or `webp` (quality 90, about a tenth of the size)."""
+    """File bytes of an (H, W, 3) image, or of one with opacity, (H, W, 4).
+
+    kind   `png` (lossless) or `webp` (quality 90, about a tenth of the size)
+    """
     from PIL import Image
 
     buffer = io.BytesIO()
     options = {"png": {}, "webp": {"quality": 90, "method": 3}}[kind]
     Image.fromarray(image).save(buffer, format=kind, **options)
-    return buffer.getvalue()
-
-
-def encode_transparent(image: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of an (H, W, 4) image, RGB and opacity."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, format="png")
     return buffer.getvalue()
 
 

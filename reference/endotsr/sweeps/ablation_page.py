@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from endotsr.report import style
-from endotsr.report.tables import markdown
+from endotsr.report.tables import fixed, markdown
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
 from endotsr.sweeps.ablation import Increment, increments, levels
@@ -60,8 +60,7 @@ def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> Ablatio
     """Write the three files in the folder of the sweep; returns the content of ablation.json. Raises OSError."""
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
-    text = ablation_markdown(record) + "\n"
-    replace_text(out / FILES[1], text)
+    replace_text(out / FILES[1], ablation_markdown(record) + "\n")
     if record["increments"]:
         draw(record, out / FILES[2])
     return record
@@ -83,8 +82,8 @@ def level_table(record: AblationRecord, split: str) -> str:
     chosen = [level for level in record["levels"] if level["split"] == split]
     columns = [column for column in SHOWN if any(level.get(column[0]) is not None for level in chosen)]
     rows = [
-        [level["configuration"], str(level["runs"]), *(_number(level.get(key), d) for key, _, d in columns),
-         _number(level.get("gaussians"), 0)]
+        [level["configuration"], str(level["runs"]), *(fixed(level.get(key), d) for key, _, d in columns),
+         fixed(level.get("gaussians"), 0)]
         for level in chosen
     ]  # fmt: skip
     return markdown(["configuration", "runs", *(head for _, head, _ in columns), "Gaussians"], rows)
@@ -100,9 +99,9 @@ def increment_table(record: AblationRecord, split: str) -> str:
         label = next(head for key, head, _ in SHOWN if key == found["metric"])
         stated = found["published"] if found["metric"] == "psnr_full" else None
         rows.append([
-            name_of(found), label, _signed(found["mean"], digits),
+            name_of(found), label, fixed(found["mean"], digits, "+"),
             *(interval_text(found, of, digits) for of in ("student", "mean")),
-            _signed(found["median"], digits), interval_text(found, "median", digits), _signed(stated, digits),
+            fixed(found["median"], digits, "+"), interval_text(found, "median", digits), fixed(stated, digits, "+"),
             f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
     heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
@@ -117,7 +116,7 @@ def name_of(found: IncrementRow) -> str:
 def interval_text(found: IncrementRow, of: str, digits: int) -> str:
     """An interval, `of` being student, mean or median: "-0.02 to +0.11"; "-" where one pair has none."""
     low, high = found.get(f"{of}_low"), found.get(f"{of}_high")
-    return "-" if low is None or high is None else f"{_signed(low, digits)} to {_signed(high, digits)}"
+    return "-" if low is None or high is None else f"{low:+.{digits}f} to {high:+.{digits}f}"
 
 
 def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
@@ -154,11 +153,3 @@ def _panel(axes: Any, chosen: list[IncrementRow]) -> None:
         axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="as published")
     axes.set_yticks(list(places), [name_of(found) for found in chosen])
     axes.invert_yaxis()
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
-def _signed(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:+.{digits}f}"

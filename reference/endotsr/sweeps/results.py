@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from endotsr.errors import InputError
-from endotsr.report.spreadsheet import csv_text
+from endotsr.report.comparison import csv_text
 from endotsr.report.tables import markdown
 from endotsr.runs.files import read_json, write_json
 from endotsr.runs.machine import now

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.evaluation.depth import normalised_depth
@@ -16,9 +17,9 @@ from endotsr.export.files import check_folder_name
 from endotsr.export.placement import Placement, placed_camera
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import chosen_times
+from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv import write_png
-from endotsr.report.figures import ByteImage
-from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
+from endotsr.report.figures import ByteImage, bytes_image
 from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import refuse_existing
 from endotsr.runs.sources import load_run_sequence
@@ -36,6 +37,8 @@ ABOUT_DEPTH = {
     "accumulated": "not normalised by opacity",
     "normalised": "normalised by opacity",
 }
+DEPTH_LEVELS = 65535  # of a 16-bit picture
+DEPTH_HEADROOM = 1.5  # over the largest prior depth, since rendered depth may be a little larger
 
 
 class ReadFrames(Protocol):
@@ -163,12 +166,23 @@ def _entry(view: PlannedView, placement: Placement) -> dict[str, Any]:
 
 
 def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool) -> None:
-    write_png(target / "colour" / f"{label}.png", rgb_bytes(out.colour))
+    write_png(target / "colour" / f"{label}.png", bytes_image(out.colour))
     write_png(target / "depth" / f"{label}.png", depth_bytes(out.depth, step))
-    write_png(target / "opacity" / f"{label}.png", grey_bytes(out.opacity))
+    write_png(target / "opacity" / f"{label}.png", np.rint(np.clip(out.opacity, 0, 1) * 255).astype(np.uint8))
     if npy:
         for name in ("colour", "depth", "opacity"):
             np.save(target / name / f"{label}.npy", getattr(out, name))
+
+
+def depth_step(largest_depth: float, depth: FloatArray) -> float:
+    """Scene units of one step of a 16-bit depth picture: a power of two that leaves headroom, one for all views."""
+    largest = max(largest_depth, float(np.nan_to_num(depth).max()), 1e-6) * DEPTH_HEADROOM
+    return float(2.0 ** np.ceil(np.log2(largest / DEPTH_LEVELS)))
+
+
+def depth_bytes(depth: FloatArray, step: float) -> NDArray[np.uint16]:
+    """(H, W) scene units as whole steps, clipped to 16 bits; 0 = no depth."""
+    return np.clip(np.rint(np.nan_to_num(depth) / step), 0, DEPTH_LEVELS).astype(np.uint16)
 
 
 def _as_json(camera: Camera) -> dict[str, Any]:

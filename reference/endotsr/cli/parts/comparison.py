@@ -30,8 +30,7 @@ class Comparison(NamedTuple):
 def compare_methods(asked: Comparison) -> None:
     """Print the means of every method and their differences to the first one frame by frame, with intervals."""
     from endotsr.evaluation.compare import compare, methods_of
-    from endotsr.report.comparison_text import METRICS, comparison_table
-    from endotsr.report.spreadsheet import comparison_csv
+    from endotsr.report.comparison import METRICS, comparison_csv, comparison_table
 
     if asked.seed < 0:
         raise InputError(f"evaluate: --seed {asked.seed} is not allowed; allowed: an integer >= 0")
@@ -46,8 +45,7 @@ def compare_methods(asked: Comparison) -> None:
     if asked.json:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
-        text = comparison_csv(rows)
-        replace_text(asked.csv, text)
+        replace_text(asked.csv, comparison_csv(rows))
 
 
 def _named(word: str) -> tuple[str, Path]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.report.words import duration
+from endotsr.report.tables import duration
 from endotsr.runs.files import refuse_inside, write_json
 from endotsr.runs.sources import SIMULATED
 
