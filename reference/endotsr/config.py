@@ -408,9 +408,13 @@ def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") 
     for key, value in data.items():
         if key not in fields:
             raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
-        inner = fields[key]
-        if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, msgspec.Struct):
-            refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
+        if isinstance(value, dict) and is_section(fields[key]):
+            refuse_unknown_keys(value, fields[key], where, f"{prefix}{key}.")
+
+
+def is_section(kind: Any) -> bool:
+    """Whether a type is a section of settings."""
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
 def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
@@ -425,10 +429,14 @@ def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
 def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
     """The key, its value and what is allowed, from the message `... - at `$.section.key`` of the type check."""
     found = re.search(r"`\$\.([\w.]+)", message)
+    place = f"{found[1]}." if found else ""
+    if missing := re.search(r"missing required field `(\w+)`", message):
+        return f"{prefix}{place}{missing[1]} is missing"
     if not found:
         return message
     value: Any = data
     for name in found[1].split("."):
+        kind = next(filter(is_section, get_args(kind)), kind)  # of a section that may be left out
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
     return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
@@ -442,12 +450,16 @@ def allowed_values(kind: Any) -> str:
     if origin in (Union, UnionType):
         return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
     if origin is tuple:
-        return f"{len(arguments)} values, each {allowed_values(arguments[0])}"
+        many = "a list" if arguments[-1] is Ellipsis else f"{len(arguments)} values"
+        return f"{many}, each {allowed_values(arguments[0])}"
     if origin is Annotated:
         limits = [(">", arguments[1].gt), (">=", arguments[1].ge), ("<", arguments[1].lt), ("<=", arguments[1].le)]
         words = " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
-        return f"{allowed_values(arguments[0])} {words}"
-    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        least = f", at least {arguments[1].min_length} of them" if arguments[1].min_length else ""
+        return f"{allowed_values(arguments[0])} {words}".rstrip() + least
+    if origin is dict:
+        return "a table of keys"
+    if is_section(kind):
         return "a section of settings"
     return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
 

@@ -113,7 +113,7 @@ def _job(spec: Spec, configuration: Configuration, name: str, source: str, split
     run = file_word(f"{name}-{shown}-{configuration.name}-seed{seed}")
     start = None
     if configuration.start is not None:
-        other, iteration = configuration.start
+        other, iteration = configuration.start.configuration, configuration.start.iteration
         found = next(c for c in spec.configurations if c.name == other)
         start = Start(_of_run(found.config, split, seed), other, iteration)
     return Job(

@@ -18,6 +18,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import msgspec
 
+from endotsr.config import is_section
+
 REQUIRED: Any = dataclasses.MISSING  # the default of an option that must be given
 METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}
 
@@ -105,11 +107,6 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 positional=note.positional,
                 may_be_empty=note.may_be_empty,
             )
-
-
-def is_section(kind: Any) -> bool:
-    """Whether a type is a section of settings."""
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
 def _declared(kind: type) -> list[tuple[str, Any, Any]]:
