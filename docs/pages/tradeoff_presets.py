@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from endotsr.tradeoff.front import Ranked
+from endotsr.tradeoff.study import Ranked
 
 # Dominated presets that are kept, with the reason. A test fails for a dominated preset that is missing here.
 KEPT = {

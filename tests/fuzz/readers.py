@@ -101,7 +101,7 @@ def ply_seeds() -> list[bytes]:
 
 
 def read_splats(path: Path) -> object:
-    from endotsr.tradeoff.splat_file import read_splats as read
+    from endotsr.tradeoff.scenes import read_splats as read
 
     return read(path)
 

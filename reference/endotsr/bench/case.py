@@ -15,14 +15,18 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from endotsr.bench.clock import SPLAT, StageClock
-from endotsr.bench.timing import spread
+from endotsr.bench.clock import SPLAT, StageClock, spread
 from endotsr.config import PAPER, Config
+from endotsr.export.npz import read_arrays
+from endotsr.kernels.constants import Y00
 from endotsr.scene import workload
+from endotsr.scene.gaussians import Gaussians, arrays
 
 Precision = Literal["float32", "float64"]
 
 WARM_UP = 2  # iterations after the compiling one
+DEPTH = 4.0  # scene units of the middle of a trained scene, that of the common workload
+PERCENTILES = (1, 99)  # of the positions of a trained scene: the range that is scaled to the picture
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,10 @@ def measure(case: BenchCase) -> dict[str, Any]:
              included; "view" {"visible", "listed", "blended"}; "parameters" a Gaussian; "peak_memory_bytes";
              "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
     """
-    import numba
-
+    from endotsr.kernels.threads import use_threads
     from endotsr.runs.machine import peak_memory_bytes
-    from endotsr.scene.gaussians import arrays
 
-    numba.set_num_threads(min(case.threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    use_threads(case.threads)
     config = case.config()
     state, shop = prepare(case, config)
     first, times = time_iterations(state, shop, case.repeats)
@@ -91,7 +93,6 @@ def measure(case: BenchCase) -> dict[str, Any]:
 
 def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
     """State and workshop of a case, at the timed iteration, with every target computed."""
-    from endotsr.bench.trained import trained_gaussians
     from endotsr.fitting.state import bench_state, workshop
 
     shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
@@ -102,6 +103,34 @@ def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
     else:
         scene = workload.gaussians(case.gaussians, config, size=case.size)
     return bench_state(scene, config, representative(config)), shop
+
+
+def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
+    """A trained scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
+
+    path   npz, see `export.npz`
+    Raises: InputError naming the file and what is missing.
+    """
+    found = read_arrays(path)
+    position, log_scale = found["xyz"].T.astype(np.float64), found["log_scale"].T.astype(np.float64)
+    low, high = np.percentile(position, PERCENTILES, axis=1)
+    across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units a pixel
+    factor = DEPTH / workload.FOCAL / across
+    middle = (low + high)[:, None] / 2
+    opacity = np.clip(found["opacity"].astype(np.float64), 1e-4, 1 - 1e-4)
+    harmonics = np.zeros(((config.model.harmonics_degree + 1) ** 2, 3, opacity.size))
+    harmonics[0] = (found["rgb"].T - 0.5) / Y00
+    dtype = np.dtype(config.training.precision)
+    cast = lambda array: np.ascontiguousarray(array, dtype)
+    scene = Gaussians(
+        position=cast((position - middle) * factor + np.array([[0.0], [0.0], [DEPTH]])),
+        quaternion=cast(found["quat_wxyz"].T),
+        log_scale=cast(log_scale + np.log(factor)),
+        opacity_logit=cast(np.log(opacity / (1 - opacity))),
+        harmonics=cast(harmonics),
+    )
+    sigma = float(np.exp(np.median(scene.log_scale)))
+    return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
 
 
 def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
