@@ -44,7 +44,7 @@ from endotsr.runs import sources
 from endotsr.runs.log import RunLog, log_until
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
-from endotsr.runs.records import ResumedEntry, RunRecord, new_record
+from endotsr.runs.records import ResumedEntry, RunRecord
 from endotsr.sequences.record import SequenceRecord, record_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
@@ -177,9 +177,8 @@ def train(
     config = lengthened(config, len(sequence.train_index))
     config, found = _called_for(sequence, config, effects, sections, on_message)
     state = new_training(sequence, config)
-    about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)
-    record = new_record(["endotsr.train"], config, threads, about) | found
+    record = sources.start_record(["endotsr.train"], source, sequence, config, simulator, threads) | found
     seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message, on_run)
@@ -308,14 +307,14 @@ class Run:
         Raises: InputError for a name, rate, count or camera that is not allowed.
         """
         from endotsr.export.times import Times
-        from endotsr.views import pictures
+        from endotsr.views import film, pictures
         from endotsr.views.plan import ViewRequest
 
         path, look, scene = Path(path), pictures.Look(), self._scene()
         pictures.check_outputs(None, path, rate, slow)
         views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
-        chosen = pictures.rate_of(path, scene, views, rate, slow)
-        pictures.write_views_film(path, pictures.rendered(scene, views, look), look, chosen)
+        chosen = rate or film.film_rate(path, [view.time for view in views], scene.record.duration, slow)
+        film.write_film(path, pictures.film_pictures(pictures.rendered(scene, views, look), look), chosen)
         return path
 
     def view(self, path: str | Path) -> Path:

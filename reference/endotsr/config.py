@@ -254,6 +254,19 @@ class Config(Section, frozen=True, kw_only=True):
 
 
 PAPER = Config()
+
+
+def with_settings(settings: SectionType, **changes: Any) -> SectionType:
+    """The settings with other values; a dictionary changes a section: `with_settings(config, training={"seed": 3})`."""
+    return msgspec.structs.replace(
+        settings,
+        **{
+            name: with_settings(getattr(settings, name), **value) if isinstance(value, dict) else value
+            for name, value in changes.items()
+        },
+    )
+
+
 # Keys of earlier versions, and the values that mean what the settings mean without them.
 FORMER = {
     "initialisation": {"motion_flow": ("dis",)},
@@ -277,19 +290,17 @@ def with_iterations(config: Config, iterations: int) -> Config:
     The length is then fixed: `visits_per_frame` is 0.
     """
     ratio = iterations / config.training.iterations
-    changed = {}
-    for section, names in MILESTONES.items():
-        old = getattr(config, section)
-        changed[section] = msgspec.structs.replace(
-            old, **{name: max(1, round(getattr(old, name) * ratio)) for name in names}
-        )
-    changed["training"] = msgspec.structs.replace(changed["training"], iterations=iterations)
-    return with_fixed_length(msgspec.structs.replace(config, **changed))
+    changes = {
+        section: {name: max(1, round(getattr(getattr(config, section), name) * ratio)) for name in names}
+        for section, names in MILESTONES.items()
+    }
+    changes["training"] |= {"iterations": iterations, "visits_per_frame": 0}
+    return with_settings(config, **changes)
 
 
 def with_fixed_length(config: Config) -> Config:
     """The same settings with exactly `training.iterations`, whatever the number of frames."""
-    return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=0))
+    return with_settings(config, training={"visits_per_frame": 0})
 
 
 def lengthened(config: Config, training_frames: int) -> Config:
@@ -313,24 +324,21 @@ SHARP = Config(
     initialisation=InitialisationConfig(motion="flow"),
     training=TrainingConfig(bridge_fraction=0.7),
 )
-SHARP = with_iterations(SHARP, 3000)
-SHARP = msgspec.structs.replace(SHARP, training=msgspec.structs.replace(SHARP.training, visits_per_frame=64))
-QUICK = with_iterations(SHARP, 1600)
-QUICK = msgspec.structs.replace(
-    QUICK,
+SHARP = with_settings(with_iterations(SHARP, 3000), training={"visits_per_frame": 64})
+QUICK = with_settings(
+    with_iterations(SHARP, 1600),
     preset="quick",
     # what a first look has time for at 640x512 pixels
-    density=msgspec.structs.replace(QUICK.density, growth="budget", maximum=22_000),
-    initialisation=msgspec.structs.replace(QUICK.initialisation, first_frame_points=14_000, other_frame_points=2_000),
-    training=msgspec.structs.replace(QUICK.training, coarse_start=True),
+    density={"growth": "budget", "maximum": 22_000},
+    initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
+    training={"coarse_start": True},
 )
-DEMO = with_iterations(SHARP, 1500)
-DEMO = msgspec.structs.replace(
-    DEMO,
+DEMO = with_settings(
+    with_iterations(SHARP, 1500),
     preset="demo",
     # points and threshold suit its 160x128 pixels
-    density=msgspec.structs.replace(DEMO.density, gradient_threshold=7e-4),
-    initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
+    density={"gradient_threshold": 7e-4},
+    initialisation={"first_frame_points": 6000, "other_frame_points": 1500},
 )
 PRESETS = {"paper": PAPER, "sharp": SHARP, "quick": QUICK, "demo": DEMO}
 

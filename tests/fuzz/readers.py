@@ -214,7 +214,7 @@ def record_seeds() -> list[bytes]:
     """run.json."""
     from endotsr.config import DEMO
     from endotsr.runs.files import finite
-    from endotsr.runs.training import start_record
+    from endotsr.runs.sources import start_record
 
     settings, sequence, _ = _tiny()
     return [json.dumps(finite(start_record(["endotsr"], "simulated", sequence, DEMO, settings, 2))).encode()]

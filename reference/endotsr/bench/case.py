@@ -12,11 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import msgspec
 import numpy as np
 
 from endotsr.bench.clock import SPLAT, StageClock, spread
-from endotsr.config import PAPER, Config
+from endotsr.config import PAPER, Config, with_settings
 from endotsr.export.npz import read_arrays
 from endotsr.kernels.constants import Y00
 from endotsr.scene import workload
@@ -48,10 +47,8 @@ class BenchCase:
 
     def config(self) -> Config:
         """The published settings with the sizes of this case."""
-        change = msgspec.structs.replace
-        training = change(PAPER.training, precision=self.precision, threads=self.threads)
-        model = change(PAPER.model, bases=self.bases, frequencies=self.frequencies)
-        return change(PAPER, training=training, model=model)
+        training = {"precision": self.precision, "threads": self.threads}
+        return with_settings(PAPER, training=training, model={"bases": self.bases, "frequencies": self.frequencies})
 
 
 def apart(function: Callable[..., Any], *arguments: Any) -> Any:

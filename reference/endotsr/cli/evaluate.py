@@ -14,12 +14,8 @@ from endotsr.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from endotsr.evaluation.records import EvaluationRecord, RunEvaluation
-    from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
-    from endotsr.splatting.render import RenderOut
 
 
 @dataclass
@@ -164,40 +160,28 @@ def evaluate_run(
 ) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
+    view       also write the viewer page that the report links to
     measures   names of `evaluation.measures.MEASURES`
     source     current place of the sequence; default: the recorded one
     """
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.measures import check_measures, measure_lines
     from endotsr.evaluation.run import measure_folder
+    from endotsr.export.scene import MovingScene
+    from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.sources import run_source
+    from endotsr.views.page import RUN_PAGE, write_run_page
+    from endotsr.views.preview import preview
 
     check_measures(measures, "--measures")
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
-    _write(folder, model, sequence, metrics, held_out, view)
+    scene = MovingScene(folder.sequence_record(), model, folder)
+    write_run_page(folder.path, scene, sequence if view else None)
+    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
-
-
-def _write(
-    folder: RunFolder,
-    model: "Model",
-    sequence: "Sequence",
-    metrics: "RunEvaluation",
-    held_out: "Callable[[int], RenderOut]",
-    view: bool,
-) -> None:
-    """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""
-    from endotsr.export.scene import MovingScene
-    from endotsr.report.run_files import write_evaluation
-    from endotsr.views.page import RUN_PAGE, write_run_page
-    from endotsr.views.preview import preview
-
-    scene = MovingScene(folder.sequence_record(), model, folder)
-    write_run_page(folder.path, scene, sequence if view else None)
-    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")

@@ -8,9 +8,7 @@ few iterations of a model without motion, which is thrown away.
 import statistics
 import time
 
-import msgspec
-
-from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations
+from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
 from endotsr.fitting.state import new_training, workshop
 from endotsr.fitting.trainer import training_step
@@ -37,13 +35,8 @@ def paced(config: Config, x: float) -> Config:
         name: between(getattr(first, name), getattr(best, name), growing)
         for name in ("first_frame_points", "other_frame_points")
     }
-    replace = msgspec.structs.replace
-    return replace(
-        timed,
-        density=replace(timed.density, growth="budget", maximum=maximum),
-        initialisation=replace(timed.initialisation, **points),
-        training=replace(timed.training, coarse_start=x <= COARSE_BELOW),
-    )
+    density, training = {"growth": "budget", "maximum": maximum}, {"coarse_start": x <= COARSE_BELOW}
+    return with_settings(timed, density=density, initialisation=points, training=training)
 
 
 def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -> Config:
@@ -71,11 +64,8 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -
 
 def seconds_of_unit(sequence: Sequence, config: Config) -> float:
     """Seconds of a unit of work on this machine and this clip: the median of a few iterations, kernels compiled."""
-    replace = msgspec.structs.replace
-    first = replace(QUICK.initialisation, motion="none")
-    short = replace(
-        config, initialisation=first, training=replace(config.training, bridge_fraction=0.0, coarse_start=False)
-    )
+    first = with_settings(QUICK.initialisation, motion="none")
+    short = with_settings(config, initialisation=first, training={"bridge_fraction": 0.0, "coarse_start": False})
     state, shop, found = new_training(sequence, short), workshop(sequence, short), []
     state.lambda_lap = state.lambda_lap or 0.0
     for _ in range(WARM + TIMED):

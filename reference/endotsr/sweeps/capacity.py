@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
-
-from endotsr.config import Config
+from endotsr.config import Config, with_settings
 from endotsr.kernels.machine import memory_available, memory_of_machine, usable_cores
 from endotsr.kernels.memory import ASSUMED
 from endotsr.sequences.checks.cost import estimated_cost
@@ -33,7 +31,7 @@ class Capacity(NamedTuple):
 
 def run_bytes(size: Size, config: Config) -> float:
     """Estimated memory of one run with these settings."""
-    read = msgspec.structs.replace(config, sequence=msgspec.structs.replace(config.sequence, scale=1.0))
+    read = with_settings(config, sequence={"scale": 1.0})
     return MARGIN * estimated_cost(size.frames, size.width, size.height, read).total_bytes
 
 

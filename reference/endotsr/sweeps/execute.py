@@ -118,7 +118,8 @@ def _trained(job: Job, sequence: Sequence, threads: int, observer: Silent) -> Ru
 def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunFolder:
     """A new run, trained to the end."""
     from endotsr.runs.model import save_training
-    from endotsr.runs.training import start_record, train_new_run, train_run
+    from endotsr.runs.sources import start_record
+    from endotsr.runs.training import train_new_run, train_run
     from endotsr.sequences.record import record_of
 
     record = start_record([*COMMAND, job.name], job.source, sequence, job.config, job.simulator, threads)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import msgspec
 
-from endotsr.config import Config, lengthened
+from endotsr.config import Config, lengthened, with_settings
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -124,12 +124,7 @@ def _job(spec: Spec, configuration: Configuration, name: str, source: str, split
 
 def _of_run(config: Config, split: str, seed: int) -> Config:
     """The settings with the split and the seed of a run."""
-    sequence = config.sequence
-    if split:
-        sequence = msgspec.structs.replace(sequence, **split_settings(split))
-    return msgspec.structs.replace(
-        config, sequence=sequence, training=msgspec.structs.replace(config.training, seed=seed)
-    )
+    return with_settings(config, sequence=split_settings(split) if split else {}, training={"seed": seed})
 
 
 def _lengthened(job: Job, training_frames: int) -> Job:

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from endotsr.config import DEMO, ModelConfig, with_iterations
+from endotsr.config import DEMO, ModelConfig, with_iterations, with_settings
 from endotsr.errors import InputError
 from endotsr.export.npz import read_arrays
 from endotsr.export.ply import read_gaussians, sound
@@ -79,10 +78,9 @@ def simulated_scene(
     height = width * SIMULATED_HEIGHT // SIMULATED_WIDTH
     simulator = SimulatorSettings(width=width, height=height, seed=seed)
     sequence = simulate(simulator).sequence
-    config = with_iterations(DEMO, iterations)
     fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
     points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}
-    config = msgspec.structs.replace(config, initialisation=msgspec.structs.replace(config.initialisation, **points))
+    config = with_settings(with_iterations(DEMO, iterations), initialisation=points)
     state = new_training(sequence, config)
     train(state, sequence, config, lambda entry: step(), lambda reached: None)
     frame = int(sequence.test_index[len(sequence.test_index) // 2])

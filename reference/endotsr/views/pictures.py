@@ -28,7 +28,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.writing import replacing_folder
 from endotsr.views.cameras import TURNING, pivot_depth_of
-from endotsr.views.film import check_film, film_rate, write_film
+from endotsr.views.film import check_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
 from endotsr.views.plan import PlannedView, ViewRequest, check_request, views_of
 
@@ -95,11 +95,6 @@ def check_outputs(out: Path | None, film: Path | None, rate: float | None = None
     if film is not None:
         check_film(film, rate, slow)
         refuse_unwritable(film)
-
-
-def rate_of(film: Path, scene: MovingScene, views: list[PlannedView], rate: float | None, slow: float | None) -> float:
-    """Pictures a second of a film of these views, see `film_rate`. Raises InputError."""
-    return rate or film_rate(film, [view.time for view in views], scene.record.duration, slow)
 
 
 def frames_of(
@@ -189,24 +184,13 @@ def _as_json(camera: Camera) -> dict[str, Any]:
     return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in camera._asdict().items()}
 
 
-def write_views_film(
-    file: Path,
-    pictures: Iterator[tuple[PlannedView, RenderOut]],
-    look: Look,
-    rate: float,
-    sequence: ReadFrames | None = None,
-) -> int:
-    """Write a film of panels; returns the number of its pictures.
-
-    sequence   the frames; needed for the panels truth and error
-    """
-    return write_film(file, film_pictures(pictures, look, sequence), rate)
-
-
 def film_pictures(
     pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: ReadFrames | None = None
 ) -> Iterator[ByteImage]:
-    """The panels of every view; depth and error have the same colours in all of them."""
+    """The panels of every view; depth and error have the same colours in all of them.
+
+    sequence   the frames; needed for the panels truth and error
+    """
     scale = None
     for view, out in pictures:
         scale = scale or scale_of(out.depth)

@@ -16,8 +16,8 @@ from endotsr.config import (
     Config,
     Preset,
     config_from_dict,
-    with_fixed_length,
     with_iterations,
+    with_settings,
 )
 from endotsr.errors import InputError
 from endotsr.untrusted.toml import read_toml
@@ -60,9 +60,9 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
         raise InputError(f"--iterations {sources.iterations} is not allowed; allowed: an integer >= 1")
     before = config.training.iterations
     if sources.schedule == "absolute":
-        training = msgspec.structs.replace(config.training, iterations=sources.iterations)
         note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
-        return with_fixed_length(msgspec.structs.replace(config, training=training)), note
+        length = {"iterations": sources.iterations, "visits_per_frame": 0}
+        return with_settings(config, training=length), note
     note = (
         f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its fraction "
         "(--schedule absolute leaves them in place)"
