@@ -56,9 +56,9 @@ def test_stages_that_the_training_announces_are_those_of_the_clock():
             yield
 
     config = TINY.config()
-    state, shop = prepare(TINY, config)
+    state, constants = prepare(TINY, config)
     numba.set_num_threads(1)
-    trainer.training_step(state, shop, Recorder())
+    trainer.training_step(state, constants, Recorder())
     names = [name for name, _ in announced]
     assert set(names) == set(clock.STAGES)
     splat = [name for name in names if name in clock.SPLAT]
@@ -69,9 +69,9 @@ def test_a_timer_changes_no_result():
     config = TINY.config()
     results = []
     for timer in (NO_TIMER, clock.StageClock()):
-        state, shop = prepare(TINY, config)
+        state, constants = prepare(TINY, config)
         with timer.iteration() if isinstance(timer, clock.StageClock) else nullcontext():
-            entry = trainer.training_step(state, shop, timer)
+            entry = trainer.training_step(state, constants, timer)
         results.append((entry, state.gaussians))
     (entry, gaussians), (other_entry, others) = results
     assert entry == other_entry

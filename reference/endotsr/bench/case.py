@@ -71,8 +71,8 @@ def measure(case: BenchCase) -> dict[str, Any]:
 
     use_threads(case.threads)
     config = case.config()
-    state, shop = prepare(case, config)
-    first, times = time_iterations(state, shop, case.repeats)
+    state, constants = prepare(case, config)
+    first, times = time_iterations(state, constants, case.repeats)
     peak = peak_memory_bytes()
     numbers = sum(a.size for a in arrays(state.gaussians).values())
     return {
@@ -81,25 +81,25 @@ def measure(case: BenchCase) -> dict[str, Any]:
         "splat": spread([sum(t[name] for name in SPLAT) for t in times]),
         "iteration": spread([sum(t.values()) for t in times]),
         "first_iteration_s": first,
-        "view": _view(state, shop),
+        "view": _view(state, constants),
         "parameters": numbers // state.gaussians.count,
         "peak_memory_bytes": peak,
-        "densification": _densification(state, shop, case.densifications),
+        "densification": _densification(state, constants, case.densifications),
     }
 
 
 def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
-    """State and workshop of a case, at the timed iteration, with every target computed."""
-    from endotsr.fitting.state import bench_state, workshop
+    """State and constants of a case, at the timed iteration, with every target computed."""
+    from endotsr.fitting.state import bench_state, training_constants
 
-    shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
-    for index in shop.sequence.train_index:
-        shop.targets_of(int(index))  # a run computes them once a frame
+    constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
+    for index in constants.sequence.train_index:
+        constants.targets_of(int(index))  # a run computes them once a frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:
         scene = workload.gaussians(case.gaussians, config, size=case.size)
-    return bench_state(scene, config, representative(config)), shop
+    return bench_state(scene, config, representative(config)), constants
 
 
 def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
@@ -130,7 +130,7 @@ def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
     return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
 
 
-def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
+def time_iterations(state: Any, constants: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
     """Repeat the same iteration of the schedule, after warm-up.
 
     returns  seconds of the very first iteration (compilation or loading of compiled code included); of each of the
@@ -140,12 +140,12 @@ def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[di
 
     iteration, clock = state.iteration, StageClock()
     began = time.perf_counter()
-    training_step(state, shop)
+    training_step(state, constants)
     first = time.perf_counter() - began
     for _ in range(WARM_UP + repeats):
         state.iteration = iteration
         with clock.iteration():
-            training_step(state, shop, clock)
+            training_step(state, constants, clock)
     return first, clock.repeats[WARM_UP:]
 
 
@@ -156,31 +156,31 @@ def representative(config: Config) -> int:
     return start + config.density.interval // 2
 
 
-def _view(state: Any, shop: Any) -> dict[str, int]:
+def _view(state: Any, constants: Any) -> dict[str, int]:
     """Gaussians on the screen, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.bench.pairs import count_pairs
     from endotsr.fitting.model import raster_settings, scene_at
     from endotsr.splatting.render import render_forward
 
-    model, index = shop.config.model, int(shop.sequence.train_index[0])
-    scene, _ = scene_at(state.gaussians, shop.spectral, model, float(shop.sequence.times[index]))
-    settings = raster_settings(shop.config)
-    _, saved = render_forward(scene, shop.sequence.cameras[index], settings, degree=model.harmonics_degree)
+    model, index = constants.config.model, int(constants.sequence.train_index[0])
+    scene, _ = scene_at(state.gaussians, constants.spectral, model, float(constants.sequence.times[index]))
+    settings = raster_settings(constants.config)
+    _, saved = render_forward(scene, constants.sequence.cameras[index], settings, degree=model.harmonics_degree)
     listed = int(saved.composite.lists.ranks.size)
     return {"visible": int(saved.order.size), "listed": listed, "blended": count_pairs(saved).blended}
 
 
-def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:
+def _densification(state: Any, constants: Any, repeats: int) -> dict[str, Any] | None:
     """Time of the densification within an iteration; the scene changes, so there are few repeats."""
     from endotsr.fitting.trainer import training_step
 
     if repeats == 0:
         return None
-    interval, clock = shop.config.density.interval, StageClock()
+    interval, clock = constants.config.density.interval, StageClock()
     for _ in range(1 + repeats):  # the first one loads its kernels
         state.iteration = -(-state.iteration // interval) * interval - 1
         with clock.iteration():
-            training_step(state, shop, clock)
+            training_step(state, constants, clock)
     seconds = [t["density control"] for t in clock.repeats[1:]]
     per_iteration = float(np.median(seconds)) * 1e3 / interval
     return spread(seconds) | {"per_iteration_ms": per_iteration, "gaussians": state.gaussians.count}

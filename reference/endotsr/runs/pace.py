@@ -10,7 +10,7 @@ import time
 
 from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
 from endotsr.sequences.sequence import Sequence
@@ -66,11 +66,11 @@ def seconds_of_unit(sequence: Sequence, config: Config) -> float:
     """Seconds of a unit of work on this machine and this clip: the median of a few iterations, kernels compiled."""
     first = with_settings(QUICK.initialisation, motion="none")
     short = with_settings(config, initialisation=first, training={"bridge_fraction": 0.0, "coarse_start": False})
-    state, shop, found = new_training(sequence, short), workshop(sequence, short), []
+    state, constants, found = new_training(sequence, short), training_constants(sequence, short), []
     state.lambda_lap = state.lambda_lap or 0.0
     for _ in range(WARM + TIMED):
         began = time.perf_counter()
-        training_step(state, shop)
+        training_step(state, constants)
         seconds = time.perf_counter() - began
         found.append(seconds / float(iteration_work(state.gaussians.count, sequence.width * sequence.height)))
     return statistics.median(found[WARM:])
