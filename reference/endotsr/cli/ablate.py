@@ -12,7 +12,7 @@ from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
-    from endotsr.sweeps.row import AblationRecord
+    from endotsr.sweeps.ablation_page import AblationRecord
     from endotsr.sweeps.sweep import Rows
 
 

@@ -4,15 +4,15 @@ In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, wri
 """
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypedDict, cast
 
 from endotsr.report import style
 from endotsr.report.tables import fixed, markdown
 from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine, now, versions
-from endotsr.sweeps.ablation import Increment, increments, levels
+from endotsr.runs.machine import MachinePart, machine, now, versions
+from endotsr.sweeps.ablation import Increment, Level, increments, levels
 from endotsr.sweeps.execute import FAILED, FINISHED
-from endotsr.sweeps.row import AblationRecord, IncrementRow, RunRow
+from endotsr.sweeps.results import RunRow
 from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
@@ -24,6 +24,32 @@ ROW_KEYS = (
     "arrays_sha256",
 )  # fmt: skip
 SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
+
+
+IncrementRow = TypedDict(
+    "IncrementRow",
+    {
+        "claim": str, "with": str, "without": str, "published": float | None, "split": str, "metric": str,
+        "mean": float, "student_low": float | None, "student_high": float | None, "mean_low": float | None,
+        "mean_high": float | None, "median": float, "median_low": float | None, "median_high": float | None,
+        "pairs": int, "sequences": int, "of": list[dict[str, Any]],
+    },
+)  # fmt: skip
+"""A paired difference: contrast, split and metric; the fields of `Estimate`; and its pairs."""
+
+
+class AblationRecord(TypedDict):
+    """ablation.json."""
+
+    format: int
+    date: str
+    command: list[str]
+    machine: MachinePart
+    versions: dict[str, str]
+    runs: dict[str, Any]  # planned, finished, and the names of the failed ones
+    levels: list[Level]
+    increments: list[IncrementRow]
+    rows: list[RunRow]
 
 
 def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:

@@ -5,16 +5,16 @@ reason of a failed one is kept in results.json alone.
 """
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Required, cast
 
 from endotsr.errors import InputError
+from endotsr.evaluation.records import FrameMetrics, MetricValues
 from endotsr.report.comparison import csv_text
 from endotsr.report.tables import markdown
 from endotsr.runs.files import read_json, write_json
-from endotsr.runs.machine import now
+from endotsr.runs.machine import MachinePart, now
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job
-from endotsr.sweeps.row import RunRow
 from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
@@ -30,6 +30,37 @@ SHOWN = (
     ("training_psnr_tissue", "training PSNR tissue", "{:.2f}"), ("cross_fade_psnr_tissue", "cross-fade", "{:.2f}"),
     ("gaussians", "Gaussians", "{}"), ("seconds", "seconds", "{:.0f}"),
 )  # fmt: skip
+
+
+class RunRow(MetricValues, total=False):
+    """One run; a run that is not finished has no numbers, a failed one a reason."""
+
+    name: Required[str]
+    sequence: Required[str]
+    split: Required[str]
+    configuration: Required[str]
+    seed: Required[int]
+    status: Required[str]
+    reason: str
+    training_psnr_full: float | None
+    training_psnr_tissue: float | None
+    cross_fade_psnr_full: float | None
+    cross_fade_psnr_tissue: float | None
+    iterations: int | None
+    gaussians: int | None
+    seconds: float | None
+    peak_memory_bytes: int | None
+    threads: int | None
+    preset: str
+    width: int | None
+    height: int | None
+    arrays_sha256: dict[str, str]
+    settings: dict[str, Any]
+    per_frame: list[FrameMetrics]
+    baselines: dict[str, dict[str, Any]]  # label and mean of each
+    measures: dict[str, dict[str, Any]]
+    versions: dict[str, str] | None
+    machine: MachinePart | None
 
 
 def finished_row(job: Job) -> RunRow:

@@ -17,7 +17,7 @@ from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.sweeps.capacity import Size
+from endotsr.sweeps.place import Size
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job, finished_folder
 from endotsr.sweeps.locks import file_lock

@@ -9,7 +9,7 @@ optical flow of the *recorded* frames, and
     d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
 
 The root mean square of d over the tissue is given for frames in an overlap (at a seam) and for all others (inside), of
-the model and of the recorded frames. It needs no resting camera, unlike `evaluation.flicker`.
+the model and of the recorded frames. It needs no resting camera, unlike `evaluation.measures.flicker`.
 """
 
 from collections.abc import Iterator
