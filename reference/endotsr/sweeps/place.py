@@ -21,6 +21,22 @@ USABLE = 0.9  # of the memory that is free
 CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
+class Size(NamedTuple):
+    """The size of a sequence at the scale of its training, as far as memory depends on it."""
+
+    frames: int
+    width: int
+    height: int
+
+
+class Capacity(NamedTuple):
+    """Runs at a time, threads of each, and what the number of runs follows from."""
+
+    workers: int
+    threads: int
+    reason: str
+
+
 class Place(NamedTuple):
     """What the options of a command ask for; None = as many as fit, and this machine."""
 
@@ -62,22 +78,6 @@ def outcomes_at(
     many = f"{len(jobs)} {what}, {found.workers} at a time"
     print(f"{many}, threads of each: {found.threads} ({found.reason})", flush=True)
     return local_outcomes(jobs, found.workers, found.threads)
-
-
-class Size(NamedTuple):
-    """The size of a sequence at the scale of its training, as far as memory depends on it."""
-
-    frames: int
-    width: int
-    height: int
-
-
-class Capacity(NamedTuple):
-    """Runs at a time, threads of each, and what the number of runs follows from."""
-
-    workers: int
-    threads: int
-    reason: str
 
 
 def run_bytes(size: Size, config: Config) -> float:
