@@ -192,7 +192,7 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.export.times import Times
+    from endotsr.export.times import Times, chosen_times
     from endotsr.runs.folder import RunFolder
     from endotsr.views.plan import ViewRequest, check_request, views_of
 
@@ -200,9 +200,9 @@ def read_sequence(path: Path) -> object:
     record = folder.sequence_record()
     requests = ViewRequest(Times(frames="all")), ViewRequest(Times(count=3), camera="sway", size="20x20")
     for request in requests:
-        check_request(request, record)
-    for request in requests:
-        for view in views_of(request, record, record.frame_cameras, pivot_depth=50.0):
+        wanted = chosen_times("render", request.times, record)
+        check_request(request, record.count)
+        for view in views_of(request, wanted, record.frame_cameras, pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
             assert view.camera.width > 0

@@ -85,6 +85,8 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
     Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
+    from endotsr.sequences.film_file import write_video
+
     count = 0
 
     def counted() -> Iterator[ByteImage]:
@@ -92,15 +94,11 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
         for count, picture in enumerate(pictures, start=1):
             yield picture
 
-    writer = _write_gif if file.suffix.lower() == ".gif" else _write_video
-    replace_file(file, lambda temporary: writer(temporary, counted(), rate))
+    if file.suffix.lower() == ".gif":
+        replace_file(file, lambda temporary: _write_gif(temporary, counted(), rate))
+    else:
+        replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate))
     return count
-
-
-def _write_video(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
-    from endotsr.sequences.film_file import write_video
-
-    write_video(file, (_even(picture) for picture in pictures), rate)
 
 
 def _even(picture: ByteImage) -> ByteImage:

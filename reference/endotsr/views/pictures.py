@@ -76,13 +76,14 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     default   frames to show if no times are chosen
     Raises: InputError as `views_of`, before the model is read; and as `MovingScene.model`.
     """
-    check_request(request, scene.record, default)
+    wanted = chosen_times("render", request.times, scene.record, default)
+    check_request(request, scene.record.count)
     pivot_depth, _ = 1.0, scene.model
     if request.camera in TURNING:
-        time, frame, _, _ = chosen_times("render", request.times, scene.record, default)[0]
+        time, frame, _, _ = wanted[0]
         out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
-    return views_of(request, scene.record, scene.cameras, pivot_depth, default, scene.placement)
+    return views_of(request, wanted, scene.cameras, pivot_depth, scene.placement)
 
 
 def check_outputs(out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None) -> None:
