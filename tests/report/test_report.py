@@ -47,10 +47,14 @@ def metrics(value):
     return {"psnr_full": value + 1.8, "psnr_tissue": value, "ssim_full": 0.9671, "lpips": None}
 
 
+ABOUT = {
+    "source": "clip", "frames": 9, "width": 32, "height": 24, "training_frames": 5, "held_out_frames": 4,
+    "tissue_fraction": 0.875, "files_sha256": {"images/a.png": "ab" * 32},
+}  # fmt: skip
 RUN = {
     "iteration": 20, "iterations_planned": 30, "gaussians": 5, "seed": 0, "threads": 2, "seconds": 61.0,
-    "peak_memory_bytes": None, "lambda_lap": None, "versions": {"numpy": "2.1"},
-    "machine": {"processor": "two cores"}, "input": {"source": "clip", "files_sha256": {"images/a.png": "ab" * 32}},
+    "peak_memory_bytes": None, "lambda_lap": None, "versions": {"numpy": "2.1"}, "input": ABOUT,
+    "machine": {"processor": "two cores", "cores": 2, "system": "Linux"},
 }  # fmt: skip
 
 

@@ -77,10 +77,7 @@ def finished_row(job: Job) -> RunRow:
         **{f"training_{name}": inside.get(name) for name in names},
         **{f"cross_fade_{name}": faded.get(name) for name in names},
         "iterations": run.get("iteration"),
-        "gaussians": run.get("gaussians"),
-        "seconds": run.get("seconds"),
-        "peak_memory_bytes": run.get("peak_memory_bytes"),
-        "threads": run.get("threads"),
+        **{name: run.get(name) for name in (*COSTS[1:], "threads", "versions", "machine")},
         "preset": run["settings"]["preset"],
         "width": run["input"].get("width"),
         "height": run["input"].get("height"),
@@ -89,8 +86,6 @@ def finished_row(job: Job) -> RunRow:
         "per_frame": held_out["per_frame"],
         "baselines": {name: {"label": row["label"], "mean": row["mean"]} for name, row in metrics["baselines"].items()},
         "measures": metrics.get("measures", {}),
-        "versions": run.get("versions"),
-        "machine": run.get("machine"),
     }
     return cast(RunRow, row)
 

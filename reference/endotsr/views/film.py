@@ -85,8 +85,6 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
     Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
-    from endotsr.sequences.film_file import write_video
-
     count = 0
 
     def counted() -> Iterator[ByteImage]:
@@ -97,6 +95,8 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     if file.suffix.lower() == ".gif":
         replace_file(file, lambda temporary: _write_gif(temporary, counted(), rate))
     else:
+        from endotsr.sequences.film_file import write_video
+
         replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate))
     return count
 
