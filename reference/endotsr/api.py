@@ -354,7 +354,7 @@ class Run:
         from endotsr.evaluation.lpips import load_lpips_weights
         from endotsr.evaluation.run import measure_model
 
-        weights = load_lpips_weights(None if lpips is None else Path(lpips))
+        weights = load_lpips_weights(lpips)
         sequence, about = self.sequence, self.record.get("input", {})
         simulator = checked(about.get("simulator", {}), SimulatorSettings, "run.json", "input.simulator.")
         truth = sources.true_positions_of(self._source or str(about.get("source")), simulator, self.config, sequence)

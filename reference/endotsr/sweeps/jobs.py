@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import msgspec
 
-from endotsr.config import Config, lengthened, with_settings
+from endotsr.config import Config, by_key, lengthened, with_settings
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -160,11 +160,10 @@ def measured_at_the_end(job: Job) -> bool:
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
     """Raises InputError if the folder holds a run of other settings than those of the job, threads apart."""
-    ours, theirs = msgspec.to_builtins(job.config), msgspec.to_builtins(folder.config())
-    for section, values in ours.items():
-        for key, value in values.items() if isinstance(values, dict) else ():
-            if theirs[section][key] != value and (section, key) != ("training", "threads"):
-                raise InputError(
-                    f"{folder.path}: holds a run with {section}.{key} = {theirs[section][key]!r}, the sweep asks for "
-                    f"{value!r}; allowed: the settings that the sweep began with, or another --out"
-                )
+    theirs = by_key(msgspec.to_builtins(folder.config()))
+    for key, value in by_key(msgspec.to_builtins(job.config)).items():
+        if theirs[key] != value and key not in ("preset", "training.threads"):
+            raise InputError(
+                f"{folder.path}: holds a run with {key} = {theirs[key]!r}, the sweep asks for {value!r}; allowed: the "
+                "settings that the sweep began with, or another --out"
+            )

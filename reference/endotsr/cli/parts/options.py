@@ -15,6 +15,7 @@ from endotsr.config import (
     MILESTONES,
     Config,
     Preset,
+    by_key,
     config_from_dict,
     with_iterations,
     with_settings,
@@ -95,11 +96,9 @@ def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
     """Keys of the settings that the command line or its TOML file names: `model.bases`. A preset names none."""
     sources = parse_known(Sources, words)
     asked = read_toml(sources.config) if sources.config else {}
-    in_file = {f"{section}.{key}" for section, values in asked.items() if isinstance(values, dict) for key in values}
     given = given_keys(options, words)
-    return frozenset(
-        in_file | {key for key in given if "." in key} | {SHORT_NAMES[k] for k in given & set(SHORT_NAMES)}
-    )
+    named = {key for key in by_key(asked).keys() | given if "." in key}
+    return frozenset(named | {SHORT_NAMES[key] for key in given & set(SHORT_NAMES)})
 
 
 def with_short_names(config: Config, given: dict[str, Any]) -> Config:
@@ -114,12 +113,5 @@ def with_short_names(config: Config, given: dict[str, Any]) -> Config:
 
 def differences(config: Config, other: Config, name: str) -> list[str]:
     """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
-    ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
-    preset = [f"preset = {config.preset!r} ({name}: {other.preset!r})"] if config.preset != other.preset else []
-    return preset + [
-        f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
-        for section, values in ours.items()
-        if isinstance(values, dict)
-        for key, value in values.items()
-        if value != theirs[section][key]
-    ]
+    ours, theirs = by_key(msgspec.to_builtins(config)), by_key(msgspec.to_builtins(other))
+    return [f"{key} = {ours[key]!r} ({name}: {theirs[key]!r})" for key in ours if ours[key] != theirs[key]]
