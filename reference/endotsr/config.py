@@ -350,18 +350,19 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
         raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
     data = without_former_keys(data, where, PRESETS[preset].training.bridge_fraction)
     refuse_unknown_keys(data, Config, where)
-    config = checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
-    _refuse_contradictions(config, where)
-    return config
+    return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
 
 
 def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
     """A section from plain data, types and ranges checked. Raises InputError naming the key and what is allowed."""
     _refuse_non_finite(data, where, prefix)
     try:
-        return msgspec.convert(data, kind, strict=True)
+        found = msgspec.convert(data, kind, strict=True)
     except msgspec.ValidationError as error:
         raise InputError(f"{where}: {_explain(str(error), data, kind, prefix)}") from None
+    if isinstance(found, Config):
+        _refuse_contradictions(found, where)
+    return found
 
 
 def load_config(path: Path) -> Config:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.options import base_settings, with_short_names
+from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
@@ -31,13 +31,7 @@ class InspectOptions:
     """frames a second (default: those of the recording, where known); rates are then also given a minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
-    scale: float | None = None
-    """image scale (= --sequence.scale)"""
-    frames: Annotated[str | None, Option("A:B[:S]")] = None
-    """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
-    """mask folder (= --sequence.masks)"""
-    settings: Annotated[Config, Option(flat=True)] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = PAPER
 
 
 def run(words: list[str]) -> int:
@@ -52,12 +46,10 @@ def run(words: list[str]) -> int:
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
     if not options.sequence:
         raise InputError("inspect: SEQUENCE is missing: a sequence folder, or the word `simulated`")
-    names = ("scale", "frames", "masks")
-    config = with_short_names(options.settings, {name: getattr(options, name) for name in names})
     refuse_unwritable(options.out, options.json)
-    sequence = load_sequence(options.sequence, config, SimulatorSettings())
+    sequence = load_sequence(options.sequence, options.settings, SimulatorSettings())
     inspection = inspect_sequence(sequence, options.frame_rate)
-    plan = make_plan(inspection, config)
+    plan = make_plan(inspection, options.settings)
     print(inspection_text(inspection, plan))
     if options.out:
         replace_text(options.out, inspection_html(Path(options.sequence).name, inspection, plan))

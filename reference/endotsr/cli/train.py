@@ -11,7 +11,6 @@ from endotsr.cli.parts.options import (
     base_settings,
     differences,
     explicit_settings,
-    with_short_names,
 )
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
@@ -26,6 +25,7 @@ from endotsr.windows.record import is_windowed
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
+SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
 RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run because they change no result
 
 
@@ -49,16 +49,6 @@ class TrainOptions:
     """length, points and Gaussians for a training of so many minutes on this machine, from preset `quick` upwards"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
-    scale: float | None = None
-    """image scale (= --sequence.scale)"""
-    frames: Annotated[str | None, Option("A:B[:S]")] = None
-    """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, Option("{masks,gt_masks,none}")] = None
-    """mask folder (= --sequence.masks)"""
-    seed: int | None = None
-    """seed of every random draw (= --training.seed)"""
-    threads: int | None = None
-    """threads, 0 = all cores (= --training.threads)"""
     effects: Literal["everything", "auto"] = "everything"
     """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
     windows: Annotated[str | None, Option("auto|N")] = None
@@ -82,7 +72,7 @@ class TrainOptions:
     """AlexNet LPIPS weights for the evaluation"""
     json: JsonFile = None
     """also write the metrics of the evaluation, or the calibration, as JSON"""
-    settings: Annotated[Config, Option(flat=True)] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=SHORT)] = PAPER
 
 
 def run(words: list[str]) -> int:
@@ -123,12 +113,12 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
     assert options.out is not None
     if options.effects != "everything":
         raise InputError("train: --effects auto beside --windows is not allowed; allowed: inspect a part, and settings")
-    place = Place(options.workers, options.threads or None, options.scheduler)
+    place = Place(options.workers, options.settings.training.threads or None, options.scheduler)
     check_place("train", place)
     if options.resume:
         _accepted_settings(options.out, words, recording_settings(options.out))
     else:
-        named, config = explicit_settings(TrainOptions, words), _settings(options)
+        named, config = explicit_settings(TrainOptions, words), options.settings
         if options.iterations is None and not named & {"training.iterations", "training.visits_per_frame"}:
             config = with_visits(config)
         plan_windows(options.sequence, options.out, config, options.windows or "", options.overlap, options.chain)
@@ -145,7 +135,7 @@ def _accepted_settings(out: Path, words: list[str], kept: Config, frames: int | 
     Raises:  InputError for settings that differ and would change a result.
     """
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
-    wanted = _settings(options) if frames is None else lengthened(_settings(options), frames)
+    wanted = options.settings if frames is None else lengthened(options.settings, frames)
     asked = asked_settings(TrainOptions, words, wanted, kept)
     extended = frames is not None and asked.training.iterations > kept.training.iterations
     allowed = RESUMABLE | ({"training.iterations"} if extended else set())
@@ -164,15 +154,10 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
         if getattr(options, name):
             raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
     folder = open_run(options.out)
-    config = _settings(parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())))
+    config = parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())).settings
     refuse_unwritable(options.json)
     calibrate_run(folder, config, options.sequence or None, options.json)
     return 0
-
-
-def _settings(options: TrainOptions) -> Config:
-    names = ("scale", "frames", "masks", "seed", "threads")
-    return with_short_names(options.settings, {name: getattr(options, name) for name in names})
 
 
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
@@ -190,7 +175,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     assert options.out is not None
     if options.minutes is not None and (options.iterations is not None or not 0 < options.minutes < math.inf):
         raise InputError(f"train: --minutes {options.minutes:g}: allowed: a number > 0, without --iterations")
-    config, source = _settings(options), options.sequence
+    config, source = options.settings, options.sequence
     refuse_existing(options.out)
     if source != SIMULATED:
         refuse_inside(options.out, Path(source), "the sequence")

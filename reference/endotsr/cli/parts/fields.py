@@ -32,6 +32,7 @@ class Option:
     positional: bool = False  # given without a name
     may_be_empty: bool = False  # of several values: also without any value
     flat: bool = False  # a section of settings whose keys are options without the name of the field in front
+    short: tuple[str, ...] = ()  # keys of such a section that are options without their section, too: `--scale`
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,11 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
         note, plain = _split_note(annotated)
         value = fallback if values is None else getattr(values, name)
         if is_section(plain):
-            inner = prefix if note.flat else f"{prefix}{name}."
-            yield from _walk(plain, value, (*path, name), inner, plain)
+            inside = list(_walk(plain, value, (*path, name), prefix if note.flat else f"{prefix}{name}.", plain))
+            for field in (field for field in inside if field.key in note.short):
+                short, about = f"--{field.key.rpartition('.')[2]}", f"{field.help} (= {field.name})"
+                yield dataclasses.replace(field, name=short, help=about, section=None)
+            yield from inside
         else:
             yield Field(
                 path=(*path, name),

@@ -23,16 +23,6 @@ from endotsr.config import (
 from endotsr.errors import InputError
 from endotsr.untrusted.toml import read_toml
 
-# Options that are a setting under a shorter name.
-SHORT_NAMES = {
-    "scale": "sequence.scale",
-    "frames": "sequence.frames",
-    "masks": "sequence.masks",
-    "seed": "training.seed",
-    "threads": "training.threads",
-}
-
-
 @dataclass
 class Sources:
     """The sources of the settings of a run."""
@@ -96,19 +86,7 @@ def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
     """Keys of the settings that the command line or its TOML file names: `model.bases`. A preset names none."""
     sources = parse_known(Sources, words)
     asked = read_toml(sources.config) if sources.config else {}
-    given = given_keys(options, words)
-    named = {key for key in by_key(asked).keys() | given if "." in key}
-    return frozenset(named | {SHORT_NAMES[key] for key in given & set(SHORT_NAMES)})
-
-
-def with_short_names(config: Config, given: dict[str, Any]) -> Config:
-    """The settings with the short options that were given (not None), checked."""
-    data = msgspec.to_builtins(config)
-    for name, value in given.items():
-        if value is not None:
-            section, key = SHORT_NAMES[name].split(".")
-            data[section][key] = value
-    return config_from_dict(data, "command line")
+    return frozenset(key for key in by_key(asked).keys() | given_keys(options, words) if "." in key)
 
 
 def differences(config: Config, other: Config, name: str) -> list[str]:
