@@ -9,7 +9,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
@@ -24,7 +24,6 @@ def run(words: list[str]) -> int:
     from endotsr.report.comparison import frames_csv
 
     options = parse(EvaluateOptions, words, "evaluate")
-    refuse_unwritable(options.json, options.csv)
     use_threads(options.threads)
     if len(options.methods) > 1 or options.compare:
         return _compare(options)

@@ -7,9 +7,10 @@ from typing import Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.runs.files import write_json
 from endotsr.untrusted.writing import replace_text
 
 
@@ -23,9 +24,9 @@ class InspectOptions:
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)]
     """sequence folder, or `simulated`"""
-    out: Annotated[Path | None, Option("report.html")] = None
+    out: Annotated[Path | None, Option("report.html", written=True)] = None
     """write a self-contained page with pictures"""
-    json: Annotated[Path | None, Option("FILE")] = None
+    json: JsonFile = None
     """write verdicts and plan as JSON"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
     """frames a second (default: those of the recording, where known); rates are then also given a minute"""
@@ -46,7 +47,6 @@ def run(words: list[str]) -> int:
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
     if not options.sequence:
         raise InputError("inspect: SEQUENCE is missing: a sequence folder, or the word `simulated`")
-    refuse_unwritable(options.out, options.json)
     sequence = load_sequence(options.sequence, options.settings, SimulatorSettings())
     inspection = inspect_sequence(sequence, options.frame_rate)
     plan = make_plan(inspection, options.settings)

@@ -62,7 +62,6 @@ def run(words: list[str]) -> int:
     """The command."""
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
-    from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
     from endotsr.views.film import film_rate, speed_in_words, write_film
@@ -73,7 +72,6 @@ def run(words: list[str]) -> int:
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate, options.slow)
-    refuse_unwritable(options.json)
     use_threads(options.threads)
     scene = open_any(options.scene)
     for path in filter(None, (options.out, options.film)):

@@ -9,7 +9,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
+from endotsr.runs.files import refuse_folder, write_json
 
 if TYPE_CHECKING:
     from endotsr.tradeoff.scenes import StudyScene
@@ -66,7 +66,6 @@ def _refuse(options: TradeoffOptions) -> None:
         raise InputError("tradeoff: give one of --run and --splats")
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json holds the answer to --budget; the measurement itself is DIR/{RESULT}")
-    refuse_unwritable(options.json)
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
 

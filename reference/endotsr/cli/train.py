@@ -17,7 +17,6 @@ from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.runs.records import RunRecord
 from endotsr.windows.record import is_windowed
@@ -87,7 +86,6 @@ def run(words: list[str]) -> int:
         return _calibrate(options, words)
     if options.json and not options.evaluate:
         raise InputError("train: --json holds the metrics, which --no-evaluate leaves out; allowed: one of them")
-    refuse_unwritable(options.json)
     if options.evaluate:
         load_lpips_weights(options.lpips)  # weights that cannot be used are refused before the training begins
     if options.windows is not None or (options.resume and is_windowed(options.out)):
@@ -155,7 +153,6 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
             raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
     folder = open_run(options.out)
     config = parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())).settings
-    refuse_unwritable(options.json)
     calibrate_run(folder, config, options.sequence or None, options.json)
     return 0
 

@@ -53,7 +53,7 @@ class EvaluateOptions:
     """sequence folder, or `simulated`; of a run: its current location (default: the recorded one)"""
     json: JsonFile = None
     """also write the metrics as JSON"""
-    csv: Annotated[Path | None, Option("FILE")] = None
+    csv: Annotated[Path | None, Option("FILE", written=True)] = None
     """also write the metrics of every held-out frame as CSV"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""

@@ -31,6 +31,7 @@ class Option:
     metavar: str = ""  # the value in the help; empty = derived from the type
     positional: bool = False  # given without a name
     may_be_empty: bool = False  # of several values: also without any value
+    written: bool = False  # a file that the command writes: refused before the work if it cannot be
     flat: bool = False  # a section of settings whose keys are options without the name of the field in front
     short: tuple[str, ...] = ()  # keys of such a section that are options without their section, too: `--scale`
 
@@ -48,6 +49,7 @@ class Field:
     metavar: str
     positional: bool
     may_be_empty: bool = False
+    written: bool = False
 
     @property
     def in_section(self) -> bool:
@@ -110,6 +112,7 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 metavar=note.metavar or _metavar(plain),
                 positional=note.positional,
                 may_be_empty=note.may_be_empty,
+                written=note.written,
             )
 
 
