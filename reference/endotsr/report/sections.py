@@ -15,7 +15,7 @@ from endotsr.evaluation.records import Means
 from endotsr.report import curves, figures, parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
 from endotsr.report.run_text import SHOWN, facts, pose_sentence, trajectory_sentence
-from endotsr.report.tables import duration, fixed, html_table
+from endotsr.report.tables import duration, html_table
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
@@ -265,8 +265,8 @@ def components(data: ReportData) -> str:
     found, rows = data.evaluation.get("components", []), []
     for row in found:
         ours, whole = row.get("psnr_tissue"), found[0].get("psnr_tissue")
-        known = row is not found[0] and ours is not None and whole is not None
-        change = f"{fixed(ours - whole, 2, '+')} dB" if known else ""
+        gain = None if ours is None or whole is None or row is found[0] else ours - whole
+        change = "" if gain is None else f"{gain:+.2f} dB"
         rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
     note = (
         "Held-out means of the trained model, rendered with the named residual set to zero. Component L, the Laplacian "
