@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from tradeoff_presets import KEPT, dominates, judge_presets
+from tradeoff_text import KEPT, dominates, judge_presets
 
 from endotsr.tradeoff.study import Ranked, non_dominated
 from endotsr.tradeoff.study import run_study
