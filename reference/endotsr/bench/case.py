@@ -25,6 +25,7 @@ Precision = Literal["float32", "float64"]
 
 WARM_UP = 2  # iterations after the compiling one
 DEPTH = 4.0  # scene units of the middle of a trained scene, that of the common workload
+SEED = 7  # of the time-dependent parameters of a trained scene
 PERCENTILES = (1, 99)  # of the positions of a trained scene: the range that is scaled to the picture
 
 
@@ -102,7 +103,7 @@ def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
     return bench_state(scene, config, representative(config)), constants
 
 
-def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
+def trained_gaussians(path: Path, config: Config) -> Gaussians:
     """A trained scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
 
     path   npz, see `export.npz`
@@ -127,7 +128,7 @@ def trained_gaussians(path: Path, config: Config, seed: int = 7) -> Gaussians:
         harmonics=cast(harmonics),
     )
     sigma = float(np.exp(np.median(scene.log_scale)))
-    return scene._replace(**workload.temporal(np.random.default_rng(seed), opacity.size, config, sigma))
+    return scene._replace(**workload.temporal(np.random.default_rng(SEED), opacity.size, config, sigma))
 
 
 def time_iterations(state: Any, constants: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:

@@ -76,17 +76,10 @@ def left_out(evaluation: EvaluationRecord) -> list[str]:
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
 
-def baseline_table(
-    sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
-) -> dict[str, LabelledFrames]:
-    """The four predictions without a model, measured like a model.
-
-    indices   frames to predict; default: all held-out frames
-    returns   baseline key -> {"label", "mean", "per_frame", "excluded", "not_finite"}, in the order of BASELINES
-    """
-    wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
+def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
+    """The four predictions of the held-out frames without a model, by key in the order of BASELINES."""
     return {
-        name: {"label": label, **evaluate_frames(sequence, wanted, make(sequence), lpips_weights)}
+        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
         for name, (label, make) in BASELINES.items()
     }
 

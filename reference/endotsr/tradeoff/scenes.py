@@ -62,7 +62,6 @@ class StudyScene:
 def simulated_scene(
     iterations: int = ITERATIONS,
     width: int = SIMULATED_WIDTH,
-    seed: int = 0,
     step: Callable[[], None] = lambda: None,
 ) -> StudyScene:
     """The simulated sequence after a short training with every component, in a picture `width` wide.
@@ -76,7 +75,7 @@ def simulated_scene(
     from endotsr.simulator.simulate import simulate
 
     height = width * SIMULATED_HEIGHT // SIMULATED_WIDTH
-    simulator = SimulatorSettings(width=width, height=height, seed=seed)
+    simulator = SimulatorSettings(width=width, height=height)
     sequence = simulate(simulator).sequence
     fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
     points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}

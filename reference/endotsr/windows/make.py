@@ -7,7 +7,6 @@ whose neighbour has failed starts cold. Finished windows are kept, and one that 
 """
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,16 +33,14 @@ VISITS = 36  # least iterations of a cold window per training frame, unless the 
 WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
 
 
-def plan_recording(
-    source: Path, config: Config, wanted: Wanted, out: Path, on_frame: Callable[[], object] = lambda: None
-) -> WindowsRecord:
+def plan_recording(source: Path, config: Config, wanted: Wanted, out: Path) -> WindowsRecord:
     """Survey a recording and write the run folder with the plan of its windows; no window is trained.
 
     Raises: InputError for settings, a recording or a folder that cannot be used, and where no window remains.
     """
     refuse_existing(out)
     check_wanted(wanted, config.sequence)
-    found = survey(source, config.sequence, on_frame)
+    found = survey(source, config.sequence)
     windows, left_out = planned_windows(found, wanted, config.sequence)
     if not windows:
         raise InputError(f"{source}: no window remains: {left_out[0].reason}")
