@@ -60,10 +60,10 @@ def measure_folder(
     source    where the sequence is now; where it is simulated, the motion is measured too
     measures  names of `evaluation.measures.MEASURES`: their results are `measures` in metrics.json
     """
-    model, (_, simulator) = load_model(folder), run_source(folder)
+    model, (_, simulator), record = load_model(folder), run_source(folder), folder.record(*REPORTED)
     truth = true_positions_of(source, simulator, folder.config(), sequence)
     found, held_out = measure_model(model, sequence, weights, truth)
-    metrics: RunEvaluation = {**found, "run": about_run(folder.record(*REPORTED), model)}
+    metrics: RunEvaluation = {**found, "run": about_run(record, model)}
     if measures:
         metrics["measures"] = measured(measures, model, sequence, source)
     return model, metrics, held_out

@@ -5,7 +5,7 @@ In: the dictionary of metrics.json. Out: text; no file, no HTML.
 
 from endotsr.evaluation.evaluate import left_out
 from endotsr.evaluation.records import EvaluationRecord, MotionPart, PosePart, RunPart
-from endotsr.report.tables import duration, fixed
+from endotsr.report.tables import duration, fixed, plain
 
 SHOWN = (("psnr_full", "PSNR full", 2), ("psnr_tissue", "PSNR tissue", 2), ("ssim_full", "SSIM full", 4))
 TABLE = (*SHOWN, ("ssim_tissue", "SSIM tissue", 4), ("lpips", "LPIPS", 4))
@@ -48,12 +48,9 @@ def held_out_table(metrics: EvaluationRecord) -> str:
     rows += [(entry["label"], entry["mean"]) for entry in [metrics.get("cross_fade")] if entry]
     rows += [(entry["label"], entry["mean"]) for entry in metrics["baselines"].values()]
     columns = [column for column in TABLE if any(mean.get(column[0]) is not None for _, mean in rows)]
-    width = max(len(label) for label, _ in rows)
-    frames = len(metrics["held_out"]["per_frame"])
-    lines = [" ".join([f"{f'{frames} held-out frames':<{width}}", *(f"{label:>12}" for _, label, _ in columns)])]
-    for label, mean in rows:
-        cells = (f"{fixed(mean.get(key), digits):>12}" for key, _, digits in columns)
-        lines.append(" ".join([f"{label:<{width}}", *cells]))
+    head = [f"{len(metrics['held_out']['per_frame'])} held-out frames", *(label for _, label, _ in columns)]
+    cells = [[label, *(fixed(mean.get(key), digits) for key, _, digits in columns)] for label, mean in rows]
+    lines = [plain(head, cells)]
     inside = metrics["training"]["mean"].get("psnr_tissue")
     run: RunPart | None = metrics.get("run")
     if run is not None or inside is not None:
