@@ -97,7 +97,7 @@ def measure_peaks(threads: int) -> dict[str, Any]:
     return {"threads": threads, "flop_per_second": fma, "bytes_per_second": bandwidths()}
 
 
-def higher(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+def higher(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
     """The higher of two measurements of each peak."""
     rates = ("flop_per_second", "bytes_per_second")
-    return first | {kind: {name: max(v, second[kind][name]) for name, v in first[kind].items()} for kind in rates}
+    return before | {kind: {name: max(v, after[kind][name]) for name, v in before[kind].items()} for kind in rates}

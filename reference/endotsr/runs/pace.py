@@ -28,11 +28,11 @@ def paced(config: Config, x: float) -> Config:
     def between(low: int, high: int, at: float) -> int:
         return max(1, round(low * (high / low) ** at))
 
-    growing, first, best = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
+    growing, quick, sharp = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
     timed = with_iterations(config, between(QUICK.training.iterations, SHARP_LENGTH, x))
     maximum = between(QUICK.density.maximum, SHARP.density.maximum, growing)
     points = {
-        name: between(getattr(first, name), getattr(best, name), growing)
+        name: between(getattr(quick, name), getattr(sharp, name), growing)
         for name in ("first_frame_points", "other_frame_points")
     }
     density, training = {"growth": "budget", "maximum": maximum}, {"coarse_start": x <= COARSE_BELOW}
@@ -64,8 +64,8 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -
 
 def seconds_of_unit(sequence: Sequence, config: Config) -> float:
     """Seconds of a unit of work on this machine and this clip: the median of a few iterations, kernels compiled."""
-    first = with_settings(QUICK.initialisation, motion="none")
-    short = with_settings(config, initialisation=first, training={"bridge_fraction": 0.0, "coarse_start": False})
+    still = with_settings(QUICK.initialisation, motion="none")
+    short = with_settings(config, initialisation=still, training={"bridge_fraction": 0.0, "coarse_start": False})
     state, constants, found = new_training(sequence, short), training_constants(sequence, short), []
     state.lambda_lap = state.lambda_lap or 0.0
     for _ in range(WARM + TIMED):

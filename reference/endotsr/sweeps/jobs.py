@@ -6,6 +6,7 @@ A job holds all that another process or machine needs to make the run.
 
 import contextlib
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -93,12 +94,11 @@ def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> lis
     Raises:           InputError for a sequence that cannot be used, or two runs of one name.
     """
     names, jobs = sequence_names(spec.sequences), []
-    for seed in spec.seeds:
-        for source in spec.sequences:
-            for split in spec.splits or ("",):
-                for configuration in spec.configurations:
-                    job = _job(spec, configuration, names[source], source, split, seed, out)
-                    jobs.append(_lengthened(job, training_frames(job)))
+    for seed, source, split, configuration in product(
+        spec.seeds, spec.sequences, spec.splits or ("",), spec.configurations
+    ):
+        job = _job(spec, configuration, names[source], source, split, seed, out)
+        jobs.append(_lengthened(job, training_frames(job)))
     seen: set[str] = set()
     for job in jobs:
         if job.name.lower() in seen:
