@@ -40,7 +40,7 @@ from endotsr.config import PAPER, with_iterations
 from endotsr.evaluation.baselines import BASELINES
 from endotsr.evaluation.metrics import psnr, psnr_tissue, ssim_full, ssim_tissue
 from endotsr.fitting.model import render_at
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.gradcheck import all_pairs, check_function, one_thread, pair_stream, table
 from endotsr.simulator import SimulatorSettings, simulate
@@ -127,18 +127,18 @@ def objective_text(i, terms, config):
 
 # %%
 def train(sequence, config):
-    """A training as the command runs it, without files: (state, workshop, log)."""
-    shop, state, log = workshop(sequence, config), new_training(sequence, config), []
+    """A training as the command runs it, without files: (state, constants, log)."""
+    constants, state, log = training_constants(sequence, config), new_training(sequence, config), []
     while state.iteration < config.training.iterations:
-        log.append(training_step(state, shop))
-    return state, shop, log
+        log.append(training_step(state, constants))
+    return state, constants, log
 
 
-def render(state, shop, index, **components):
+def render(state, constants, index, **components):
     out = render_at(
         state.gaussians,
-        shop.spectral,
-        shop.config,
+        constants.spectral,
+        constants.config,
         sequence.cameras[index],
         float(sequence.times[index]),
         **components,
@@ -146,12 +146,12 @@ def render(state, shop, index, **components):
     return np.clip(out.colour, 0, 1)
 
 
-def score(state, shop, frames, **components):
+def score(state, constants, frames, **components):
     """Mean PSNR over tissue, dB."""
     return np.mean(
         [
             psnr_tissue(
-                render(state, shop, int(k), **components),
+                render(state, constants, int(k), **components),
                 sequence.frame(int(k)).image,
                 sequence.masks[k],
             )
@@ -187,7 +187,7 @@ assert score(one_state, one_shop, [first]) > score(one_state, one_shop, others) 
 # ## The full sequence
 
 # %%
-state, shop, log = train(sequence, config)
+state, constants, log = train(sequence, config)
 for entry in log:
     np.testing.assert_allclose(
         entry["loss"], objective_text(entry["iteration"], entry, config), rtol=1e-12
@@ -224,7 +224,7 @@ for milestone, label in (
     axes[0].text(milestone, 2e-4, label, fontsize=8, rotation=90, va="top", ha="right")
 axes[0].set(title="terms of the objective (unweighted)", xlabel="iteration", ylim=(1e-9, 2))
 axes[0].legend(fontsize=8, ncols=3, loc="lower left")
-per_frame = [score(state, shop, [k]) for k in range(sequence.count)]
+per_frame = [score(state, constants, [k]) for k in range(sequence.count)]
 held = np.isin(np.arange(sequence.count), sequence.test_index)
 axes[1].plot(
     np.arange(sequence.count)[~held], np.array(per_frame)[~held], "o", label="training frames"
@@ -296,7 +296,7 @@ def ssim_text(x_hat, x, M):
 # %%
 for k in sequence.test_index:
     M, truth = sequence.masks[k], sequence.frame(int(k), np.float64).image
-    rendered = render(state, shop, int(k)).astype(np.float64)
+    rendered = render(state, constants, int(k)).astype(np.float64)
     masked = (np.where(M, rendered, 0), np.where(M, truth, 0), M)
     np.testing.assert_allclose(
         (psnr(rendered, truth, M), psnr_tissue(rendered, truth, M)),
@@ -321,9 +321,9 @@ for k in sequence.test_index:
 shown = sequence.test_index[[0, -1]]
 figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
 for row, k in zip(axes, shown):
-    truth, full = sequence.frame(int(k)).image, render(state, shop, int(k))
+    truth, full = sequence.frame(int(k)).image, render(state, constants, int(k))
     without_A, without_S = (
-        render(state, shop, int(k), **{c: False}) for c in ("appearance", "spectral_motion")
+        render(state, constants, int(k), **{c: False}) for c in ("appearance", "spectral_motion")
     )
     error = np.where(sequence.masks[k], np.abs(full - truth).mean(axis=0), np.nan)
     pictures = (
@@ -335,7 +335,7 @@ for row, k in zip(axes, shown):
     )
     titles = (
         f"held-out frame {k}",
-        f"render, {score(state, shop, [k]):.1f} dB",
+        f"render, {score(state, constants, [k]):.1f} dB",
         "error (0 to 0.2)",
         "what A adds (±0.15)",
         "what S adds (±0.15)",
@@ -359,7 +359,7 @@ plt.show()
 times = np.arange(2 * sequence.count - 1) / (2 * sequence.count)
 strips = []
 for j, t in enumerate(times):
-    out = render_at(state.gaussians, shop.spectral, shop.config, sequence.cameras[0], float(t))
+    out = render_at(state.gaussians, constants.spectral, constants.config, sequence.cameras[0], float(t))
     pair = [sequence.images[j // 2] / 255, np.clip(out.colour, 0, 1)]
     strip = np.concatenate(pair, axis=2).transpose(1, 2, 0)
     strip[: max(2, sequence.height // 40)] = (
@@ -409,7 +409,7 @@ variants = {
     "without L": {"laplacian": False},
     "base": {"appearance": False, "spectral_motion": False, "laplacian": False},
 }
-scores = {"full": score(state, shop, sequence.test_index)}
+scores = {"full": score(state, constants, sequence.test_index)}
 trained = {}
 for name, parts in variants.items():
     if name != "full":
@@ -509,8 +509,8 @@ assert report.passed
 # Answer. The one trained without A: its other parameters have learned to do without (wrongly,
 # by moving things). The difference between "taken out" and "never there" shows how other
 # parameters compensate.
-with_all = score(state, shop, sequence.train_index)
-taken_out = score(state, shop, sequence.train_index, appearance=False)
+with_all = score(state, constants, sequence.train_index)
+taken_out = score(state, constants, sequence.train_index, appearance=False)
 never_there = score(*trained["without A"][:2], sequence.train_index)
 print(
     f"all {with_all:.2f} dB, A never there {never_there:.2f} dB, A taken out {taken_out:.2f} dB"

@@ -31,7 +31,7 @@ from endotsr.config import ModelConfig
 from endotsr.fitting.model import scene_at, spectral_from
 from endotsr.scene import workload
 from endotsr.splatting.render import render_forward
-from endotsr.tradeoff.front import Ranked, non_dominated
+from endotsr.tradeoff.study import Ranked, non_dominated
 from endotsr.tradeoff.measure import errors, frame, prepare, seconds
 from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting

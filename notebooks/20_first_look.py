@@ -225,8 +225,8 @@ config = replace(
 coarse, state, errors = coarse_start(sequence, config), new_training(sequence, config), {}
 while state.iteration < T:  # at half size to the end, to see the whole course of e
     if state.iteration % 25 == 0 and state.iteration:
-        errors[state.iteration] = fit_error(state, coarse.workshop, coarse.frames)
-    training_step(state, coarse.workshop)
+        errors[state.iteration] = fit_error(state, coarse.constants, coarse.frames)
+    training_step(state, coarse.constants)
 
 figure, axes = plt.subplots(1, 3, figsize=(14, 3.7), layout="constrained")
 axes[0].semilogy(

@@ -49,7 +49,7 @@ def test_the_metadata_is_complete(wheel):
 
 # Distributions whose import has another name.
 IMPORTED_AS = {"opencv-contrib-python-headless": "cv2", "pillow": "PIL", "scikit-image": "skimage", "pyyaml": "yaml"}
-INDIRECT = {"llvmlite": "numba", "pytest": "test", "dask": "distributed"}  # comes with; pytest calls the door for ports
+INDIRECT = {"llvmlite": "numba", "pytest": "test", "dask": "distributed"}  # comes with; pytest runs the tests of ports
 
 
 def test_the_wheel_needs_what_the_package_imports_and_nothing_else(wheel):

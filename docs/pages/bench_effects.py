@@ -70,9 +70,9 @@ def _one(part: Part, gaussians: int, repeats: int, width: int, height: int, conf
     }  # fmt: skip
     seconds: dict[str, list[float]] = {name: [] for name in builds}
     for turn in range(repeats + 2):
-        for name, (state, shop, missing) in builds.items():
-            _iteration(state, shop, missing)  # fills the caches, which the state before it left with its own
-            taken = _iteration(state, shop, missing)
+        for name, (state, constants, missing) in builds.items():
+            _iteration(state, constants, missing)  # fills the caches, which the state before it left with its own
+            taken = _iteration(state, constants, missing)
             if turn >= 2:  # after compilation and one warm turn
                 seconds[name].append(taken)
     pairs = list(zip(seconds["off"], seconds["absent"]))
@@ -100,42 +100,42 @@ def changed(config: Config, part: Part) -> Config:
 
 
 def _prepared(case: BenchCase, config: Config) -> tuple[Any, Any]:
-    """State at a representative iteration of the published schedule, and its workshop."""
-    from endotsr.fitting.state import bench_state, workshop
+    """State at a representative iteration of the published schedule, and its constants."""
+    from endotsr.fitting.state import bench_state, training_constants
 
-    shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
-    for index in shop.sequence.train_index:
-        shop.targets_of(int(index))
-    return bench_state(workload.gaussians(case.gaussians, config), config, representative(PAPER)), shop
+    constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
+    for index in constants.sequence.train_index:
+        constants.targets_of(int(index))
+    return bench_state(workload.gaussians(case.gaussians, config), config, representative(PAPER)), constants
 
 
-def _iteration(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> float:
+def _iteration(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...]) -> float:
     """Seconds of processor time of one iteration without the functions `missing`."""
     with _without(missing):
         began = time.process_time()
-        _step(state, shop)
+        _step(state, constants)
         return time.process_time() - began
 
 
-def _allocated(state: Any, shop: Any, missing: tuple[tuple[Any, str], ...]) -> int:
+def _allocated(state: Any, constants: Any, missing: tuple[tuple[Any, str], ...]) -> int:
     """The most bytes that NumPy and Python allocate in one iteration beside what is held; not those inside kernels."""
     with _without(missing):
         for _ in range(3):  # compiles, and allocates what stays
-            _step(state, shop)
+            _step(state, constants)
         tracemalloc.start()
         try:
-            _step(state, shop)
+            _step(state, constants)
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
 
 
-def _step(state: Any, shop: Any) -> None:
+def _step(state: Any, constants: Any) -> None:
     """One iteration, after which the state counts as before."""
     from endotsr.fitting.trainer import training_step
 
     iteration = state.iteration
-    training_step(state, shop)
+    training_step(state, constants)
     state.iteration = iteration
 
 

@@ -15,7 +15,7 @@ from unittest.mock import patch
 import numpy as np
 
 from endotsr.bench.case import BenchCase, Precision, apart
-from endotsr.bench.timing import repeated, spread
+from endotsr.bench.clock import repeated, spread
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.report.tables import plain

@@ -51,22 +51,22 @@ def _first_iterations() -> None:
     from endotsr.bench.case import representative
     from endotsr.config import PAPER
     from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.state import new_training, workshop
+    from endotsr.fitting.state import new_training, training_constants
     from endotsr.fitting.trainer import training_step
     from endotsr.scene import workload
 
     say = lambda moment: print(json.dumps(moment), flush=True)
     say(MOMENTS[0])
-    shop = workshop(workload.sequence(), PAPER)
+    constants = training_constants(workload.sequence(), PAPER)
     say(MOMENTS[1])
-    state = new_training(shop.sequence, PAPER)
+    state = new_training(constants.sequence, PAPER)
     say(MOMENTS[2])
     compile_ahead(PAPER)
-    training_step(state, shop)
+    training_step(state, constants)
     say(MOMENTS[3])
     for iteration in (PAPER.training.residual_activation, representative(PAPER)):
         state.iteration = iteration  # the residuals are activated at the first of the two
-        training_step(state, shop)
+        training_step(state, constants)
     say(MOMENTS[4])
 
 

@@ -1,14 +1,15 @@
 """The generated tables of docs/claims.md and docs/guides/sweep.md: ablations, other held-out frames, cost."""
 
+import math
 from typing import Any
 
 import numpy as np
-from claims_cost import planned_hours
 from claims_verdicts import FULL, NOT_YET
 
 from endotsr.report.tables import markdown
 from endotsr.sweeps.ablation_page import increment_table, level_table
 
+BEGIN_MINUTES = 1.0  # of a worker before its first iteration, kernels not compiled before
 PLANNED_RUNS, PLANNED_CORES = (15, 42), (2, 8, 16, 64)
 WIDTH = 640  # px, of the recorded clip at full size
 Record = Any  # what a file of docs/results holds
@@ -122,3 +123,22 @@ def cost(found: Record | None, runs: list[Record]) -> str:
     ]
     about = f"One run takes {core_minutes:.0f} core minutes (median of {len(measured)} measured)."
     return f"{about}\n\n" + markdown(("runs", *(f"{n} cores, hours" for n in PLANNED_CORES)), cells)
+
+
+def planned_hours(runs: int, cores: int, core_minutes: float, threads: int = 1, begin: float = BEGIN_MINUTES) -> float:
+    """Hours until the last of the runs has ended, planned from the time of one run.
+
+    W workers make R runs of equal length in ceil(R / W) rounds. A run on k threads takes 1 / k of its core minutes at
+    best, so that threads never finish a sweep sooner than workers do. The start of a worker (imports, kernels, the
+    sequence) is paid once. Assumed: workers do not slow each other down, which holds on separate machines.
+
+    runs          in the sweep
+    cores         of all machines together, divided among workers of `threads` threads
+    core_minutes  of one run: minutes on one thread
+    begin         minutes of a worker before its first iteration
+    Raises:       ValueError if there is no worker.
+    """
+    workers = cores // threads
+    if workers < 1:
+        raise ValueError(f"{cores} cores give no worker of {threads} threads")
+    return (begin + math.ceil(runs / workers) * core_minutes / threads) / 60 if runs else 0.0

@@ -10,9 +10,9 @@ Thresholds were set with seeds below `FIRST_SEED`. A study takes seeds from ther
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
+from endotsr.config import with_settings
 from endotsr.effects.inspect import EFFECTS, Inspection, inspect_sequence
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings, with_effects
@@ -72,8 +72,7 @@ def settings_of(names: tuple[str, ...], seed: int, frames: int, amplitude: float
     changes = {name: dict(BEATING.get(name, {})) for name in names}
     if amplitude is not None:
         changes[names[-1]][STRENGTH.get(names[-1], "amplitude")] = amplitude
-    sections = {name: msgspec.structs.replace(getattr(settings, name), **c) for name, c in changes.items() if c}
-    return msgspec.structs.replace(settings, **sections)
+    return with_settings(settings, **changes)
 
 
 def expectation(names: tuple[str, ...]) -> dict[str, bool | None]:

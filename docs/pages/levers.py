@@ -1,21 +1,24 @@
-"""Train `sharp`, `paper`, and `sharp` with one of its changes taken back at a time, over seeds, and write the tables.
+"""Train `sharp` with some of its settings changed, over seeds and scenes, and write the tables.
 
-    python docs/pages/levers.py [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
-    python docs/pages/levers.py --table    write the tables of the last result again
+    python docs/pages/levers.py changes [CLIP ...] [--seeds 3] [--iterations 1500] [--jobs 2]
+    python docs/pages/levers.py weights [CLIP ...]    several weights of the similarity, for the rulings
+    python docs/pages/levers.py changes --table       write the tables of the last result again
 
+`changes` trains `sharp`, `paper`, and `sharp` with one of its changes taken back at a time.
 Two scenes are simulated, so their true motion is known. A CLIP is a sequence folder; it is read at half size, and
 its held-out frames are left out: every eighth frame of the others is held out in their place. Every run has the
 length `--iterations` and the initial points of `demo`. Every run is kept when it ends, and a command that was stopped
-goes on with the runs that are missing. The result is docs/results/levers.json; the tables stand in
-docs/results/README.md between their marks.
+goes on with the runs that are missing. The tables stand in a page between their marks; no frame that a preset is judged
+by takes part.
 """
 
 import argparse
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import kept
 import numpy as np
@@ -29,8 +32,7 @@ from endotsr.runs.machine import machine
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import every_eighth
 
-RESULTS = Path(__file__).parents[1] / "results"
-FILE = RESULTS / "levers.json"
+DOCS = Path(__file__).parents[1]
 SIMULATED: dict[str, dict[str, Any]] = {
     "demo": {},
     "pull and breath": {
@@ -40,7 +42,8 @@ SIMULATED: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 POINTS = {key: getattr(DEMO.initialisation, key) for key in ("first_frame_points", "other_frame_points")}
 SHARP, PAPER = "`sharp`", "`paper`"
-CHANGES: dict[str, dict[str, dict[str, Any]]] = {
+Rows = dict[str, dict[str, dict[str, Any]]]  # row of a table -> what is changed in the settings of `sharp`, by section
+CHANGES: Rows = {
     SHARP: {},
     PAPER: {},
     "no tracked motion": {"initialisation": {"motion": "none"}},
@@ -50,7 +53,12 @@ CHANGES: dict[str, dict[str, dict[str, Any]]] = {
     "`ssim_weight` of `paper`": {"loss": {"ssim_weight": 0.1}},
     "width of `paper`": {"model": {"initial_width": 0.01}},
 }
-"""Row of the table -> what is changed in the settings, by section; the first two rows are the presets."""
+THRESHOLD = {"density": {"gradient_threshold": 4e-4}}  # of all rows: a larger weight makes more Gaussians
+FORMER = "0.2"  # the weight that the others are compared with
+WEIGHTS: Rows = {
+    **{weight: {"loss": {"ssim_weight": float(weight)}, **THRESHOLD} for weight in (FORMER, "0.5", "0.7", "0.9")},
+    "0.7, `lambda_lap` 3": {"loss": {"ssim_weight": 0.7, "lambda_lap": 3.0}, **THRESHOLD},
+}
 SHOWN = (("psnr_tissue", "held-out PSNR tissue, dB", 2), ("scene_units", "trajectory error, mm", 3))
 MOTION = (
     ("scene_units", "trajectory error, mm", 3),
@@ -83,13 +91,9 @@ def inner(sequence: Sequence) -> Sequence:
 
 
 def measured(
-    key: str,
-    runs: dict[str, tuple[str, str, int]],
-    iterations: int,
-    clips: dict[str, str],
-    changes: dict[str, dict[str, dict[str, Any]]] = CHANGES,
+    key: str, runs: dict[str, tuple[str, str, int]], iterations: int, clips: dict[str, str], rows: Rows
 ) -> dict[str, float]:
-    """Train one run (scene, row of `changes`, seed), and measure it; trajectories where their truth is known."""
+    """Train one run (scene, row, seed), and measure it; trajectories where their truth is known."""
     import endotsr
 
     scene, label, seed = runs[key]
@@ -98,7 +102,7 @@ def measured(
         "initialisation": POINTS,
         "density": {"gradient_threshold": DEMO.density.gradient_threshold},
     }
-    for section, values in changes[label].items():
+    for section, values in rows[label].items():
         sections[section] = sections.get(section, {}) | values
     config = endotsr.make_config("paper" if label == PAPER else "sharp", iterations=iterations, **sections)
     metrics = endotsr.train(scene_of(scene, clips), config, on_message=lambda text: None).evaluate()
@@ -109,20 +113,19 @@ def measured(
     }
 
 
-def found(clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict[str, Any]:
+def found(file: Path, rows: Rows, clips: dict[str, str], seeds: int, iterations: int, jobs: int) -> dict[str, Any]:
     """Scene -> row -> numbers of the runs in the order of their seeds; runs that are kept are not trained again."""
-    about = {"iterations": iterations, "sources": kept.sources("")}
-    scenes = (*SIMULATED, *clips)
+    about, scenes = {"iterations": iterations, "sources": kept.sources("")}, (*SIMULATED, *clips)
     runs = {
         f"{scene}, {label}, seed {seed}": (scene, label, seed)
         for seed in range(seeds)
         for scene in scenes
-        for label in CHANGES
+        for label in rows
     }
-    train = partial(measured, runs=runs, iterations=iterations, clips=clips)
-    answers = kept.measured(FILE, about, runs, train, jobs)
+    train = partial(measured, runs=runs, iterations=iterations, clips=clips, rows=rows)
+    answers = kept.measured(file, about, runs, train, jobs)
     return {
-        scene: {label: [answers[f"{scene}, {label}, seed {seed}"] for seed in range(seeds)] for label in CHANGES}
+        scene: {label: [answers[f"{scene}, {label}, seed {seed}"] for seed in range(seeds)] for label in rows}
         for scene in scenes
     }
 
@@ -150,6 +153,22 @@ def table(result: dict[str, Any]) -> str:
     return markdown(["Scene", "Settings", *(name for _, name, _ in SHOWN)], rows) + "\n\n" + about
 
 
+def weights_table(result: dict[str, Any]) -> str:
+    """Paired differences from the former weight, with 95 % intervals: held-out PSNR and trajectory error."""
+    columns = [
+        (f"{name}, {words.rsplit(', ', 1)[1]}", scene, key, digits)
+        for name, scene in result["scenes"].items()
+        for key, words, digits in SHOWN
+        if key in scene[FORMER][0]
+    ]
+    rows = [
+        [label, *(cell(scene[label], scene[FORMER], key, digits) for _, scene, key, digits in columns)]
+        for label in WEIGHTS
+    ]
+    about = f"The first row is a level, the others are differences; {_about(result)}"
+    return markdown(["$w$", *(column[0] for column in columns)], rows) + "\n\n" + about
+
+
 def _about(result: dict[str, Any]) -> str:
     where = f"{result['machine']['processor']}, {result['date']}"
     return f"{result['seeds']} seeds, {result['iterations']} iterations; {where}."
@@ -164,23 +183,44 @@ def cell(runs: list[dict[str, float]], sharp: list[dict[str, float]], key: str, 
     return shown([run[key] - other[key] for run, other in zip(runs, sharp, strict=True)], digits, "+")
 
 
+class Study(NamedTuple):
+    """Rows that are compared, and where the tables of them stand."""
+
+    rows: Rows
+    file: Path  # of the result
+    page: Path
+    room: str  # of its marks
+    tables: dict[str, Callable[[dict[str, Any]], str]]  # by mark
+
+
+RULINGS, RESULTS = DOCS / "specification" / "rulings.md", DOCS / "results"
+STUDIES = {
+    "changes": Study(
+        CHANGES, RESULTS / "levers.json", RESULTS / "README.md", "levers", {"table": table, "motion": motion_table}
+    ),
+    "weights": Study(WEIGHTS, RESULTS / "similarity.json", RULINGS, "similarity", {"table": weights_table}),
+}
+
+
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("study", choices=STUDIES)
     parser.add_argument("clips", nargs="*", type=Path, metavar="CLIP")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--iterations", type=int, default=1500)
     parser.add_argument("--jobs", type=int, default=2, help="runs at a time; the numbers do not depend on it")
     parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
+    study = STUDIES[options.study]
     if not options.table:
         clips = {folder.name: str(folder.resolve()) for folder in options.clips}
-        scenes = found(clips, options.seeds, options.iterations, options.jobs)
+        scenes = found(study.file, study.rows, clips, options.seeds, options.iterations, options.jobs)
         about = {"seeds": options.seeds, "iterations": options.iterations, "date": date.today().isoformat()}
-        write_json(FILE, about | {"machine": machine(), "scenes": scenes})
-        kept.finished(FILE)
-    result = read_json(FILE, "docs/pages/levers.py")
-    write_marked(RESULTS / "README.md", {"table": table(result), "motion": motion_table(result)}, "levers")
+        write_json(study.file, about | {"machine": machine(), "scenes": scenes})
+        kept.finished(study.file)
+    result = read_json(study.file, f"docs/pages/levers.py {options.study}")
+    write_marked(study.page, {name: made(result) for name, made in study.tables.items()}, study.room)
 
 
 if __name__ == "__main__":

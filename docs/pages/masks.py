@@ -13,10 +13,10 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from marks import read_json, write_marked
 
+from endotsr.config import with_settings
 from endotsr.kernels.arrays import BoolArray
 from endotsr.opencv import read_png
 from endotsr.report.tables import markdown
@@ -25,7 +25,6 @@ from endotsr.sequences.propose_masks import propose_masks
 from endotsr.sequences.recording import Picture
 from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.scenes import named_scene
-from endotsr.simulator.settings import SimulatorSettings
 
 DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "masks.json", DOCS / "guides" / "prepare.md"
@@ -35,9 +34,8 @@ SCENES = ("pulling", "cutting", "smoke", "everything", "moving-camera", "breathi
 
 def simulated(name: str) -> tuple[list[Picture], list[BoolArray]]:
     """Pictures (H, W, 3) and true masks of a scene; a moving camera gets an instrument."""
-    settings: SimulatorSettings = msgspec.structs.replace(named_scene(name), **SIZE)
-    if name == "moving-camera":
-        settings = msgspec.structs.replace(settings, instrument=msgspec.structs.replace(settings.instrument, on=True))
+    changes = {"instrument": {"on": True}} if name == "moving-camera" else {}
+    settings = with_settings(named_scene(name), **SIZE, **changes)
     frames = list(simulated_frames(make_scene(settings)))
     return [frame.image.transpose(1, 2, 0) for frame in frames], [frame.excluded for frame in frames]
 

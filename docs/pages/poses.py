@@ -22,7 +22,7 @@ import numpy as np
 from marks import read_json, write_marked
 from over_seeds import shown
 
-from endotsr.config import DEMO
+from endotsr.config import DEMO, with_settings
 from endotsr.equations.pose import pose_forward
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
@@ -44,15 +44,13 @@ POSES = ("true", "disturbed", "corrected")
 
 def scene_of(name: str, seed: int) -> Sequence:
     """A simulated scene with its true poses."""
-    import msgspec
     from effects_study import settings_of
 
     from endotsr.simulator.simulate import simulate
 
     found = settings_of(("noise", *SCENES[name], "camera_motion"), seed, FRAMES, SWING)
-    found = msgspec.structs.replace(found, width=SIZE[0], height=SIZE[1])
-    breathing = msgspec.structs.replace(found.breathing, amplitude=BREATH)
-    return simulate(msgspec.structs.replace(found, breathing=breathing)).sequence
+    size = {"width": SIZE[0], "height": SIZE[1]}
+    return simulate(with_settings(found, breathing={"amplitude": BREATH}, **size)).sequence
 
 
 def disturbed(sequence: Sequence, seed: int) -> Sequence:

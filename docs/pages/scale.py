@@ -9,10 +9,9 @@ Nothing is trained here. The numbers are those that `endotsr check` and the star
 import json
 from pathlib import Path
 
-import msgspec
 from marks import write_marked
 
-from endotsr.config import PRESETS, lengthened
+from endotsr.config import PRESETS, lengthened, with_settings
 from endotsr.report.style import BLUE, GREEN, ORANGE, legend, name_axes, new_figure, plain_axes, save
 from endotsr.report.tables import markdown
 from endotsr.sequences.checks.cost import Cost, estimated_cost
@@ -30,7 +29,7 @@ RECORDS = {"paper": "pulling_paper_seed0", "sharp": "pulling_sharp_seed0"}  # of
 def estimated(preset: str, frames: int, width: int, height: int) -> tuple[int, Cost]:
     """Iterations of a run with a preset, and its cost."""
     config = lengthened(PRESETS[preset], len(every_eighth(frames)[0]))
-    config = msgspec.structs.replace(config, sequence=msgspec.structs.replace(config.sequence, memory=MEMORY))
+    config = with_settings(config, sequence={"memory": MEMORY})
     return config.training.iterations, estimated_cost(frames, width, height, config)
 
 

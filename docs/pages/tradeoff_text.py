@@ -1,8 +1,16 @@
-"""Three pieces of advice, each with the figures of a measurement of `endotsr tradeoff`."""
+"""The studies of error against time as text: advice, presets that are dominated, and the table of the trainings."""
 
+from collections.abc import Sequence
 from typing import Any
 
+from endotsr.report.tables import duration, plain
+from endotsr.tradeoff.study import Ranked
 from endotsr.tradeoff.text import levels
+
+# Dominated presets that are kept, with the reason. A test fails for a dominated preset that is missing here.
+KEPT = {
+    "legacy": "reproduces the released CUDA program, its three-sigma tiles and its gradients, for comparison",
+}
 
 
 def small(number: float) -> str:
@@ -69,3 +77,87 @@ def _against_noise(point: dict[str, Any], result: dict[str, Any]) -> str:
 def _joint(result: dict[str, Any], precision: str) -> list[dict[str, Any]]:
     names = set(result["joint"])
     return [p for p in result["points"] if p["name"] in names and p["setting"]["precision"] == precision]
+
+
+def dominates(a: Ranked, b: Ranked) -> bool:
+    """Whether a is nowhere worse than b and somewhere better."""
+    ours, theirs = (a.cost, *a.errors), (b.cost, *b.errors)
+    return all(x <= y for x, y in zip(ours, theirs, strict=True)) and ours != theirs
+
+
+def dominated_by(point: Ranked, points: Sequence[Ranked]) -> list[str]:
+    """Names of the points that dominate this one, cheapest first."""
+    return [p.name for p in sorted(points, key=lambda p: (p.cost, p.errors)) if dominates(p, point)]
+
+
+def judge_presets(points: Sequence[dict[str, Any]], presets: dict[str, str]) -> dict[str, dict[str, Any]]:
+    """For every preset: the settings that dominate it, and the reason why it is kept.
+
+    A preset serves rendering and training, so another setting dominates it only if it visits no more pairs and is no
+    worse in the largest error, the RMS error and every gradient block. The comparison is within one precision, where a
+    visit costs the same arithmetic.
+
+    points    entries of `tradeoff.json`
+    presets   name -> name of its point
+    """
+    by_name = {p["name"]: p for p in points}
+    found = {}
+    for preset, name in presets.items():
+        own = by_name[name]
+        precision, terms = own["setting"]["precision"], own["terms"]
+        peers = [_ranked(p) for p in points if p["setting"]["precision"] == precision and p["terms"] == terms]
+        better = dominated_by(_ranked(own), peers)
+        found[preset] = {"dominated_by": better, "reason": KEPT.get(preset) if better else None}
+    return found
+
+
+def _ranked(point: dict[str, Any]) -> Ranked:
+    error = point["error"]
+    return Ranked(point["name"], point["visits"], (error["max"], error["rms"], *error["gradients"].values()))
+
+
+def training_lines(result: dict[str, Any]) -> list[str]:
+    """Text for the terminal: the final state of every training beside the base, and the summary."""
+    rows = training_rows(result)
+    lines = [plain(("training", "PSNR", "to base", "SSIM", "LPIPS", "time", "to base", "Gaussians"), rows)]
+    lines += [f"left out: {name} ({reason})" for name, reason in result["left_out"].items()]
+    return lines + summary(result)
+
+
+def summary(result: dict[str, Any]) -> list[str]:
+    """The variation by rounding alone, and the trainings that a faster one exceeded by more than that variation."""
+    ends = {c["name"]: (c["seconds"], c["milestones"][-1]["psnr_full"]) for c in result["configurations"]}
+    if "base" not in ends or None in [psnr for _, psnr in ends.values()]:
+        return []
+    chance, lines = 0.0, []
+    if "float64" in ends:
+        chance = abs(ends["float64"][1] - ends["base"][1])
+        lines.append(
+            "Chance: each training has one seed. `float64` differs from `base` by rounding alone, and ends "
+            f"{chance:.2f} dB from it. Smaller differences are noise."
+        )
+    for name, (seconds, psnr) in ends.items():
+        better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
+        if better:
+            lines.append(f"*{name}* is slower, and worse by more than chance, than: {', '.join(better)}.")
+    return lines
+
+
+def training_rows(result: dict[str, Any]) -> list[list[str]]:
+    """Name, PSNR, gain on the base, SSIM, LPIPS, time, time over that of the base, Gaussians."""
+    by_name = {c["name"]: c for c in result["configurations"]}
+    if "base" not in by_name:
+        return []
+    base = by_name["base"]["milestones"][-1]
+    rows = []
+    for c in result["configurations"]:
+        last = c["milestones"][-1]
+        cells = [
+            f"{last['psnr_full']:.2f}",
+            f"{last['psnr_full'] - base['psnr_full']:+.2f}",
+            f"{last['ssim_full']:.4f}",
+        ]
+        cells.append("-" if last["lpips"] is None else f"{last['lpips']:.4f}")
+        cells += [duration(last["seconds"]), f"{last['seconds'] / base['seconds']:.2f}x", str(last["gaussians"])]
+        rows.append([c["name"], *cells])
+    return rows

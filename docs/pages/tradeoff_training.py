@@ -22,7 +22,7 @@ from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.fitting.compile_ahead import rehearse
 from endotsr.fitting.model import render_at, spectral_from, with_corrected_cameras
 from endotsr.fitting.records import LogEntry
-from endotsr.fitting.state import TrainingState, new_training, workshop
+from endotsr.fitting.state import TrainingState, new_training, training_constants
 from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.files import write_json
 from endotsr.runs.machine import machine, now, versions
@@ -95,12 +95,12 @@ def planned_iterations(base: Config, sequence: Sequence, seconds: float, weights
 
     A few iterations and one evaluation are timed first.
     """
-    shop, state = workshop(sequence, base), new_training(sequence, base)
+    constants, state = training_constants(sequence, base), new_training(sequence, base)
     for _ in range(PROBE_WARM):
-        training_step(state, shop)
+        training_step(state, constants)
     began = time.monotonic()
     for _ in range(PROBE):
-        training_step(state, shop)
+        training_step(state, constants)
     iteration = (time.monotonic() - began) / PROBE * GROWTH
     chosen = configurations(base)
     left = seconds

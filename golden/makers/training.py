@@ -211,11 +211,11 @@ WRONG_PORTS = [
         ),
         edit(
             SOURCE,
-            "            _control_density(state, shop, iteration)\n",
+            "            _control_density(state, constants, iteration)\n",
             "            moved, state.gaussians = state.gaussians, before\n"
             "            plan = densify(before, state.statistics, config.density, "
-            "copy.deepcopy(state.rng), shop.extent).plan\n"
-            "            _control_density(state, shop, iteration)\n"
+            "copy.deepcopy(state.rng), constants.extent).plan\n"
+            "            _control_density(state, constants, iteration)\n"
             "            for old, new in zip(moved, state.gaussians):\n"
             "                if new is not None:\n"
             "                    new[..., : plan.survivors] = old[..., plan.source[: plan.survivors]]\n",

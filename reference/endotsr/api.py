@@ -41,10 +41,10 @@ from endotsr.errors import InputError
 from endotsr.fitting.records import LogEntry
 from endotsr.runs import folder as run_folders
 from endotsr.runs import sources
-from endotsr.runs.log import RunLog
+from endotsr.runs.log import RunLog, log_until
 from endotsr.runs.machine import now, peak_memory_bytes
 from endotsr.runs.model import Model, load_model, load_training, save_training
-from endotsr.runs.records import ResumedEntry, RunRecord, new_record
+from endotsr.runs.records import ResumedEntry, RunRecord
 from endotsr.sequences.record import SequenceRecord, record_of
 from endotsr.sequences.sequence import Sequence
 from endotsr.simulator.settings import SimulatorSettings
@@ -177,9 +177,8 @@ def train(
     config = lengthened(config, len(sequence.train_index))
     config, found = _called_for(sequence, config, effects, sections, on_message)
     state = new_training(sequence, config)
-    about = sources.input_record(source, sequence, config, simulator)
     threads = use_threads(config.training.threads)
-    record = new_record(["endotsr.train"], config, threads, about) | found
+    record = sources.start_record(["endotsr.train"], source, sequence, config, simulator, threads) | found
     seen = record_of(sequence)
     run = Run(config, record, seen, [], _model_of(state, config, seen), "", _sequence=sequence, _state=state)
     return run.resume(on_iteration, on_message, on_run)
@@ -229,7 +228,6 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
 
     Raises: InputError if there is no run or no checkpoint, or if a file is damaged or of other settings.
     """
-    from endotsr.report.curves import read_log
     from endotsr.windows.record import is_windowed
     from endotsr.windows.run import WindowedRun
 
@@ -237,7 +235,7 @@ def open_run(path: str | Path, sequence: str | Path | None = None) -> "Run | Win
         return WindowedRun(Path(path), None if sequence is None else str(sequence))
     folder = run_folders.open_run(Path(path))
     model = load_model(folder)
-    log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= model.iteration]
+    log = log_until(folder.log, model.iteration)
     given = "" if sequence is None else str(sequence)
     return Run(model.config, folder.record(), folder.sequence_record(), log, model, given, _folder=folder)
 
@@ -309,14 +307,14 @@ class Run:
         Raises: InputError for a name, rate, count or camera that is not allowed.
         """
         from endotsr.export.times import Times
-        from endotsr.views import pictures
+        from endotsr.views import film, pictures
         from endotsr.views.plan import ViewRequest
 
         path, look, scene = Path(path), pictures.Look(), self._scene()
         pictures.check_outputs(None, path, rate, slow)
         views = pictures.requested_views(scene, ViewRequest(Times(count=count), camera), "all")
-        chosen = pictures.rate_of(path, scene, views, rate, slow)
-        pictures.write_views_film(path, pictures.rendered(scene, views, look), look, chosen)
+        chosen = rate or film.film_rate(path, [view.time for view in views], scene.record.duration, slow)
+        film.write_film(path, pictures.film_pictures(pictures.rendered(scene, views, look), look), chosen)
         return path
 
     def view(self, path: str | Path) -> Path:
@@ -356,7 +354,7 @@ class Run:
         from endotsr.evaluation.lpips import load_lpips_weights
         from endotsr.evaluation.run import measure_model
 
-        weights = load_lpips_weights(None if lpips is None else Path(lpips))
+        weights = load_lpips_weights(lpips)
         sequence, about = self.sequence, self.record.get("input", {})
         simulator = checked(about.get("simulator", {}), SimulatorSettings, "run.json", "input.simulator.")
         truth = sources.true_positions_of(self._source or str(about.get("source")), simulator, self.config, sequence)

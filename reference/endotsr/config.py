@@ -254,6 +254,19 @@ class Config(Section, frozen=True, kw_only=True):
 
 
 PAPER = Config()
+
+
+def with_settings(settings: SectionType, **changes: Any) -> SectionType:
+    """The settings with other values; a dictionary changes a section: `with_settings(config, training={"seed": 3})`."""
+    return msgspec.structs.replace(
+        settings,
+        **{
+            name: with_settings(getattr(settings, name), **value) if isinstance(value, dict) else value
+            for name, value in changes.items()
+        },
+    )
+
+
 # Keys of earlier versions, and the values that mean what the settings mean without them.
 FORMER = {
     "initialisation": {"motion_flow": ("dis",)},
@@ -277,19 +290,17 @@ def with_iterations(config: Config, iterations: int) -> Config:
     The length is then fixed: `visits_per_frame` is 0.
     """
     ratio = iterations / config.training.iterations
-    changed = {}
-    for section, names in MILESTONES.items():
-        old = getattr(config, section)
-        changed[section] = msgspec.structs.replace(
-            old, **{name: max(1, round(getattr(old, name) * ratio)) for name in names}
-        )
-    changed["training"] = msgspec.structs.replace(changed["training"], iterations=iterations)
-    return with_fixed_length(msgspec.structs.replace(config, **changed))
+    changes = {
+        section: {name: max(1, round(getattr(getattr(config, section), name) * ratio)) for name in names}
+        for section, names in MILESTONES.items()
+    }
+    changes["training"] |= {"iterations": iterations, "visits_per_frame": 0}
+    return with_settings(config, **changes)
 
 
 def with_fixed_length(config: Config) -> Config:
     """The same settings with exactly `training.iterations`, whatever the number of frames."""
-    return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=0))
+    return with_settings(config, training={"visits_per_frame": 0})
 
 
 def lengthened(config: Config, training_frames: int) -> Config:
@@ -313,24 +324,21 @@ SHARP = Config(
     initialisation=InitialisationConfig(motion="flow"),
     training=TrainingConfig(bridge_fraction=0.7),
 )
-SHARP = with_iterations(SHARP, 3000)
-SHARP = msgspec.structs.replace(SHARP, training=msgspec.structs.replace(SHARP.training, visits_per_frame=72))
-QUICK = with_iterations(SHARP, 1600)
-QUICK = msgspec.structs.replace(
-    QUICK,
+SHARP = with_settings(with_iterations(SHARP, 3000), training={"visits_per_frame": 72})
+QUICK = with_settings(
+    with_iterations(SHARP, 1600),
     preset="quick",
     # what a first look has time for at 640x512 pixels
-    density=msgspec.structs.replace(QUICK.density, growth="budget", maximum=22_000),
-    initialisation=msgspec.structs.replace(QUICK.initialisation, first_frame_points=14_000, other_frame_points=2_000),
-    training=msgspec.structs.replace(QUICK.training, coarse_start=True),
+    density={"growth": "budget", "maximum": 22_000},
+    initialisation={"first_frame_points": 14_000, "other_frame_points": 2_000},
+    training={"coarse_start": True},
 )
-DEMO = with_iterations(SHARP, 1500)
-DEMO = msgspec.structs.replace(
-    DEMO,
+DEMO = with_settings(
+    with_iterations(SHARP, 1500),
     preset="demo",
     # points and threshold suit its 160x128 pixels
-    density=msgspec.structs.replace(DEMO.density, gradient_threshold=7e-4),
-    initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=6000, other_frame_points=1500),
+    density={"gradient_threshold": 7e-4},
+    initialisation={"first_frame_points": 6000, "other_frame_points": 1500},
 )
 PRESETS = {"paper": PAPER, "sharp": SHARP, "quick": QUICK, "demo": DEMO}
 
@@ -342,18 +350,19 @@ def config_from_dict(data: dict[str, Any], where: str = "configuration") -> Conf
         raise InputError(f"{where}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
     data = without_former_keys(data, where, PRESETS[preset].training.bridge_fraction)
     refuse_unknown_keys(data, Config, where)
-    config = checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
-    _refuse_contradictions(config, where)
-    return config
+    return checked(merged(msgspec.to_builtins(PRESETS[preset]), data), Config, where)
 
 
 def checked(data: dict[str, Any], kind: type[SectionType], where: str, prefix: str = "") -> SectionType:
     """A section from plain data, types and ranges checked. Raises InputError naming the key and what is allowed."""
     _refuse_non_finite(data, where, prefix)
     try:
-        return msgspec.convert(data, kind, strict=True)
+        found = msgspec.convert(data, kind, strict=True)
     except msgspec.ValidationError as error:
         raise InputError(f"{where}: {_explain(str(error), data, kind, prefix)}") from None
+    if isinstance(found, Config):
+        _refuse_contradictions(found, where)
+    return found
 
 
 def load_config(path: Path) -> Config:
@@ -408,9 +417,13 @@ def refuse_unknown_keys(data: dict, struct: type, where: str, prefix: str = "") 
     for key, value in data.items():
         if key not in fields:
             raise InputError(f"{where}: unknown key {prefix}{key}; allowed: {', '.join(fields)}")
-        inner = fields[key]
-        if isinstance(value, dict) and isinstance(inner, type) and issubclass(inner, msgspec.Struct):
-            refuse_unknown_keys(value, inner, where, f"{prefix}{key}.")
+        if isinstance(value, dict) and is_section(fields[key]):
+            refuse_unknown_keys(value, fields[key], where, f"{prefix}{key}.")
+
+
+def is_section(kind: Any) -> bool:
+    """Whether a type is a section of settings."""
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
 def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
@@ -425,10 +438,14 @@ def _refuse_non_finite(data: dict, where: str, prefix: str) -> None:
 def _explain(message: str, data: dict, kind: Any, prefix: str) -> str:
     """The key, its value and what is allowed, from the message `... - at `$.section.key`` of the type check."""
     found = re.search(r"`\$\.([\w.]+)", message)
+    place = f"{found[1]}." if found else ""
+    if missing := re.search(r"missing required field `(\w+)`", message):
+        return f"{prefix}{place}{missing[1]} is missing"
     if not found:
         return message
     value: Any = data
     for name in found[1].split("."):
+        kind = next(filter(is_section, get_args(kind)), kind)  # of a section that may be left out
         kind = {f.name: f.type for f in msgspec.structs.fields(kind)}[name]
         value = value[name]
     return f"{prefix}{found[1]} = {value!r} is not allowed; allowed: {allowed_values(kind)}"
@@ -442,12 +459,16 @@ def allowed_values(kind: Any) -> str:
     if origin in (Union, UnionType):
         return " or ".join(allowed_values(part) for part in arguments if part is not NoneType)
     if origin is tuple:
-        return f"{len(arguments)} values, each {allowed_values(arguments[0])}"
+        many = "a list" if arguments[-1] is Ellipsis else f"{len(arguments)} values"
+        return f"{many}, each {allowed_values(arguments[0])}"
     if origin is Annotated:
         limits = [(">", arguments[1].gt), (">=", arguments[1].ge), ("<", arguments[1].lt), ("<=", arguments[1].le)]
         words = " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
-        return f"{allowed_values(arguments[0])} {words}"
-    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        least = f", at least {arguments[1].min_length} of them" if arguments[1].min_length else ""
+        return f"{allowed_values(arguments[0])} {words}".rstrip() + least
+    if origin is dict:
+        return "a table of keys"
+    if is_section(kind):
         return "a section of settings"
     return {bool: "true, false", int: "an integer", float: "a number", str: "text", Path: "a path"}[kind]
 
@@ -471,6 +492,14 @@ def _refuse_contradictions(config: Config, where: str) -> None:
         raise InputError(
             f"{where}: sequence.depth_percentiles = {[low, high]} is not allowed; allowed: 0 <= low < high <= 100"
         )
+
+
+def by_key(settings: Any) -> dict[str, Any]:
+    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. {} for anything else."""
+    found: dict[str, Any] = {}
+    for name, values in settings.items() if isinstance(settings, dict) else ():
+        found |= {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
+    return found
 
 
 def config_to_toml(config: Config) -> str:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import bench
-from endotsr.bench import stages, trained
-from endotsr.bench.case import BenchCase, measure
+from endotsr.bench import stages
+from endotsr.bench.case import DEPTH, BenchCase, measure, trained_gaussians
 from endotsr.bench.limits import limits
 from endotsr.bench.stages import ns_per_pair
 from endotsr.cli.bench import BenchOptions, cases_of
@@ -127,15 +127,15 @@ def test_trained_scene_fills_the_picture(tmp_path):
     found = {name: rng.uniform(0.1, 0.9, (50, *rest)).astype(np.float32) for name, rest in npz.ARRAYS.items()}
     found["xyz"] *= 30
     np.savez(file, allow_pickle=False, **found)
-    scene = trained.trained_gaussians(file, PAPER)
-    column = 570 * scene.position[0] / trained.DEPTH
-    assert scene.position[2].mean() == pytest.approx(trained.DEPTH, abs=1)
+    scene = trained_gaussians(file, PAPER)
+    column = 570 * scene.position[0] / DEPTH
+    assert scene.position[2].mean() == pytest.approx(DEPTH, abs=1)
     assert 150 < np.abs(column).max() <= 400 and scene.position.dtype == np.float32
     np.savez(file, allow_pickle=False, **(found | {"rgb": found["rgb"][:7]}))
     with pytest.raises(InputError, match=r"rgb has shape \(7, 3\)"):
-        trained.trained_gaussians(file, PAPER)
+        trained_gaussians(file, PAPER)
     np.savez(file, allow_pickle=False, xyz=found["xyz"])
     with pytest.raises(InputError, match=r"scene\.npz: not a trained scene: log_scale is missing; allowed: an npz"):
-        trained.trained_gaussians(file, PAPER)
+        trained_gaussians(file, PAPER)
     with pytest.raises(InputError, match=r"none\.npz: cannot be read: No such file"):
-        trained.trained_gaussians(tmp_path / "none.npz", PAPER)
+        trained_gaussians(tmp_path / "none.npz", PAPER)

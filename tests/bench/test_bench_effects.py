@@ -39,9 +39,9 @@ def test_an_allocation_of_a_part_that_is_off_is_seen(monkeypatch):
     """A megabyte that only the build with the part allocates."""
     plain = bench_effects._step
 
-    def wasteful(state, shop):
+    def wasteful(state, constants):
         waste = None if objective.normalised_depth_forward is None else np.ones(1 << 17)
-        plain(state, shop)
+        plain(state, constants)
         del waste
 
     monkeypatch.setattr(bench_effects, "_step", wasteful)

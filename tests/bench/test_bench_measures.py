@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from endotsr.bench import clock, pairs, peaks, timing
+from endotsr.bench import clock, pairs, peaks
 from endotsr.bench.case import BenchCase, measure, prepare, representative
 from endotsr.bench.clock import STAGES
 from endotsr.bench.limits import limits, work
@@ -56,9 +56,9 @@ def test_stages_that_the_training_announces_are_those_of_the_clock():
             yield
 
     config = TINY.config()
-    state, shop = prepare(TINY, config)
+    state, constants = prepare(TINY, config)
     numba.set_num_threads(1)
-    trainer.training_step(state, shop, Recorder())
+    trainer.training_step(state, constants, Recorder())
     names = [name for name, _ in announced]
     assert set(names) == set(clock.STAGES)
     splat = [name for name in names if name in clock.SPLAT]
@@ -69,9 +69,9 @@ def test_a_timer_changes_no_result():
     config = TINY.config()
     results = []
     for timer in (NO_TIMER, clock.StageClock()):
-        state, shop = prepare(TINY, config)
+        state, constants = prepare(TINY, config)
         with timer.iteration() if isinstance(timer, clock.StageClock) else nullcontext():
-            entry = trainer.training_step(state, shop, timer)
+            entry = trainer.training_step(state, constants, timer)
         results.append((entry, state.gaussians))
     (entry, gaussians), (other_entry, others) = results
     assert entry == other_entry
@@ -239,10 +239,10 @@ def test_memory_kernels_do_what_they_say():
 
 
 def test_median_and_quartiles():
-    found = timing.spread([0.001, 0.002, 0.003, 0.004, 0.1])
+    found = clock.spread([0.001, 0.002, 0.003, 0.004, 0.1])
     assert [found["median_ms"], *found["quartiles_ms"]] == pytest.approx([3.0, 2.0, 4.0])
     calls = []
-    assert len(timing.repeated(lambda: calls.append(1), 3, warm_up=2)) == 3 and len(calls) == 5
+    assert len(clock.repeated(lambda: calls.append(1), 3, warm_up=2)) == 3 and len(calls) == 5
 
 
 def test_workload_is_seeded_and_grows_with_its_factor():

@@ -10,7 +10,7 @@ from endotsr.cli.main import COMMANDS, main
 
 NOT_ALONE = {"golden"}  # only with a second word
 WITHOUT = {"sweep": "the folder it writes holds results.json"}
-EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), *(f"golden {door}" for door in SUBCOMMANDS)]
+EVERY = [*(name for name in COMMANDS if name not in NOT_ALONE), *(f"golden {name}" for name in SUBCOMMANDS)]
 PRINTING = [name for name in EVERY if name not in WITHOUT]
 NUMBERS = range(len(EVERY))  # not the names: `pytest -k gradcheck` selects the gradient checks alone
 

@@ -3,7 +3,7 @@
 import pytest
 from tiny import assert_refused
 
-from endotsr.cli.parts.options import base_settings, with_short_names
+from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.train import TrainOptions
 from endotsr.config import PAPER, SHARP, Config, config_from_dict, load_config
@@ -14,8 +14,7 @@ def settings(*words: str) -> Config:
     """The settings that `endotsr train` ends up with."""
     line = ["sequence", "--out", "run", *words]
     base, _ = base_settings(line)
-    options = parse(TrainOptions, line, "train", TrainOptions(settings=base))
-    return with_short_names(options.settings, {"seed": options.seed, "scale": options.scale})
+    return parse(TrainOptions, line, "train", TrainOptions(settings=base)).settings
 
 
 def test_defaults_are_the_paper_preset():

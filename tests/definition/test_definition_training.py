@@ -27,7 +27,7 @@ from endotsr.definition.simulate import simulate
 from endotsr.equations.calibration import calibration_views
 from endotsr.fitting import schedules
 from endotsr.fitting.adam import rate_parts
-from endotsr.fitting.state import fresh_state, workshop
+from endotsr.fitting.state import fresh_state, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.opencv import canny_edges
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -143,7 +143,7 @@ def test_the_fast_path_takes_the_same_steps(start, growth, maximum):
     sequence, made = start
     settings = SHORT._replace(density=SHORT.density._replace(growth=growth, maximum=maximum))
     config = fast_config(settings)
-    shop = workshop(fast_sequence(sequence), config)
+    constants = training_constants(fast_sequence(sequence), config)
     fast = Gaussians(
         **{name: np.array(array, order="C") for name, array in made._asdict().items() if array is not None}
     )
@@ -153,7 +153,7 @@ def test_the_fast_path_takes_the_same_steps(start, growth, maximum):
     counts = set()
     for iteration in range(1, STEPS + 1):
         state, view = train.iterate(state, sequence, spectral, settings, rng, edges=canny_edges)
-        entry = training_step(fast_state, shop)
+        entry = training_step(fast_state, constants)
         counts.add(entry["gaussians"])
         print(f"iteration {iteration:2d}  definition {view.loss:.16f}  fast path {entry['loss']:.16f}")
         assert entry["loss"] == pytest.approx(view.loss, rel=LOSS_BOUND), iteration

@@ -7,8 +7,7 @@ from itertools import pairwise
 import claims
 import numpy as np
 import pytest
-from claims_cost import planned_hours
-from claims_parts import protocols, tables
+from claims_parts import planned_hours, protocols, tables
 from claims_power import least_size, pairs_needed
 from claims_protocols import MOVED, right_eye
 from claims_verdicts import NOT_YET, increment_verdict, level_verdict, student, verdicts

@@ -45,7 +45,6 @@ RESERVED = {
     "moments": {"definition", "fitting", "losses", "stages"},
     "band": {"definition", "equations", "stages"},
     "bands": {"definition", "equations", "fitting", "stages"},
-    "door": {"golden"},
     "bridged": {"fitting"},
 }
 # Modules of `fitting` that name moments, which are Adam's; a time between two frames is a bridged time.

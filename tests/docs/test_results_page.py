@@ -5,16 +5,15 @@ from pathlib import Path
 
 import levers
 import pytest
-import similarity
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-TABLES = {"table": levers.table, "motion": levers.motion_table}
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_a_table_of_the_levers_is_what_the_result_says(name):
-    found = json.loads(levers.FILE.read_text(encoding="utf-8"))
-    assert TABLES[name](found) in (RESULTS / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("study, name", [(study, name) for study, about in levers.STUDIES.items() for name in about.tables])
+def test_a_table_of_the_levers_is_what_the_result_says(study, name):
+    about = levers.STUDIES[study]
+    found = json.loads(about.file.read_text(encoding="utf-8"))
+    assert about.tables[name](found) in about.page.read_text(encoding="utf-8")
 
 
 def test_the_readme_says_which_preset_has_the_smaller_error():
@@ -36,8 +35,3 @@ def test_differences_are_paired_by_seed():
     found = {"scenes": {"clip": runs}, "seeds": 2, "iterations": 9, "date": "-", "machine": {"processor": "x"}}
     rows = [line for line in levers.table(found).splitlines() if line.startswith("| clip")]
     assert rows == ["| clip | `sharp` | 35.00 | - |", "| clip | `paper` | -1.00 ± 0.00 | - |"]
-
-
-def test_the_table_of_weights_is_what_the_result_says():
-    found = json.loads(similarity.FILE.read_text(encoding="utf-8"))
-    assert similarity.table(found) in similarity.PAGE.read_text(encoding="utf-8")

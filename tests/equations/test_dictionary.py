@@ -17,7 +17,7 @@ from endotsr.equations.dictionary import (
     normalised_atoms,
     report_atoms,
 )
-from endotsr.fitting.state import workshop
+from endotsr.fitting.state import training_constants
 from endotsr.scene import workload
 from oracle import fourier_oracle
 
@@ -188,7 +188,7 @@ def test_hard_W4_statistics_do_not_read_the_test_stamps():
         sequence = workload.sequence(32, 24)
         moved = sequence.times.copy()
         moved[sequence.test_index] += shift
-        spectral = workshop(dataclasses.replace(sequence, times=moved), config).spectral
+        spectral = training_constants(dataclasses.replace(sequence, times=moved), config).spectral
         atoms.append(normalised_atoms(0.77, spectral.omega, spectral.statistics).tobytes())
     assert atoms[0] == atoms[1]
 

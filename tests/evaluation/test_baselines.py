@@ -86,7 +86,7 @@ def test_temporal_mean_counts_only_tissue():
     masks = np.ones((3, 4, 5), bool)
     masks[0, 0, 0] = False  # tissue in frame 2 only
     masks[:, 3, 4] = False  # never tissue
-    mean = baselines.temporal_mean(made_up(images, [1], masks), 1)
+    mean = baselines.temporal_mean(made_up(images, [1], masks))
     np.testing.assert_allclose(mean[:, 1, 1], (20 + 40) / 2 / 255, atol=1e-6)
     np.testing.assert_allclose(mean[:, 0, 0], 40 / 255, atol=1e-6)
     np.testing.assert_array_equal(mean[:, 3, 4], 0)

@@ -8,8 +8,7 @@ import pytest
 
 from endotsr.errors import InputError
 from endotsr.evaluation.compare import Method, compare, interval, methods_of
-from endotsr.report.comparison_text import comparison_table
-from endotsr.report.spreadsheet import comparison_csv, frames_csv
+from endotsr.report.comparison import comparison_csv, comparison_table, frames_csv
 
 DIGESTS = {"images": "a", "masks": "b"}
 

@@ -8,8 +8,7 @@ from data_folder import data_folder
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.evaluation.depth import held_out_depth
-from endotsr.evaluation.flicker import flicker
-from endotsr.evaluation.measures import MEASURES, measure_lines, measured
+from endotsr.evaluation.measures import MEASURES, flicker, measure_lines, measured
 from endotsr.evaluation.right_view import moved_left, right_camera, right_view, stereo_baseline
 from endotsr.opencv import read_png
 from endotsr.sequences.endonerf import read_endonerf

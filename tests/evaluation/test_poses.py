@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endotsr.equations.pose import pose_forward
-from endotsr.evaluation.poses import pose_change
+from endotsr.evaluation.run import pose_change
 from endotsr.report.run_text import pose_sentence
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.simulate import simulate

@@ -3,30 +3,37 @@
 import numpy as np
 import pytest
 
-from endotsr.evaluation.run import RENDERS_KEPT, Renders
+from collections import Counter
+from types import SimpleNamespace
+
+from made_up_sequence import made_up
+
+from endotsr.evaluation import run
 from endotsr.report.run_files import worst_first
 from endotsr.splatting.render import RenderOut
 
 
-def test_renders_are_made_when_asked_for_and_few_are_kept():
-    made = []
+@pytest.mark.parametrize("kept, times", [(32, 1), (2, 2)])
+def test_a_held_out_frame_is_rendered_once_where_few_are_held_out(monkeypatch, kept, times):
+    """With fewer kept than held out, the oldest is rendered again, and no more of them are in memory."""
+    clip = made_up(np.full((9, 3, 40, 40), 100, np.uint8), [1, 4, 7])
+    sequence = SimpleNamespace(**vars(clip), cameras=[None] * 9)
+    made: Counter[float] = Counter()
 
-    def render(index):
-        made.append(index)
-        return RenderOut(np.full((1, 1, 1), index), np.zeros((1, 1)), np.zeros((1, 1)))
+    def render_at(gaussians, spectral, config, camera, time, *, frames):
+        made[time] += 1
+        return RenderOut(np.full((3, 40, 40), time, np.float32), np.ones((40, 40)), np.ones((40, 40)))
 
-    frames = tuple(range(0, 5 * RENDERS_KEPT, 2))
-    renders = Renders(render, frames)
-    assert list(renders) == list(frames) and len(renders) == len(frames) and not made
-    assert renders[4].colour.item() == renders[4].colour.item() == 4 and made == [4]
-    assert 6 in renders and 3 not in renders and made == [4]
-    with pytest.raises(KeyError):
-        renders[3]
-    for i in frames:
-        assert renders[i].colour.item() == i
-    assert len(made) == len(frames)  # the one that was kept is not made again
-    assert all(renders[i].colour.item() == i for i in frames[-RENDERS_KEPT:]) and len(made) == len(frames)
-    assert renders[0].colour.item() == 0 and len(made) == len(frames) + 1  # it had been dropped
+    monkeypatch.setattr(run, "render_at", render_at)
+    monkeypatch.setattr(run, "RENDERS_KEPT", kept)
+    monkeypatch.setattr(run, "without", lambda gaussians, **taken_out: gaussians)
+    gaussians = SimpleNamespace(appearance_coefficients=None, motion_coefficients=None)
+    model = SimpleNamespace(gaussians=gaussians, spectral=None, config=None, frames=None)
+    _, held_out = run.measure_model(model, sequence)
+    assert {i: float(held_out(i).colour.max()) for i in (1, 4, 7)} == {
+        i: np.float32(sequence.times[i]) for i in (1, 4, 7)
+    }
+    assert [made[float(sequence.times[i])] for i in (1, 4, 7)] == [times] * 3
 
 
 def test_the_report_shows_the_worst_frames_and_the_folder_has_all(tmp_path, monkeypatch):

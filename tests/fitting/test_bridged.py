@@ -13,7 +13,7 @@ from endotsr.fitting.bridged import BridgedTargets
 from endotsr.fitting.objective import frame_targets
 from endotsr.fitting.packed import STEPS
 from endotsr.fitting.sampling import BridgedTime, draw_view
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.sequences.between import flows_between, frame_between
 from endotsr.simulator.settings import SimulatorSettings
@@ -59,8 +59,8 @@ def test_the_targets_of_a_bridged_time_are_those_of_the_equation(sequence, preci
 
 
 def test_the_targets_of_a_frame_are_those_of_its_picture(sequence):
-    shop = workshop(sequence, DEMO)
-    for a, b in zip(flat(shop.targets_of(3)), flat(frame_targets(sequence.frame(3), DEMO)), strict=True):
+    constants = training_constants(sequence, DEMO)
+    for a, b in zip(flat(constants.targets_of(3)), flat(frame_targets(sequence.frame(3), DEMO)), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
@@ -92,16 +92,16 @@ def test_a_training_compares_with_bridged_times(sequence):
         training=msgspec.structs.replace(DEMO.training, bridge_fraction=1.0, iterations=6),
         initialisation=msgspec.structs.replace(DEMO.initialisation, first_frame_points=300, other_frame_points=60),
     )
-    shop, state = workshop(sequence, config), new_training(sequence, config)
-    entries = [training_step(state, shop) for _ in range(4)]
-    assert not len(shop.supports) and len(shop.bridged.stored)  # no frame was looked at
+    constants, state = training_constants(sequence, config), new_training(sequence, config)
+    entries = [training_step(state, constants) for _ in range(4)]
+    assert not len(constants.supports) and len(constants.bridged.stored)  # no frame was looked at
     assert all(np.isfinite(entry["loss"]) for entry in entries)
 
 
 def test_without_bridges_no_target_is_made(sequence):
     training = msgspec.structs.replace(DEMO.training, bridge_fraction=0.0)
     config = msgspec.structs.replace(DEMO, training=training)
-    shop, state = workshop(sequence, config), new_training(sequence, config)
+    constants, state = training_constants(sequence, config), new_training(sequence, config)
     for _ in range(4):
-        training_step(state, shop)
-    assert not len(shop.bridged.stored)
+        training_step(state, constants)
+    assert not len(constants.bridged.stored)

@@ -34,15 +34,15 @@ def settings(iterations=120, **training) -> Config:
 def run(sequence, config, state=None):
     """The last state, and the size of the frames by iteration."""
     state, sizes, said = state or new_training(sequence, config), [], []
-    step = coarse_start.workshop
+    step = coarse_start.training_constants
 
     def watched(frames, changed):
         sizes.append((state.iteration, frames.width))
         return step(frames, changed)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coarse_start, "workshop", watched)
-        patch.setattr("endotsr.fitting.trainer.workshop", watched)
+        patch.setattr(coarse_start, "training_constants", watched)
+        patch.setattr("endotsr.fitting.trainer.training_constants", watched)
         train(state, sequence, config, lambda entry: None, lambda _: None, on_message=said.append)
     return state, sizes, said
 
@@ -85,18 +85,18 @@ def test_a_check_changes_nothing_and_a_better_fit_has_less_error(sequence):
     config = settings()
     state = new_training(sequence, config)
     start = coarse_start.coarse_start(sequence, config)
-    shop, frames = start.workshop, start.frames
+    constants, frames = start.training_constants, start.frames
     assert len(frames) == 8 and {frames[0], frames[-1]} == {sequence.train_index[0], sequence.train_index[-1]}
     before = {name: a.copy() for name, a in arrays(state.gaussians).items()}
     generator = dict(state.rng.bit_generator.state)
     state.iteration = CHECK_EVERY
-    poor = coarse_start.fit_error(state, shop, frames)
+    poor = coarse_start.fit_error(state, constants, frames)
     assert not coarse_ends(state, start)
     assert all(np.array_equal(a, before[name]) for name, a in arrays(state.gaussians).items())
     assert state.rng.bit_generator.state == generator
     state.iteration = 0
     trained, *_ = run(sequence, settings(iterations=60))
-    assert coarse_start.fit_error(trained, shop, frames) < 0.95 * poor
+    assert coarse_start.fit_error(trained, constants, frames) < 0.95 * poor
 
 
 def test_what_the_half_lacks_is_the_finest_band(sequence):

@@ -25,17 +25,17 @@ import msgspec
 from endotsr.scene import workload
 from endotsr.bench.case import representative
 from endotsr.config import PAPER
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 
 small = msgspec.structs.replace(PAPER.initialisation, first_frame_points=500, other_frame_points=50)
 config = msgspec.structs.replace(PAPER, initialisation=small)
-shop = workshop(workload.sequence(128, 96), config)
-state = new_training(shop.sequence, config)
+constants = training_constants(workload.sequence(128, 96), config)
+state = new_training(constants.sequence, config)
 born = config.training.residual_activation
 for before in (0, born, representative(config), born + 2 * config.density.interval - 1):  # the last one densifies
     state.iteration = before
-    training_step(state, shop)
+    training_step(state, constants)
 kernels = [(f"{n}.{k}", v) for n, m in list(sys.modules.items()) if n.startswith("endotsr") for k, v in vars(m).items()]
 stats = {name: kernel.stats for name, kernel in kernels if hasattr(kernel, "stats") and hasattr(kernel, "overloads")}
 missed = sorted(name for name, s in stats.items() if s.cache_misses)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endotsr.equations.pose import pose_forward, pose_reverse
-from endotsr.fitting.model import camera_at, corrected, corrected_cameras, corrected_reverse, with_corrected_cameras
+from endotsr.fitting.model import camera_at, corrected_cameras, with_corrected_cameras, with_pose_correction, with_pose_correction_reverse
 from endotsr.scene.parameters import FrameParameters, Pose, pose_at
 from endotsr.scene.workload import sequence as made_up_sequence
 from endotsr.splatting.camera import CameraGrads
@@ -32,14 +32,14 @@ def test_every_camera_has_the_correction_at_its_time(clip, frames):
         np.testing.assert_array_equal(camera.translation, translation)
         assert camera[2:] == given[2:]
     np.testing.assert_array_equal(camera_at(frames, clip.cameras[1], 0.3).rotation,
-                                  corrected(clip.cameras[1], pose_at(frames, 0.3))[0].rotation)  # fmt: skip
+                                  with_pose_correction(clip.cameras[1], pose_at(frames, 0.3))[0].rotation)  # fmt: skip
 
 
 def test_without_corrections_nothing_is_made_anew(clip):
     for none in (None, FrameParameters(clip.times[clip.train_index])):
         assert with_corrected_cameras(clip, none) is clip
         assert all(a is b for a, b in zip(corrected_cameras(none, clip.cameras, clip.times), clip.cameras, strict=True))
-    assert corrected(clip.cameras[0], None) == (clip.cameras[0], None)
+    assert with_pose_correction(clip.cameras[0], None) == (clip.cameras[0], None)
 
 
 def test_a_sequence_keeps_everything_but_its_cameras(clip, frames):
@@ -50,10 +50,10 @@ def test_a_sequence_keeps_everything_but_its_cameras(clip, frames):
 
 def test_gradients_go_back_to_the_correction_alone_and_only_where_there_is_one(clip):
     camera, grads = clip.cameras[0], CameraGrads(np.arange(9.0).reshape(3, 3), np.array([1.0, -2.0, 3.0]))
-    _, saved = corrected(camera, Pose(np.array([0.1, 0.2, -0.3]), np.array([1.0, 2.0, 3.0])))
-    found, wanted = corrected_reverse(grads, saved), pose_reverse(*grads, saved)
+    _, saved = with_pose_correction(camera, Pose(np.array([0.1, 0.2, -0.3]), np.array([1.0, 2.0, 3.0])))
+    found, wanted = with_pose_correction_reverse(grads, saved), pose_reverse(*grads, saved)
     np.testing.assert_array_equal(found.rotation, wanted.d_rotation_vector)
     np.testing.assert_array_equal(found.translation, wanted.d_offset)
-    assert corrected_reverse(None, saved) is None
-    assert corrected_reverse(grads, None) is None
-    assert corrected_reverse(None, None) is None
+    assert with_pose_correction_reverse(None, saved) is None
+    assert with_pose_correction_reverse(grads, None) is None
+    assert with_pose_correction_reverse(None, None) is None

@@ -25,8 +25,8 @@ from endotsr.evaluation.run import measure_model
 from endotsr.export.model import load_slim_model, save_slim_model
 from endotsr.fitting import model as model_module
 from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.fitting.model import corrected, corrected_cameras, render_at, spectral_from, with_corrected_cameras
-from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, workshop
+from endotsr.fitting.model import corrected_cameras, render_at, spectral_from, with_corrected_cameras, with_pose_correction
+from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, training_constants
 from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.model import Model
 from endotsr.scene.parameters import Pose, exposure_of, trained
@@ -139,9 +139,9 @@ def test_identity_that_is_not_trained_changes_no_bit(part, clips):
 @both
 def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(part, clips, tmp_path):
     clip, config = clips[part], settings(part, True, iterations=20)
-    state, shop = new_training(clip, config), workshop(clip, config)
+    state, constants = new_training(clip, config), training_constants(clip, config)
     for _ in range(10):
-        training_step(state, shop)
+        training_step(state, constants)
     save_state(tmp_path / "a.npz", state, config)
     resumed = state_from_checkpoint(load_checkpoint(tmp_path / "a.npz"), config)
     for now in (state, resumed):
@@ -157,11 +157,11 @@ def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(part, clips, tmp_pat
 
 
 def mean_psnr(dimmed, state, config, indices):
-    shop = workshop(dimmed, config)
+    constants = training_constants(dimmed, config)
     found = []
     for i in indices:
         out = render_at(
-            state.gaussians, shop.spectral, config, dimmed.cameras[i], float(dimmed.times[i]), frames=state.frames
+            state.gaussians, constants.spectral, config, dimmed.cameras[i], float(dimmed.times[i]), frames=state.frames
         )
         found.append(psnr_tissue(out.colour, dimmed.images[i] / 255.0, dimmed.masks[i]))
     return float(np.mean(found))
@@ -251,11 +251,11 @@ def test_training_frames_are_fitted_as_with_the_true_poses(moving, disturbed, ru
 def test_translations_move_in_proportion_to_the_depth(disturbed):
     """The rate of the translation is in depths: the first step of Adam is its rate, whatever the gradient."""
     config = settings("pose", True, iterations=300)
-    state, shop = new_training(disturbed, config), workshop(disturbed, config)
-    training_step(state, shop)
+    state, constants = new_training(disturbed, config), training_constants(disturbed, config)
+    training_step(state, constants)
     steps = [np.abs(trained(state.frames)[f"pose_{name}"]).max() for name in ("rotation", "translation")]
-    assert shop.depth == pytest.approx(np.median(disturbed.depth[disturbed.depth > 0]), rel=0.2)
-    assert steps[1] / steps[0] == pytest.approx(shop.depth, rel=1e-5)
+    assert constants.depth == pytest.approx(np.median(disturbed.depth[disturbed.depth > 0]), rel=0.2)
+    assert steps[1] / steps[0] == pytest.approx(constants.depth, rel=1e-5)
 
 
 def test_one_of_the_two_arrays_alone_is_refused(disturbed, tmp_path):
@@ -293,6 +293,6 @@ def test_a_sequence_without_corrections_is_the_sequence_itself(disturbed, runs):
     seen = with_corrected_cameras(disturbed, runs["pose", True].frames)
     camera = disturbed.cameras[0]
     assert seen.images is disturbed.images and not np.array_equal(seen.cameras[0].rotation, camera.rotation)
-    assert corrected(camera, None)[0] is camera
-    moved, _ = corrected(camera, Pose(np.zeros(3), np.array([1.0, 2.0, 3.0])))
+    assert with_pose_correction(camera, None)[0] is camera
+    moved, _ = with_pose_correction(camera, Pose(np.zeros(3), np.array([1.0, 2.0, 3.0])))
     np.testing.assert_array_equal(moved.translation, camera.translation + [1, 2, 3])

@@ -28,7 +28,7 @@ from endotsr.fitting.divergence import Diverged
 from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import render_at
 from endotsr.fitting.schedules import densify_now
-from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, workshop
+from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, training_constants
 from endotsr.fitting.trainer import calibrated_weight, train, training_step
 from endotsr.scene.gaussians import arrays
 from endotsr.simulator.settings import SimulatorSettings
@@ -176,7 +176,7 @@ def stepped(state, sequence, config, monkeypatch):
         watched = lambda rendered, *rest, **named: seen.append(rendered) or real(rendered, *rest, **named)
         patch.setattr(trainer, "image_loss", watched)
         state = copy.deepcopy(state)
-        entry = training_step(state, workshop(sequence, config))
+        entry = training_step(state, training_constants(sequence, config))
     return state, entry, seen[0]
 
 
@@ -330,18 +330,18 @@ def test_legacy_skip_leaves_out_the_step_on_densify_iterations(finished, sequenc
     state = finished[2][10]
     for skip in (False, True):
         config = settings(optimiser={"legacy_skip": skip})
-        shop, now = workshop(sequence, config), copy.deepcopy(state)
+        constants, now = training_constants(sequence, config), copy.deepcopy(state)
         while now.iteration < 19:
-            training_step(now, shop)
+            training_step(now, constants)
         before, steps = now.gaussians.harmonics[0].copy(), now.adam.step["position"]
         with monkeypatch.context() as patch:
             if skip:
                 patch.setattr(trainer, "optimise", forbidden)
-            training_step(now, shop)
+            training_step(now, constants)
         assert now.adam.step["position"] == steps + (0 if skip else 1)
         kept = {tuple(c) for c in now.gaussians.harmonics[0].T} & {tuple(c) for c in before.T}
         assert bool(kept) == skip  # survivors, clones and children have the colours of before
-        training_step(now, shop)
+        training_step(now, constants)
         assert now.adam.step["position"] == steps + (1 if skip else 2)
 
 
@@ -373,9 +373,9 @@ def test_hard_P6_a_state_that_is_not_finite_is_refused_at_the_start(name, value,
         run(sequence, settings(), state)
     if value == np.inf and name in ("fdm_width", "appearance_coefficients"):
         return  # an infinite width or coefficient still gives a finite scene
-    shop = workshop(sequence, settings())
+    constants = training_constants(sequence, settings())
     with pytest.raises(ValueError, match=r"position|harmonics|residual|log_scale|quaternion"):
-        render_at(state.gaussians, shop.spectral, settings(), sequence.cameras[0], 0.25)
+        render_at(state.gaussians, constants.spectral, settings(), sequence.cameras[0], 0.25)
 
 
 @pytest.mark.parametrize("name", ["position", "quaternion", "log_scale", "opacity_logit"])
@@ -385,7 +385,7 @@ def test_a_nan_parameter_in_the_middle_of_a_run_never_crashes_the_kernels(name, 
     getattr(state.gaussians, name)[..., ::7] = np.nan
     getattr(state.gaussians, name)[..., 1::7] = np.inf
     try:
-        training_step(state, workshop(sequence, settings()))
+        training_step(state, training_constants(sequence, settings()))
     except FloatingPointError as error:
         assert "iteration 31" in str(error)
 

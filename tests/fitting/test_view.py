@@ -20,7 +20,7 @@ from endotsr.fitting.adam import adam_update
 from endotsr.fitting.objective import LossWeights
 from endotsr.fitting.sampling import drawn_view
 from endotsr.fitting.schedules import learning_rates
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.fitting.view import view_gradients
 from endotsr.opencv import canny_edges
@@ -57,22 +57,22 @@ def turning(sequence):
 
 
 def warm(sequence, config, iterations):
-    """State and workshop after some iterations: coefficients, moments and exposures are off zero."""
-    state, shop = new_training(sequence, config), workshop(sequence, config)
+    """State and training_constants after some iterations: coefficients, moments and exposures are off zero."""
+    state, constants = new_training(sequence, config), training_constants(sequence, config)
     for _ in range(iterations):
-        training_step(state, shop)
-    return state, shop
+        training_step(state, constants)
+    return state, constants
 
 
-def plain_step(state, shop):
+def plain_step(state, constants):
     """The documented gradients of the next view, then Adam; the state is changed in place."""
-    config, iteration = shop.config, state.iteration + 1
-    index, t, _ = (state.drawn or drawn_view(copy.deepcopy(state.rng), shop.sequence, config.training)).view
-    column = int(np.flatnonzero(shop.sequence.train_index == index)[0])
+    config, iteration = constants.config, state.iteration + 1
+    index, t, _ = (state.drawn or drawn_view(copy.deepcopy(state.rng), constants.sequence, config.training)).view
+    column = int(np.flatnonzero(constants.sequence.train_index == index)[0])
     loss, o = config.loss, config.optimiser
     weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)
     view = view_gradients(
-        state.gaussians, shop.spectral, shop.targets_of(index), weights, config, shop.sequence.cameras[index], t,
+        state.gaussians, constants.spectral, constants.targets_of(index), weights, config, constants.sequence.cameras[index], t,
         exposure=exposure_of(state.frames, column), pose=pose_at(state.frames, t), degree=min(3, iteration // 2),
     )  # fmt: skip
     gradients = dict(view.gradients)
@@ -83,7 +83,7 @@ def plain_step(state, shop):
     parameters = arrays(state.gaussians) | trained(state.frames)
     rates = learning_rates(iteration, config)
     if config.model.pose_correction:
-        rates["pose_translation"] *= shop.depth
+        rates["pose_translation"] *= constants.depth
     adam_update(state.adam, parameters, gradients, rates, o.beta1, o.beta2, o.epsilon)
     return index, view
 
@@ -93,10 +93,10 @@ def plain_step(state, shop):
 def test_a_step_of_training_equals_the_view_gradients_put_to_adam_bitwise(sequence, turning, precision, frames):
     poses = frames in ("poses", "both")
     config = settings(precision, exposure=frames in ("exposure", "both"), pose_correction=poses)
-    state, shop = warm(turning if poses else sequence, config, 6)
+    state, constants = warm(turning if poses else sequence, config, 6)
     plain = copy.deepcopy(state)
-    index, view = plain_step(plain, shop)
-    entry = training_step(state, shop)
+    index, view = plain_step(plain, constants)
+    entry = training_step(state, constants)
     assert (entry["frame"], entry["loss"]) == (index, view.loss)
     assert set(view.terms) == {"l1", "ssim", "depth", "smoothness", "laplacian", "matern_penalty"}
     assert {name: entry[name] for name in view.terms} == view.terms
@@ -110,33 +110,33 @@ def test_a_step_of_training_equals_the_view_gradients_put_to_adam_bitwise(sequen
         np.testing.assert_array_equal(state.adam.second[name], plain.adam.second[name], err_msg=name)
 
 
-def view_of(state, shop, edges=None):
-    targets, camera = shop.targets_of(0), shop.sequence.cameras[0]
+def view_of(state, constants, edges=None):
+    targets, camera = constants.targets_of(0), constants.sequence.cameras[0]
     weights = LossWeights(0.1, 1.0, 0.5, 0.8)
-    return view_gradients(state.gaussians, shop.spectral, targets, weights, shop.config, camera, 0.2, edges)
+    return view_gradients(state.gaussians, constants.spectral, targets, weights, constants.config, camera, 0.2, edges)
 
 
 def test_given_edges_take_the_place_of_the_detected_ones(sequence):
-    state, shop = warm(sequence, settings(), 3)
-    default = view_of(state, shop)
+    state, constants = warm(sequence, settings(), 3)
+    default = view_of(state, constants)
     detected = canny_edges(default.rendered.depth)
-    same, none = view_of(state, shop, detected), view_of(state, shop, np.ones_like(detected))
+    same, none = view_of(state, constants, detected), view_of(state, constants, np.ones_like(detected))
     assert same.loss == default.loss
     np.testing.assert_array_equal(same.gradients["position"], default.gradients["position"])
     assert none.terms["smoothness"] != default.terms["smoothness"]
 
 
 def test_a_component_that_is_off_has_no_gradient_and_no_term(sequence):
-    state, shop = warm(sequence, settings(appearance=False, spectral_motion=False, deformation=False), 3)
-    view = view_of(state, shop)
+    state, constants = warm(sequence, settings(appearance=False, spectral_motion=False, deformation=False), 3)
+    view = view_of(state, constants)
     assert view.gradients.keys() == arrays(state.gaussians).keys()
     assert "matern_penalty" not in view.terms and view.d_exposure is None
 
 
 def test_degree_of_the_model_is_the_default(sequence):
-    state, shop = warm(sequence, settings(), 8)
-    high = msgspec.structs.replace(shop.config.model, harmonics_degree=0)
-    flat = msgspec.structs.replace(shop.config, model=high)
-    assert view_of(state, shop).gradients["harmonics"].shape[0] == 16
-    shop.config = flat
-    assert not view_of(state, shop).gradients["harmonics"][1:].any()
+    state, constants = warm(sequence, settings(), 8)
+    high = msgspec.structs.replace(constants.config.model, harmonics_degree=0)
+    flat = msgspec.structs.replace(constants.config, model=high)
+    assert view_of(state, constants).gradients["harmonics"].shape[0] == 16
+    constants.config = flat
+    assert not view_of(state, constants).gradients["harmonics"][1:].any()

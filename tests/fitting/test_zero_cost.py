@@ -8,7 +8,7 @@ from endotsr.effects.plan import with_setting
 from endotsr.effects.savings import numbers_of_a_gaussian
 from endotsr.equations import laplacian
 from endotsr.equations.laplacian import support_masks
-from endotsr.fitting.model import exposed, exposed_reverse, scene_at, spectral_from
+from endotsr.fitting.model import with_exposure, with_exposure_reverse, scene_at, spectral_from
 from endotsr.fitting.objective import (
     LossWeights,
     depth_term,
@@ -103,11 +103,11 @@ def test_memory_is_that_of_the_parts_that_are_on(degree, residuals):
 def test_exposure_off_equals_an_exposure_of_zero_bitwise():
     rendered, _ = view(*made_up({}))
     zero = np.zeros(3, np.float32)
-    (on, saved), (off, nothing) = exposed(rendered, Exposure(zero, zero)), exposed(rendered, None)
+    (on, saved), (off, nothing) = with_exposure(rendered, Exposure(zero, zero)), with_exposure(rendered, None)
     assert nothing is None and saved is not None
     np.testing.assert_array_equal(on.colour, off.colour)
     d_colour = np.random.default_rng(6).normal(size=on.colour.shape).astype(np.float32)
-    np.testing.assert_array_equal(exposed_reverse(d_colour, saved)[0], exposed_reverse(d_colour, None)[0])
+    np.testing.assert_array_equal(with_exposure_reverse(d_colour, saved)[0], with_exposure_reverse(d_colour, None)[0])
 
 
 LOSSES = {

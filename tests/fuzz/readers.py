@@ -101,7 +101,7 @@ def ply_seeds() -> list[bytes]:
 
 
 def read_splats(path: Path) -> object:
-    from endotsr.tradeoff.splat_file import read_splats as read
+    from endotsr.tradeoff.scenes import read_splats as read
 
     return read(path)
 
@@ -192,7 +192,7 @@ def sequence_seeds() -> list[bytes]:
 
 def read_sequence(path: Path) -> object:
     """As `endotsr render` does, up to the names of the pictures."""
-    from endotsr.export.times import Times
+    from endotsr.export.times import Times, chosen_times
     from endotsr.runs.folder import RunFolder
     from endotsr.views.plan import ViewRequest, check_request, views_of
 
@@ -200,9 +200,9 @@ def read_sequence(path: Path) -> object:
     record = folder.sequence_record()
     requests = ViewRequest(Times(frames="all")), ViewRequest(Times(count=3), camera="sway", size="20x20")
     for request in requests:
-        check_request(request, record)
-    for request in requests:
-        for view in views_of(request, record, record.frame_cameras, pivot_depth=50.0):
+        wanted = chosen_times("render", request.times, record)
+        check_request(request, record.count)
+        for view in views_of(request, wanted, record.frame_cameras, pivot_depth=50.0):
             inside = (path.parent / f"{view.label}.png").resolve()
             assert inside.parent == path.parent.resolve(), f"{view.label!r} leaves the folder"
             assert view.camera.width > 0
@@ -214,7 +214,7 @@ def record_seeds() -> list[bytes]:
     """run.json."""
     from endotsr.config import DEMO
     from endotsr.runs.files import finite
-    from endotsr.runs.training import start_record
+    from endotsr.runs.sources import start_record
 
     settings, sequence, _ = _tiny()
     return [json.dumps(finite(start_record(["endotsr"], "simulated", sequence, DEMO, settings, 2))).encode()]
@@ -234,7 +234,7 @@ def read_record(path: Path) -> object:
     record = folder.record(*REPORTED)
     run_source(folder)
     scene = type("Scene", (), {"count": 3})()
-    return facts({"run": about_run(record, Model(scene, None, DEMO, 5))}), sequence_fingerprint(record)
+    return facts(about_run(record, Model(scene, None, DEMO, 5))), sequence_fingerprint(record)
 
 
 @cache
@@ -246,11 +246,10 @@ def log_seeds() -> list[bytes]:
 
 def read_log(path: Path) -> object:
     """As the report and a resumed training do."""
-    from endotsr.report.curves import read_log as read
     from endotsr.report.curves import series
-    from endotsr.runs.log import RunLog
+    from endotsr.runs.log import RunLog, log_until
 
-    log = [entry for entry in read(path) if entry.get("iteration", 0) <= 5]
+    log = log_until(path, 5)
     found = [series(log, key) for key in ("loss", "l1", "psnr", "seconds")]
     RunLog(path, 5).close()
     return found

@@ -20,7 +20,7 @@ MODULES = (
     "fitting.schedules",
 )
 # functions in which only a named defect is planted
-MORE = ("fitting.state.workshop",)
+MORE = ("fitting.state.training_constants",)
 
 
 def kernels() -> dict[str, Callable]:

@@ -108,7 +108,7 @@ DEFECTS: tuple[Defect, ...] = (
     Defect("determinant as a c - b b", SCREEN, (("low_pass * low_pass + low_pass * spread + areas", "a * c - b * b"),)),
     Defect(
         "atom statistics from all time stamps",
-        "fitting.state.workshop",
+        "fitting.state.training_constants",
         (("sequence.times[sequence.train_index]", "sequence.times"),),
     ),
     Defect(

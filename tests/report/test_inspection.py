@@ -10,7 +10,7 @@ from endotsr.effects.periodic import Line
 from endotsr.effects.plan import Change, Dictionary, Plan
 from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.equations.dictionary import AtomReport
-from endotsr.report.inspection import inspection_html, inspection_text, write_inspection
+from endotsr.report.inspection import inspection_html, inspection_text
 from report.test_report import Reader, without_pictures
 
 
@@ -45,15 +45,13 @@ def test_headline_separates_what_was_found_from_what_is_open(found):
         assert said in Reader(inspection_html("clip", changed, plan)).words
 
 
-def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found, tmp_path):
+def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found):
     page = inspection_html("clip & <b>", *found)
     words = Reader(page).words
     for word in ("clip & <b>", "periodic", "It <moves>.", "model.appearance", "Kept as given. Slow motion.", "Remark."):
         assert any(word in said for said in words), word
     assert "http" not in without_pictures(page) and "<script" not in page
     assert page.count("data:image/png") == 4  # frame, map, and the chart for either colour scheme
-    write_inspection(tmp_path / "page.html", "clip & <b>", *found)
-    assert (tmp_path / "page.html").read_text(encoding="utf-8") == page
 
 
 def test_text_says_what_the_page_says(found):

@@ -9,7 +9,7 @@ import pytest
 
 from endonerf_writer import write_endonerf
 from endotsr.config import DEMO, SequenceConfig
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.kernels.memory import ASSUMED, Kept, bytes_of, memory_limit
 from endotsr.scene.gaussians import arrays
@@ -47,20 +47,20 @@ def trained(folder, memory, steps=24):
     training = msgspec.structs.replace(DEMO.training, iterations=steps)
     config = msgspec.structs.replace(DEMO, sequence=SequenceConfig(memory=memory), training=training)
     sequence = read_endonerf(folder, config.sequence)
-    state, shop = new_training(sequence, config), workshop(sequence, config)
-    log = [training_step(state, shop) for _ in range(steps)]
-    return arrays(state.gaussians), log, shop
+    state, constants = new_training(sequence, config), training_constants(sequence, config)
+    log = [training_step(state, constants) for _ in range(steps)]
+    return arrays(state.gaussians), log, constants
 
 
 def test_a_lowered_limit_changes_no_number_of_a_training(folder):
     """The presets with targets along optical flow use frames and moments between them; few of either are kept."""
-    here, log, shop = trained(folder, 0.0)
+    here, log, constants = trained(folder, 0.0)
     there, same, short = trained(folder, TINY)
     assert log == same
     for name, array in here.items():
         np.testing.assert_array_equal(array, there[name])
-    assert len(short.supports) < len(shop.supports)  # a mask of one bit a pixel is small
-    assert len(short.bridged.stored) <= 1 < len(shop.bridged.stored)
+    assert len(short.supports) < len(constants.supports)  # a mask of one bit a pixel is small
+    assert len(short.bridged.stored) <= 1 < len(constants.bridged.stored)
 
 
 def test_values_are_dropped_oldest_first_and_made_again():

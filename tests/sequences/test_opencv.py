@@ -1,4 +1,4 @@
-"""The door to OpenCV."""
+"""The room that calls OpenCV."""
 
 import subprocess
 import sys

@@ -88,4 +88,4 @@ def test_mistakes_are_one_line(tmp_path, capsys, words, said):
 
 def test_a_folder_is_needed(capsys):
     assert main(["ablate", "simulated"]) == 2
-    assert "--out DIR is missing" in capsys.readouterr().err
+    assert "missing: --out DIR" in capsys.readouterr().err

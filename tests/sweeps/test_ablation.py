@@ -22,7 +22,7 @@ from endotsr.sweeps.ablation import (
     model_of,
 )
 from endotsr.sweeps.ablation_page import FILES, ablation_record, interval_text, write_ablation
-from endotsr.sweeps.spec import spec_of
+from endotsr.sweeps.spec import StartAt, spec_of
 
 
 def row(configuration, seed, psnr, sequence="one", split="every_eighth", **more):
@@ -144,7 +144,7 @@ def test_comparisons_differ_in_what_they_claim_and_nothing_else(tmp_path):
         prior = "prior" in c.claim
         assert (one.config.loss != other.config.loss) == prior and (one.config.model != other.config.model) != prior
     fixed = configs[f"A{FIXED}"]
-    assert fixed.start == ("base", 3000) and fixed.config.density.until == 0
+    assert fixed.start == StartAt(configuration="base", iteration=3000) and fixed.config.density.until == 0
     assert model_of("S without prior")["loss"] == {"lambda_msp": 0.0}
 
 

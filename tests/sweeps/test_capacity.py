@@ -5,7 +5,7 @@ import pytest
 
 from endotsr.config import PAPER, SHARP
 from endotsr.kernels.machine import memory_of_machine
-from endotsr.sweeps.capacity import Size, capacity, free_memory, run_bytes
+from endotsr.sweeps.place import Size, capacity, free_memory, run_bytes
 
 FULL = Size(63, 640, 512)
 RUN = run_bytes(FULL, PAPER)
@@ -51,6 +51,6 @@ def test_memory_of_this_machine_is_found():
 
 
 def test_where_memory_is_unknown_little_is_assumed_and_said(monkeypatch):
-    monkeypatch.setattr("endotsr.sweeps.capacity.free_memory", lambda: None)
+    monkeypatch.setattr("endotsr.sweeps.place.free_memory", lambda: None)
     found = capacity([RUN] * 9, cores=64)
     assert found.workers == 1 and found.reason.endswith("4.0 GB assumed: the system does not say what is free")

@@ -233,7 +233,7 @@ def test_a_plan_lists_what_is_left(whole, capsys):
 
 @pytest.mark.parametrize(
     "words, said",
-    [(["--out"], "--out: missing value"), ([], "--out DIR is missing"),
+    [(["--out"], "--out: missing value"), ([], "missing: --out DIR"),
      (["--out", "x", "--workers", "0"], "--workers 0"),
      (["--out", "x", "--workers", "2", "--scheduler", "tcp://a:1"], "--workers beside --scheduler")],
 )  # fmt: skip

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from made_up import moving_scene
-from tradeoff_presets import KEPT, dominates, judge_presets
+from tradeoff_text import KEPT, dominates, judge_presets
 
-from endotsr.tradeoff.front import Ranked, non_dominated
+from endotsr.tradeoff.study import Ranked, non_dominated
 from endotsr.tradeoff.study import run_study
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"

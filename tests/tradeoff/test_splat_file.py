@@ -7,7 +7,7 @@ from endotsr.errors import InputError
 from endotsr.kernels.constants import Y00
 from endotsr.splatting.render import Scene, render_forward
 from endotsr.splatting.settings import PAPER
-from endotsr.tradeoff.splat_file import read_splats, splat_scene
+from endotsr.tradeoff.scenes import read_splats, splat_scene
 
 
 def write_ply(path, count=12, bands=4, text=False, seed=0):

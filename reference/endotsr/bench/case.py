@@ -12,17 +12,21 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import msgspec
 import numpy as np
 
-from endotsr.bench.clock import SPLAT, StageClock
-from endotsr.bench.timing import spread
-from endotsr.config import PAPER, Config
+from endotsr.bench.clock import SPLAT, StageClock, spread
+from endotsr.config import PAPER, Config, with_settings
+from endotsr.export.npz import read_arrays
+from endotsr.kernels.constants import Y00
 from endotsr.scene import workload
+from endotsr.scene.gaussians import Gaussians, arrays
 
 Precision = Literal["float32", "float64"]
 
 WARM_UP = 2  # iterations after the compiling one
+DEPTH = 4.0  # scene units of the middle of a trained scene, that of the common workload
+SEED = 7  # of the time-dependent parameters of a trained scene
+PERCENTILES = (1, 99)  # of the positions of a trained scene: the range that is scaled to the picture
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,8 @@ class BenchCase:
 
     def config(self) -> Config:
         """The published settings with the sizes of this case."""
-        change = msgspec.structs.replace
-        training = change(PAPER.training, precision=self.precision, threads=self.threads)
-        model = change(PAPER.model, bases=self.bases, frequencies=self.frequencies)
-        return change(PAPER, training=training, model=model)
+        training = {"precision": self.precision, "threads": self.threads}
+        return with_settings(PAPER, training=training, model={"bases": self.bases, "frequencies": self.frequencies})
 
 
 def apart(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -65,15 +67,13 @@ def measure(case: BenchCase) -> dict[str, Any]:
              included; "view" {"visible", "listed", "blended"}; "parameters" a Gaussian; "peak_memory_bytes";
              "densification" {"median_ms", "quartiles_ms", "per_iteration_ms", "gaussians"}, None if none was timed
     """
-    import numba
-
+    from endotsr.kernels.threads import use_threads
     from endotsr.runs.machine import peak_memory_bytes
-    from endotsr.scene.gaussians import arrays
 
-    numba.set_num_threads(min(case.threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    use_threads(case.threads)
     config = case.config()
-    state, shop = prepare(case, config)
-    first, times = time_iterations(state, shop, case.repeats)
+    state, constants = prepare(case, config)
+    first, times = time_iterations(state, constants, case.repeats)
     peak = peak_memory_bytes()
     numbers = sum(a.size for a in arrays(state.gaussians).values())
     return {
@@ -82,29 +82,56 @@ def measure(case: BenchCase) -> dict[str, Any]:
         "splat": spread([sum(t[name] for name in SPLAT) for t in times]),
         "iteration": spread([sum(t.values()) for t in times]),
         "first_iteration_s": first,
-        "view": _view(state, shop),
+        "view": _view(state, constants),
         "parameters": numbers // state.gaussians.count,
         "peak_memory_bytes": peak,
-        "densification": _densification(state, shop, case.densifications),
+        "densification": _densification(state, constants, case.densifications),
     }
 
 
 def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
-    """State and workshop of a case, at the timed iteration, with every target computed."""
-    from endotsr.bench.trained import trained_gaussians
-    from endotsr.fitting.state import bench_state, workshop
+    """State and constants of a case, at the timed iteration, with every target computed."""
+    from endotsr.fitting.state import bench_state, training_constants
 
-    shop = workshop(workload.sequence(case.width, case.height, frames=case.frames), config)
-    for index in shop.sequence.train_index:
-        shop.targets_of(int(index))  # a run computes them once a frame
+    constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
+    for index in constants.sequence.train_index:
+        constants.targets_of(int(index))  # a run computes them once a frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:
         scene = workload.gaussians(case.gaussians, config, size=case.size)
-    return bench_state(scene, config, representative(config)), shop
+    return bench_state(scene, config, representative(config)), constants
 
 
-def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
+def trained_gaussians(path: Path, config: Config) -> Gaussians:
+    """A trained scene, moved and scaled to fill the common camera's picture, with small time-dependent parameters.
+
+    path   npz, see `export.npz`
+    Raises: InputError naming the file and what is missing.
+    """
+    found = read_arrays(path)
+    position, log_scale = found["xyz"].T.astype(np.float64), found["log_scale"].T.astype(np.float64)
+    low, high = np.percentile(position, PERCENTILES, axis=1)
+    across = max((high - low)[0] / workload.WIDTH, (high - low)[1] / workload.HEIGHT)  # scene units a pixel
+    factor = DEPTH / workload.FOCAL / across
+    middle = (low + high)[:, None] / 2
+    opacity = np.clip(found["opacity"].astype(np.float64), 1e-4, 1 - 1e-4)
+    harmonics = np.zeros(((config.model.harmonics_degree + 1) ** 2, 3, opacity.size))
+    harmonics[0] = (found["rgb"].T - 0.5) / Y00
+    dtype = np.dtype(config.training.precision)
+    cast = lambda array: np.ascontiguousarray(array, dtype)
+    scene = Gaussians(
+        position=cast((position - middle) * factor + np.array([[0.0], [0.0], [DEPTH]])),
+        quaternion=cast(found["quat_wxyz"].T),
+        log_scale=cast(log_scale + np.log(factor)),
+        opacity_logit=cast(np.log(opacity / (1 - opacity))),
+        harmonics=cast(harmonics),
+    )
+    sigma = float(np.exp(np.median(scene.log_scale)))
+    return scene._replace(**workload.temporal(np.random.default_rng(SEED), opacity.size, config, sigma))
+
+
+def time_iterations(state: Any, constants: Any, repeats: int) -> tuple[float, list[dict[str, float]]]:
     """Repeat the same iteration of the schedule, after warm-up.
 
     returns  seconds of the very first iteration (compilation or loading of compiled code included); of each of the
@@ -114,12 +141,12 @@ def time_iterations(state: Any, shop: Any, repeats: int) -> tuple[float, list[di
 
     iteration, clock = state.iteration, StageClock()
     began = time.perf_counter()
-    training_step(state, shop)
+    training_step(state, constants)
     first = time.perf_counter() - began
     for _ in range(WARM_UP + repeats):
         state.iteration = iteration
         with clock.iteration():
-            training_step(state, shop, clock)
+            training_step(state, constants, clock)
     return first, clock.repeats[WARM_UP:]
 
 
@@ -130,31 +157,31 @@ def representative(config: Config) -> int:
     return start + config.density.interval // 2
 
 
-def _view(state: Any, shop: Any) -> dict[str, int]:
+def _view(state: Any, constants: Any) -> dict[str, int]:
     """Gaussians on the screen, entries of the tile lists and blended pairs of the first training view."""
     from endotsr.bench.pairs import count_pairs
     from endotsr.fitting.model import raster_settings, scene_at
     from endotsr.splatting.render import render_forward
 
-    model, index = shop.config.model, int(shop.sequence.train_index[0])
-    scene, _ = scene_at(state.gaussians, shop.spectral, model, float(shop.sequence.times[index]))
-    settings = raster_settings(shop.config)
-    _, saved = render_forward(scene, shop.sequence.cameras[index], settings, degree=model.harmonics_degree)
+    model, index = constants.config.model, int(constants.sequence.train_index[0])
+    scene, _ = scene_at(state.gaussians, constants.spectral, model, float(constants.sequence.times[index]))
+    settings = raster_settings(constants.config)
+    _, saved = render_forward(scene, constants.sequence.cameras[index], settings, degree=model.harmonics_degree)
     listed = int(saved.composite.lists.ranks.size)
     return {"visible": int(saved.order.size), "listed": listed, "blended": count_pairs(saved).blended}
 
 
-def _densification(state: Any, shop: Any, repeats: int) -> dict[str, Any] | None:
+def _densification(state: Any, constants: Any, repeats: int) -> dict[str, Any] | None:
     """Time of the densification within an iteration; the scene changes, so there are few repeats."""
     from endotsr.fitting.trainer import training_step
 
     if repeats == 0:
         return None
-    interval, clock = shop.config.density.interval, StageClock()
+    interval, clock = constants.config.density.interval, StageClock()
     for _ in range(1 + repeats):  # the first one loads its kernels
         state.iteration = -(-state.iteration // interval) * interval - 1
         with clock.iteration():
-            training_step(state, shop, clock)
+            training_step(state, constants, clock)
     seconds = [t["density control"] for t in clock.repeats[1:]]
     per_iteration = float(np.median(seconds)) * 1e3 / interval
     return spread(seconds) | {"per_iteration_ms": per_iteration, "gaussians": state.gaussians.count}

@@ -1,15 +1,19 @@
-"""Time of an iteration by stage: the timer that a benchmark passes to the training step.
+"""Time of an iteration by stage: the timer that a benchmark passes to the training step; and spreads of repeated times.
 
 In: the stages that the training announces (`endotsr.kernels.timer`). Out: seconds by stage, one entry a repeat.
 Stages may nest: a stage is assigned its own time, not that of a stage inside it. While several threads are in stages,
 each stage is assigned an equal part of the time. The remainder (the log entry, additions between stages) is "rest".
-Cost: about 2 us a stage, some twenty stages an iteration.
+Cost: about 2 us a stage, some twenty stages an iteration. On a shared machine a mean would follow the largest
+disturbance, so that repeated times are given as median and quartiles.
 """
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
 
 REST = "rest"
 SPLAT = ("projection", "binning", "blend forward", "blend reverse")
@@ -70,3 +74,20 @@ class StageClock:
         for stage in active:
             self.repeats[-1][stage] += (now - self._since) / len(active)
         self._since = now
+
+
+def spread(seconds: Sequence[float]) -> dict[str, Any]:
+    """{"median_ms", "quartiles_ms": [25 %, 75 %]} of times in seconds."""
+    low, median, high = np.percentile(np.array(seconds) * 1e3, [25, 50, 75])
+    return {"median_ms": float(median), "quartiles_ms": [float(low), float(high)]}
+
+
+def repeated(work: Callable[[], object], repeats: int, warm_up: int = 1) -> list[float]:
+    """Seconds of each of `repeats` calls, after `warm_up` calls that compile, load and touch memory."""
+    seconds = []
+    for repeat in range(-warm_up, repeats):
+        began = time.perf_counter()
+        work()
+        if repeat >= 0:
+            seconds.append(time.perf_counter() - began)
+    return seconds

@@ -10,7 +10,7 @@ set by traffic alone.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from endotsr.config import PAPER, Config
+from endotsr.config import PAPER
 from endotsr.scene.gaussians import DEFORMATION_CHANNELS
 from endotsr.splatting.records import GRADIENT, RECORD  # numbers of a Gaussian, and of a pair's gradients
 
@@ -32,14 +32,14 @@ class Work(NamedTuple):
     bytes: float
 
 
-def work(result: Mapping[str, Any], config: Config = PAPER) -> dict[str, Work]:
+def work(result: Mapping[str, Any]) -> dict[str, Work]:
     """Work of every stage of a measured case (`endotsr.bench.case.measure`); "rest" has none."""
     case, view = result["case"], result["view"]
     n, pixels = case["gaussians"], case["width"] * case["height"]
     size = 8 if case["precision"] == "float64" else 4
     fdm = 3 * DEFORMATION_CHANNELS * case["bases"] * n  # numbers of the three arrays
     spectral = 6 * case["frequencies"] * n  # numbers of A, and of C
-    harmonics = 3 * (config.model.harmonics_degree + 1) ** 2  # coefficients
+    harmonics = 3 * (PAPER.model.harmonics_degree + 1) ** 2  # coefficients
     base = 11 + harmonics  # numbers of a Gaussian beside its time bases and residuals
     seen, listed, blended = view["visible"], view["listed"], view["blended"]
     digits = -(-8 * size // RADIX_BITS)

@@ -10,9 +10,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from endotsr.bench.timing import repeated
+from endotsr.bench.clock import repeated
 from endotsr.kernels.jit import jit
-from endotsr.kernels.threads import parallel_for
+from endotsr.kernels.threads import parallel_for, use_threads
 
 STEPS = 16  # multiply-adds of one chain, each waiting for the one before
 CHAINS = 8  # of one number, independent: enough to hide the latency of an FMA
@@ -92,12 +92,12 @@ def bandwidths(repeats: int = 7, array_bytes: int = ARRAY_BYTES) -> dict[str, fl
 
 def measure_peaks(threads: int) -> dict[str, Any]:
     """{"threads", "flop_per_second" {precision}, "bytes_per_second" {kernel}}: the best of the repeats."""
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    use_threads(threads)
     fma = {precision: fma_peak(precision) for precision in ("float32", "float64")}
     return {"threads": threads, "flop_per_second": fma, "bytes_per_second": bandwidths()}
 
 
-def higher(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+def higher(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
     """The higher of two measurements of each peak."""
     rates = ("flop_per_second", "bytes_per_second")
-    return first | {kind: {name: max(v, second[kind][name]) for name, v in first[kind].items()} for kind in rates}
+    return before | {kind: {name: max(v, after[kind][name]) for name, v in before[kind].items()} for kind in rates}

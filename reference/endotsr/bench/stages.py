@@ -8,8 +8,7 @@ from endotsr.bench.case import BenchCase, apart, measure
 from endotsr.bench.limits import limits
 from endotsr.bench.peaks import higher, measure_peaks
 from endotsr.export.npz import read_arrays
-from endotsr.report.tables import plain
-from endotsr.report.words import memory
+from endotsr.report.tables import memory, plain
 
 Say = Callable[[str], None]
 

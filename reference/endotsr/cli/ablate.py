@@ -12,7 +12,7 @@ from endotsr.config import PRESETS, Preset, with_iterations
 from endotsr.errors import InputError
 
 if TYPE_CHECKING:
-    from endotsr.sweeps.row import AblationRecord
+    from endotsr.sweeps.ablation_page import AblationRecord
     from endotsr.sweeps.sweep import Rows
 
 
@@ -27,8 +27,8 @@ class AblateOptions:
 
     sequences: Annotated[tuple[str, ...], Option("SEQUENCE", positional=True)]
     """sequence folders, or `simulated`"""
-    out: Annotated[Path | None, Option("DIR")] = None
-    """folder of the sweep (required)"""
+    out: Annotated[Path, Option("DIR")]
+    """folder of the sweep"""
     seeds: Annotated[int, Option("N")] = 3
     """number of seeds, from 0"""
     preset: Preset = "paper"
@@ -65,7 +65,7 @@ class AblateOptions:
 
 def run(words: list[str]) -> int:
     """The command."""
-    from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
+    from endotsr.runs.files import refuse_folder, write_json
     from endotsr.sweeps.ablation_page import ablation_markdown, write_ablation
     from endotsr.sweeps.place import Place, check_place
     from endotsr.sweeps.spec import spec_of
@@ -73,15 +73,11 @@ def run(words: list[str]) -> int:
     options = parse(AblateOptions, words, "ablate")
     place = Place(options.workers, options.threads, options.scheduler)
     check_place("ablate", place)
-    refuse_unwritable(options.json)
-    if options.out is None:
-        raise InputError("ablate: --out DIR is missing: the folder of the sweep")
     spec = spec_of(spec_data(options), "ablate", Path.cwd())
     records: list[AblationRecord] = []  # the latest, once there are rows
     command = ["endotsr", "ablate", *map(without_folders, words)]
 
     def on_rows(rows: "Rows") -> None:
-        assert options.out is not None
         records[:] = [write_ablation(options.out, rows, command)]
         if options.json is not None:
             write_json(options.json, records[0])

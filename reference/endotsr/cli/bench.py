@@ -9,7 +9,7 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.runs.files import write_json
 
 LEAST = {"gaussians": 4, "repeats": 1, "width": 16, "height": 16, "threads": 1}
 
@@ -66,7 +66,6 @@ def _refuse(options: BenchOptions) -> None:
         raise InputError(
             "bench: --gaussians is empty, which leaves nothing to time; allowed: one or more, or none with --scenes"
         )
-    refuse_unwritable(options.json)
 
 
 def cases_of(options: BenchOptions) -> list[BenchCase]:

@@ -20,9 +20,9 @@ class CheckOptions:
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)] = ""
     """sequence folder, in the common format or in the layout of EndoNeRF"""
-    json: Annotated[Path | None, Option("FILE.json")] = None
+    json: Annotated[Path | None, Option("FILE.json", written=True)] = None
     """write the findings to this file"""
-    html: Annotated[Path | None, Option("FILE.html")] = None
+    html: Annotated[Path | None, Option("FILE.html", written=True)] = None
     """write a page with the findings and pictures to this file"""
     settings: Annotated[Config, Option(flat=True)] = PAPER
 
@@ -34,11 +34,10 @@ def run(words: list[str]) -> int:
     if not options.sequence:
         raise InputError("check: SEQUENCE is missing: a sequence folder")
     from endotsr.report.check_page import check_page
-    from endotsr.runs.files import refuse_unwritable, write_json
+    from endotsr.runs.files import write_json
     from endotsr.sequences.checks.check import check_sequence
     from endotsr.untrusted.writing import replace_text
 
-    refuse_unwritable(options.json, options.html)
     checked = check_sequence(Path(options.sequence), options.settings)
     for finding in checked.findings:
         print(f"{finding.level}: {finding.code}: {finding.line}")
@@ -54,6 +53,5 @@ def run(words: list[str]) -> int:
         findings = [finding._asdict() for finding in checked.findings]
         write_json(options.json, {"source": checked.source, "findings": findings, "facts": checked.facts})
     if options.html is not None:
-        page = check_page(checked)
-        replace_text(options.html, page)
+        replace_text(options.html, check_page(checked))
     return 1 if checked.refused else 0

@@ -9,7 +9,6 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
 from endotsr.sequences.stereo_depth import StereoSettings
 
 STEREO = StereoSettings()
@@ -57,7 +56,6 @@ class DepthOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(DepthOptions, words, "depth")
-    refuse_unwritable(options.json)
     if not 0 < options.unit_scale < float("inf"):
         raise InputError(f"--unit-scale {options.unit_scale:g} is not allowed; allowed: a number > 0")
     _refuse_contradictions(options)

@@ -7,76 +7,23 @@ from typing import TYPE_CHECKING, Annotated, cast
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile
-from endotsr.cli.parts.shown import SHOWN, ShownSettings, shown_sequence
+from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder, open_run
 from endotsr.untrusted.writing import replace_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from endotsr.evaluation.records import EvaluationRecord, RunEvaluation
-    from endotsr.runs.model import Model
     from endotsr.sequences.sequence import Sequence
-    from endotsr.splatting.render import RenderOut
-
-
-@dataclass
-class EvaluateOptions:
-    """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
-
-    Several METHODs are compared on the same held-out frames: means, and differences to the first one frame by frame.
-    Each is a run folder that was evaluated, a JSON file of --json, or pictures; NAME=PATH gives it another
-    name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
-
-    With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
-    of the run or on --sequence. One picture a held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
-    .npy (float, display units) in a folder, paired by the names of the frames, by their numbers, or in order; or a
-    video of all frames or of the held-out ones. The run, if one is named, is not changed.
-    """
-
-    methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
-    """run folder, or several methods to compare; with --pictures it may be left out"""
-    pictures: Annotated[Path | None, Option("FOLDER|VIDEO")] = None
-    """measure the pictures of this folder or video, not the run"""
-    label: Annotated[str, Option("TEXT")] = ""
-    """name of the method in the tables (default: the name of the folder)"""
-    sequence: Annotated[str | None, Option("SEQUENCE")] = None
-    """sequence folder, or `simulated`; of a run: its current location (default: the recorded one)"""
-    json: JsonFile = None
-    """also write the metrics as JSON"""
-    csv: Annotated[Path | None, Option("FILE")] = None
-    """also write the metrics of every held-out frame as CSV"""
-    lpips: Annotated[Path | None, Option("FILE")] = None
-    """AlexNet LPIPS weights (.npz)"""
-    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
-    """measure more of a run, each with rows to compare: depth, flicker, right_view"""
-    view: bool = True
-    """write the viewer page that the report links to, view.html"""
-    compare: bool = False
-    """compare a single METHOD with its baselines as several are compared"""
-    baselines: bool = True
-    """compare the baselines of the first METHOD too"""
-    seed: int = 0
-    """seed of the resampling of a comparison"""
-    threads: int = 0
-    """threads, 0 = all cores"""
-    settings: Annotated[ShownSettings, Option(flat=True)] = SHOWN
-
-    @property
-    def run(self) -> Path | None:
-        """The one run folder."""
-        return Path(self.methods[0]) if self.methods else None
 
 
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.kernels.threads import use_threads
-    from endotsr.report.spreadsheet import frames_csv
+    from endotsr.report.comparison import frames_csv
 
     options = parse(EvaluateOptions, words, "evaluate")
-    refuse_unwritable(options.json, options.csv)
     use_threads(options.threads)
     if len(options.methods) > 1 or options.compare:
         return _compare(options)
@@ -86,26 +33,18 @@ def run(words: list[str]) -> int:
     if options.json:
         write_json(options.json, metrics)
     if options.csv:
-        text = frames_csv(metrics, metrics.get("label", "this model"))
-        replace_text(options.csv, text)
+        replace_text(options.csv, frames_csv(metrics, metrics.get("label", "this model")))
     return 0
 
 
 def _compare(options: EvaluateOptions) -> int:
     """The table of several methods."""
-    from endotsr.cli.parts.comparison import Comparison, compare_methods
-
     if not options.methods:
         raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
     for name in ("pictures", "label", "measures"):
         if getattr(options, name):
             raise InputError(f"evaluate: --{name} beside several methods is not allowed; allowed: evaluate one first")
-    compare_methods(
-        Comparison(
-            options.methods, options.baselines, options.seed, options.sequence, options.settings, options.lpips,
-            options.json, options.csv,
-        )
-    )  # fmt: skip
+    compare_methods(options)
     return 0
 
 
@@ -165,40 +104,28 @@ def evaluate_run(
 ) -> "RunEvaluation":
     """Measure the latest checkpoint, write the files of an evaluation, and print the table; returns metrics.json.
 
+    view       also write the viewer page that the report links to
     measures   names of `evaluation.measures.MEASURES`
     source     current place of the sequence; default: the recorded one
     """
     from endotsr.evaluation.lpips import load_lpips_weights
     from endotsr.evaluation.measures import check_measures, measure_lines
     from endotsr.evaluation.run import measure_folder
+    from endotsr.export.scene import MovingScene
+    from endotsr.report.run_files import write_evaluation
     from endotsr.report.run_text import held_out_table
     from endotsr.runs.sources import run_source
+    from endotsr.views.page import RUN_PAGE, write_run_page
+    from endotsr.views.preview import preview
 
     check_measures(measures, "--measures")
     weights, source = load_lpips_weights(lpips), source or run_source(folder)[0]
     model, metrics, held_out = measure_folder(folder, sequence, source, weights=weights, measures=measures)
-    _write(folder, model, sequence, metrics, held_out, view)
+    scene = MovingScene(folder.sequence_record(), model, folder)
+    write_run_page(folder.path, scene, sequence if view else None)
+    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")
     print(held_out_table(metrics))
     for line in measure_lines(metrics.get("measures", {})):
         print(line)
     print(f"report: {folder.path / 'report.html'}", flush=True)
     return metrics
-
-
-def _write(
-    folder: RunFolder,
-    model: "Model",
-    sequence: "Sequence",
-    metrics: "RunEvaluation",
-    held_out: "Mapping[int, RenderOut]",
-    view: bool,
-) -> None:
-    """The files of an evaluation: metrics.json, renders, the report, and the viewer page that it links to."""
-    from endotsr.export.scene import MovingScene
-    from endotsr.report.run_files import write_evaluation
-    from endotsr.views.page import RUN_PAGE, write_run_page
-    from endotsr.views.preview import preview
-
-    scene = MovingScene(folder.sequence_record(), model, folder)
-    write_run_page(folder.path, scene, sequence if view else None)
-    write_evaluation(folder, sequence, metrics, held_out, preview(scene), RUN_PAGE if view else "")

@@ -61,11 +61,9 @@ def run(words: list[str]) -> int:
     from endotsr.export.files import GAUSSIANS, Content, export
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
-    from endotsr.runs.files import refuse_unwritable
     from endotsr.windows.scene import open_any, refuse_one_set
 
     options = parse(ExportOptions, words, "export")
-    refuse_unwritable(options.json)
     use_threads(options.threads)
     refuse_one_set(options.scene, options.out)
     times = Times(options.times, options.frames, options.count)

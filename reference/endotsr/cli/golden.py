@@ -9,7 +9,6 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
 
 Outdir = Annotated[Path, Option("OUTDIR", positional=True)]
 Level = Literal[0, 1, 2, 3, 4, 5]
@@ -23,9 +22,9 @@ class _Reported:
     """level to judge; exit code 0 if it is complete"""
     golden: Annotated[Path | None, Option("DIR")] = None
     """folder of the golden cases (default: golden/ of the source tree or of the working folder)"""
-    json: Annotated[Path | None, Option("FILE")] = None
+    json: JsonFile = None
     """also write the report as JSON"""
-    html: Annotated[Path | None, Option("FILE")] = None
+    html: Annotated[Path | None, Option("FILE", written=True)] = None
     """also write the report as one HTML page with difference images"""
     only: Annotated[str, Option("FAMILY[/CASE]")] = ""
     """judge this family or case alone; there is then no claim, and exit code 0 means that nothing was refused"""
@@ -100,7 +99,6 @@ def _judge(words: list[str]) -> int:
     for folder in filter(None, (options.outdir, options.again)):
         if not folder.is_dir():
             raise InputError(f"{folder}: not a folder")
-    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     asked = {"level": options.level, "again": options.again, "only": options.only}
     report = judge(golden, options.outdir, options.precision, **asked)
@@ -114,7 +112,6 @@ def _run(words: list[str]) -> int:
 
     options = parse(RunOptions, words, "golden run")
     refuse_command(options.port)
-    refuse_unwritable(options.json, options.html)
     golden = read_golden(golden_folder(options.golden))
     with tempfile.TemporaryDirectory() as scratch:
         root = options.keep or Path(scratch)
@@ -151,7 +148,6 @@ def _reference(words: list[str]) -> int:
     from endotsr.golden.reference import answer_all, answer_requests
 
     options = parse(ReferenceOptions, words, "golden reference")
-    refuse_unwritable(options.json)
     if options.requests is not None:
         count = answer_requests(options.requests, options.outdir)
     else:

@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Annotated
 
 from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.options import base_settings, with_short_names
+from endotsr.cli.parts.options import base_settings
 from endotsr.cli.parts.parser import parse
+from endotsr.cli.parts.result import JsonFile
 from endotsr.config import PAPER, Config
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable, write_json
+from endotsr.runs.files import write_json
+from endotsr.untrusted.writing import replace_text
 
 
 @dataclass
@@ -22,28 +24,22 @@ class InspectOptions:
 
     sequence: Annotated[str, Option("SEQUENCE", positional=True)]
     """sequence folder, or `simulated`"""
-    out: Annotated[Path | None, Option("report.html")] = None
+    out: Annotated[Path | None, Option("report.html", written=True)] = None
     """write a self-contained page with pictures"""
-    json: Annotated[Path | None, Option("FILE")] = None
+    json: JsonFile = None
     """write verdicts and plan as JSON"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
     """frames a second (default: those of the recording, where known); rates are then also given a minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
-    scale: float | None = None
-    """image scale (= --sequence.scale)"""
-    frames: Annotated[str | None, Option("A:B[:S]")] = None
-    """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, Option("{masks,gt_masks}")] = None
-    """mask folder (= --sequence.masks)"""
-    settings: Annotated[Config, Option(flat=True)] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = PAPER
 
 
 def run(words: list[str]) -> int:
     """The command."""
     from endotsr.effects.inspect import inspect_sequence, inspection_record
     from endotsr.effects.plan import make_plan, plan_record
-    from endotsr.report.inspection import inspection_text, write_inspection
+    from endotsr.report.inspection import inspection_html, inspection_text
     from endotsr.runs.sources import load_sequence
     from endotsr.simulator.settings import SimulatorSettings
 
@@ -51,15 +47,12 @@ def run(words: list[str]) -> int:
     options = parse(InspectOptions, words, "inspect", InspectOptions("", settings=base))
     if not options.sequence:
         raise InputError("inspect: SEQUENCE is missing: a sequence folder, or the word `simulated`")
-    names = ("scale", "frames", "masks")
-    config = with_short_names(options.settings, {name: getattr(options, name) for name in names})
-    refuse_unwritable(options.out, options.json)
-    sequence = load_sequence(options.sequence, config, SimulatorSettings())
+    sequence = load_sequence(options.sequence, options.settings, SimulatorSettings())
     inspection = inspect_sequence(sequence, options.frame_rate)
-    plan = make_plan(inspection, config)
+    plan = make_plan(inspection, options.settings)
     print(inspection_text(inspection, plan))
     if options.out:
-        write_inspection(options.out, Path(options.sequence).name, inspection, plan)
+        replace_text(options.out, inspection_html(Path(options.sequence).name, inspection, plan))
         print(f"report: {options.out}")
     if options.json:
         write_json(options.json, inspection_record(inspection) | {"plan": plan_record(plan)})

@@ -7,7 +7,6 @@ from typing import Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
-from endotsr.runs.files import refuse_unwritable
 
 
 @dataclass
@@ -34,7 +33,6 @@ class MasksOptions:
 def run(words: list[str]) -> int:
     """The command."""
     options = parse(MasksOptions, words, "masks")
-    refuse_unwritable(options.json)
     from endotsr.sequences.files import shortened
     from endotsr.sequences.layouts import open_recording
     from endotsr.sequences.make_masks import OVERLAY, enter_masks, write_proposal

@@ -8,7 +8,6 @@ from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
 
 if TYPE_CHECKING:
     from endotsr.sequences.source_options import SourceOptions
@@ -110,7 +109,6 @@ def run(words: list[str]) -> int:
     if options.crop:
         recording = cropped(recording, options.crop)
     print(f"source: {options.source}, layout {recording.layout}, {recording.count} frames", flush=True)
-    refuse_unwritable(options.json)
     found, notes = prepare(recording, options.out, settings, replace=options.replace)
     if options.also:
         from endotsr.sequences.for_others import describe_for

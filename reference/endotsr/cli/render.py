@@ -62,10 +62,9 @@ def run(words: list[str]) -> int:
     """The command."""
     from endotsr.export.times import Times
     from endotsr.kernels.threads import use_threads
-    from endotsr.runs.files import refuse_unwritable
     from endotsr.runs.sources import refuse_inside_data
     from endotsr.views import pictures
-    from endotsr.views.film import speed_in_words
+    from endotsr.views.film import film_rate, speed_in_words, write_film
     from endotsr.views.plan import ViewRequest
     from endotsr.windows.scene import open_any, shown_frames
 
@@ -73,23 +72,22 @@ def run(words: list[str]) -> int:
     times = Times(options.times, options.frames, options.count)
     request = ViewRequest(times, options.camera, options.offset, options.size, options.angle)
     pictures.check_outputs(options.out, options.film, options.rate, options.slow)
-    refuse_unwritable(options.json)
     use_threads(options.threads)
     scene = open_any(options.scene)
     for path in filter(None, (options.out, options.film)):
         if scene.folder is not None:
             refuse_inside_data(path, scene.folder)
     views = pictures.requested_views(scene, request, "test" if options.out else "all")
-    rate = pictures.rate_of(options.film, scene, views, options.rate, options.slow) if options.film else None
+    shown_at, duration = [view.time for view in views], scene.record.duration
+    rate = (options.rate or film_rate(options.film, shown_at, duration, options.slow)) if options.film else None
     look = pictures.Look(options.depth, options.without, options.panels)
     sequence = shown_frames(scene, options.panels, views, options.sequence) if options.film else None
     made = pictures.rendered(scene, views, look)
 
     def film(shown) -> None:
         if options.film and rate:
-            count = pictures.write_views_film(options.film, shown, look, rate, sequence)
-            speed = speed_in_words([view.time for view in views], scene.record.duration, rate)
-            print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed}")
+            count = write_film(options.film, pictures.film_pictures(shown, look, sequence), rate)
+            print(f"{options.film}: {count} pictures, {count / rate:.1f} s{speed_in_words(shown_at, duration, rate)}")
         else:
             list(shown)
 
@@ -98,5 +96,5 @@ def run(words: list[str]) -> int:
         print(f"{count} pictures in {options.out}: colour/, depth/, opacity/, render.json")
     else:
         film(made)
-    write_result(options.json, folder=options.out, film=options.film, rate=rate, times=[view.time for view in views])
+    write_result(options.json, folder=options.out, film=options.film, rate=rate, times=shown_at)
     return 0

@@ -12,7 +12,7 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import os_error_line, refuse_unwritable
+from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import refuse_existing
 from endotsr.simulator.scenes import SCENES, effects_on, named_scene, scene_of
 from endotsr.simulator.settings import SimulatorSettings
@@ -56,7 +56,6 @@ def run(words: list[str]) -> int:
     base = named_scene(options.scene) if options.scene else STILL
     base = base if options.effects is None else scene_of(options.effects)
     settings = parse(SimulateOptions, words, "simulate", SimulateOptions(settings=base)).settings
-    refuse_unwritable(options.json)
     _write(options, settings, options.scene if options.effects is None else options.effects)
     write_result(
         options.json,

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 from endotsr.cli.parts.fields import Option
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
-from endotsr.errors import InputError
 
 if TYPE_CHECKING:
     from endotsr.sweeps.place import Place
@@ -25,8 +24,8 @@ class SweepOptions:
 
     spec: Annotated[Path, Option("SPEC.toml", positional=True)]
     """the runs"""
-    out: Annotated[Path | None, Option("DIR")] = None
-    """folder of the sweep (required)"""
+    out: Annotated[Path, Option("DIR")]
+    """folder of the sweep"""
     workers: Annotated[int | None, Option("N")] = None
     """runs at a time (default: as many as cores and free memory allow)"""
     threads: Annotated[int | None, Option("N")] = None
@@ -47,8 +46,6 @@ def run(words: list[str]) -> int:
     options = parse(SweepOptions, words, "sweep")
     place = Place(options.workers, options.threads, options.scheduler)
     check_place("sweep", place)
-    if options.out is None:
-        raise InputError("sweep: --out DIR is missing: the folder of the sweep")
     spec = read_spec(options.spec)
     if options.dry_run:
         return _list(spec, options.out)

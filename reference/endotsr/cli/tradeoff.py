@@ -9,10 +9,9 @@ from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import StepBar
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_folder, refuse_unwritable, write_json
+from endotsr.runs.files import refuse_folder, write_json
 
 if TYPE_CHECKING:
-    from endotsr.tradeoff.budget import Advice
     from endotsr.tradeoff.scenes import StudyScene
 
 RESULT = "tradeoff.json"  # in the folder of the measurement
@@ -47,27 +46,19 @@ def run(words: list[str]) -> int:
     """The command."""
     options = parse(TradeoffOptions, words, "tradeoff")
     _refuse(options)
-    budget = None
-    if options.budget is not None:
-        from endotsr.tradeoff.budget import parse_budget
-
-        budget = parse_budget(options.budget)
+    from endotsr.tradeoff.budget import frame_advice, parse_budget
     from endotsr.tradeoff.results import Measurement, read_result
 
+    budget = None if options.budget is None else parse_budget(options.budget)
     file = options.out / RESULT
     if budget is None and file.exists():
         raise InputError(f"{options.out}: holds a measurement already; choose another --out, or read it with --budget")
     result = read_result(file, Measurement) if file.exists() else _measure(options)
     if budget is not None:
-        from endotsr.tradeoff.budget import frame_advice
-
-        _say(options, frame_advice(result, budget))
+        advice = frame_advice(result, budget)
+        print("\n".join(advice.lines))
+        write_result(options.json, budget=options.budget, point=advice.point, lines=advice.lines)
     return 0
-
-
-def _say(options: TradeoffOptions, advice: "Advice") -> None:
-    print("\n".join(advice.lines))
-    write_result(options.json, budget=options.budget, point=advice.point, lines=advice.lines)
 
 
 def _refuse(options: TradeoffOptions) -> None:
@@ -75,7 +66,6 @@ def _refuse(options: TradeoffOptions) -> None:
         raise InputError("tradeoff: give one of --run and --splats")
     if options.json is not None and options.budget is None:
         raise InputError(f"tradeoff: --json holds the answer to --budget; the measurement itself is DIR/{RESULT}")
-    refuse_unwritable(options.json)
     if not 0 < options.scale <= 8:
         raise InputError(f"tradeoff: --scale {options.scale:g} is not allowed; allowed: a number > 0 and <= 8")
 
@@ -103,9 +93,7 @@ def chosen_scene(options: TradeoffOptions) -> "StudyScene":
     from endotsr.tradeoff import scenes
 
     if options.splats is not None:
-        from endotsr.tradeoff.splat_file import SIDE, splat_scene
-
-        return splat_scene(options.splats, max(1, round(SIDE * options.scale)))
+        return scenes.splat_scene(options.splats, max(1, round(scenes.SIDE * options.scale)))
     if options.run is not None:
         return scenes.run_scene(options.run, options.scale)
     with StepBar("simulated scene") as bar:

@@ -11,14 +11,12 @@ from endotsr.cli.parts.options import (
     base_settings,
     differences,
     explicit_settings,
-    with_short_names,
 )
 from endotsr.cli.parts.parser import parse
 from endotsr.cli.parts.progress import Progress
 from endotsr.cli.parts.result import JsonFile, write_result
 from endotsr.config import PAPER, PRESETS, Config, lengthened
 from endotsr.errors import InputError
-from endotsr.runs.files import refuse_unwritable
 from endotsr.runs.folder import RunFolder, open_run, refuse_existing
 from endotsr.runs.records import RunRecord
 from endotsr.windows.record import is_windowed
@@ -26,6 +24,7 @@ from endotsr.windows.record import is_windowed
 if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
+SHORT = ("sequence.scale", "sequence.frames", "sequence.masks", "training.seed", "training.threads")
 RESUMABLE = {"training.threads"}  # settings that may differ in a resumed run because they change no result
 
 
@@ -49,16 +48,6 @@ class TrainOptions:
     """length, points and Gaussians for a training of so many minutes on this machine, from preset `quick` upwards"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
-    scale: float | None = None
-    """image scale (= --sequence.scale)"""
-    frames: Annotated[str | None, Option("A:B[:S]")] = None
-    """frame range (= --sequence.frames)"""
-    masks: Annotated[str | None, Option("{masks,gt_masks,none}")] = None
-    """mask folder (= --sequence.masks)"""
-    seed: int | None = None
-    """seed of every random draw (= --training.seed)"""
-    threads: int | None = None
-    """threads, 0 = all cores (= --training.threads)"""
     effects: Literal["everything", "auto"] = "everything"
     """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
     windows: Annotated[str | None, Option("auto|N")] = None
@@ -82,11 +71,13 @@ class TrainOptions:
     """AlexNet LPIPS weights for the evaluation"""
     json: JsonFile = None
     """also write the metrics of the evaluation, or the calibration, as JSON"""
-    settings: Annotated[Config, Option(flat=True)] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=SHORT)] = PAPER
 
 
 def run(words: list[str]) -> int:
     """The command."""
+    from endotsr.evaluation.lpips import load_lpips_weights
+
     base, schedule_note = base_settings(words)
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base))
     if options.out is None:
@@ -95,13 +86,12 @@ def run(words: list[str]) -> int:
         return _calibrate(options, words)
     if options.json and not options.evaluate:
         raise InputError("train: --json holds the metrics, which --no-evaluate leaves out; allowed: one of them")
-    refuse_unwritable(options.json)
     if options.evaluate:
-        check_lpips(options.lpips)
+        load_lpips_weights(options.lpips)  # weights that cannot be used are refused before the training begins
     if options.windows is not None or (options.resume and is_windowed(options.out)):
         return _train_windows(options, words)
     if options.resume:
-        folder, sequence = _resume(options.out, options.sequence, words)
+        folder, sequence = _resume(options, words)
     else:
         folder, sequence = _train_new(options, words, schedule_note)
     if options.evaluate:
@@ -114,38 +104,43 @@ def run(words: list[str]) -> int:
 
 def _train_windows(options: TrainOptions, words: list[str]) -> int:
     """Train a recording in windows, or what is missing of it, and measure it."""
-    from endotsr.cli.parts.windows import WindowsWanted, evaluate_windows, train_windows
-    from endotsr.sweeps.place import Place
-    from endotsr.windows.make import with_visits
+    from endotsr.cli.parts.windows import evaluate_windows, plan_windows, train_windows
+    from endotsr.sweeps.place import Place, check_place
+    from endotsr.windows.make import recording_settings, with_visits
 
     assert options.out is not None
     if options.effects != "everything":
         raise InputError("train: --effects auto beside --windows is not allowed; allowed: inspect a part, and settings")
+    place = Place(options.workers, options.settings.training.threads or None, options.scheduler)
+    check_place("train", place)
     if options.resume:
-        _refuse_other_settings(options.out, words)
-    place = Place(options.workers, options.threads or None, options.scheduler)
-    named, config = explicit_settings(TrainOptions, words), _settings(options)
-    if options.iterations is None and not named & {"training.iterations", "training.visits_per_frame"}:
-        config = with_visits(config)
-    asked = WindowsWanted(
-        options.sequence, options.out, config, options.windows or "", options.overlap, options.chain, place
-    )
-    code = train_windows(asked, resume=options.resume)
+        _accepted_settings(options.out, words, recording_settings(options.out))
+    else:
+        named, config = explicit_settings(TrainOptions, words), options.settings
+        if options.iterations is None and not named & {"training.iterations", "training.visits_per_frame"}:
+            config = with_visits(config)
+        plan_windows(options.sequence, options.out, config, options.windows or "", options.overlap, options.chain)
+    code = train_windows(options.out, place)
     if options.evaluate and code == 0:
         write_result(options.json, **evaluate_windows(options.out, options.lpips, options.sequence or None))
     return code
 
 
-def _refuse_other_settings(out: Path, words: list[str]) -> None:
-    """Raises InputError for settings that differ from those that the windows were planned with."""
-    from endotsr.windows.make import recording_settings
+def _accepted_settings(out: Path, words: list[str], kept: Config, frames: int | None = None) -> Config:
+    """The settings `kept` of a run as the words ask for them, with which it is resumed.
 
-    kept = recording_settings(out)
+    frames   training frames of the run, which may be extended; None: it may not
+    Raises:  InputError for settings that differ and would change a result.
+    """
     options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
-    asked = asked_settings(TrainOptions, words, _settings(options), kept)
-    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in RESUMABLE]
+    wanted = options.settings if frames is None else lengthened(options.settings, frames)
+    asked = asked_settings(TrainOptions, words, wanted, kept)
+    extended = frames is not None and asked.training.iterations > kept.training.iterations
+    allowed = RESUMABLE | ({"training.iterations"} if extended else set())
+    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in allowed]
     if refused:
         raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
+    return asked
 
 
 def _calibrate(options: TrainOptions, words: list[str]) -> int:
@@ -157,22 +152,9 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
         if getattr(options, name):
             raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
     folder = open_run(options.out)
-    config = _settings(parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())))
-    refuse_unwritable(options.json)
+    config = parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())).settings
     calibrate_run(folder, config, options.sequence or None, options.json)
     return 0
-
-
-def check_lpips(path: Path | None) -> None:
-    """Raises InputError for LPIPS weights that cannot be used, before the training begins."""
-    from endotsr.evaluation.lpips import load_lpips_weights
-
-    load_lpips_weights(path)
-
-
-def _settings(options: TrainOptions) -> Config:
-    names = ("scale", "frames", "masks", "seed", "threads")
-    return with_short_names(options.settings, {name: getattr(options, name) for name in names})
 
 
 def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> tuple[RunFolder, "Sequence"]:
@@ -180,8 +162,8 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     from endotsr.effects.auto import planned_settings
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.files import refuse_inside
-    from endotsr.runs.sources import SIMULATED, load_sequence
-    from endotsr.runs.training import start_record, train_new_run
+    from endotsr.runs.sources import SIMULATED, load_sequence, start_record
+    from endotsr.runs.training import train_new_run
     from endotsr.simulator.recorded import recorded_positions
     from endotsr.simulator.settings import SimulatorSettings
 
@@ -190,7 +172,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     assert options.out is not None
     if options.minutes is not None and (options.iterations is not None or not 0 < options.minutes < math.inf):
         raise InputError(f"train: --minutes {options.minutes:g}: allowed: a number > 0, without --iterations")
-    config, source = _settings(options), options.sequence
+    config, source = options.settings, options.sequence
     refuse_existing(options.out)
     if source != SIMULATED:
         refuse_inside(options.out, Path(source), "the sequence")
@@ -231,30 +213,24 @@ def _of_minutes(options: TrainOptions, sequence: "Sequence", config: Config) -> 
     )
 
 
-def _resume(out: Path, source: str, words: list[str]) -> tuple[RunFolder, "Sequence"]:
+def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequence"]:
     """Refuse settings that would change the run, and train it from its last checkpoint to the end."""
     from endotsr.kernels.threads import use_threads
     from endotsr.runs.sources import check_same_input, load_sequence, run_source
     from endotsr.runs.training import extend_run, resume_run
 
-    folder = open_run(out)
+    assert options.out is not None
+    folder = open_run(options.out)
     kept = folder.config()
     remembered, simulator = run_source(folder)
-    options = parse(TrainOptions, words, "train", TrainOptions(settings=base_settings(words)[0]))
-    frames = len(folder.sequence_record().train_index)
-    asked = asked_settings(TrainOptions, words, lengthened(_settings(options), frames), kept)
-    extended = asked.training.iterations > kept.training.iterations
-    allowed = RESUMABLE | ({"training.iterations"} if extended else set())
     if options.minutes is not None:
-        raise InputError(f"{out}: --minutes beside --resume is not allowed: the length of a run is fixed")
-    refused = [line for line in differences(asked, kept, "run") if line.split(" = ")[0] not in allowed]
-    if refused:
-        raise InputError(f"{out}: a resumed run keeps the settings of its config.toml; requested: {', '.join(refused)}")
-    source = source or remembered
+        raise InputError(f"{options.out}: --minutes beside --resume is not allowed: the length of a run is fixed")
+    asked = _accepted_settings(options.out, words, kept, len(folder.sequence_record().train_index))
+    source = options.sequence or remembered
     sequence = load_sequence(source, kept, simulator)
     check_same_input(folder, sequence, source)
     threads = use_threads(asked.training.threads)
-    if extended:
+    if asked.training.iterations > kept.training.iterations:
         print(f"extended from {kept.training.iterations} to {asked.training.iterations} iterations")
         extend_run(folder, asked.training.iterations)
     resume_run(folder, sequence, threads, _progress(folder, sequence, folder.config()))

@@ -65,18 +65,12 @@ def unit_image(sequence: Sequence, index: int) -> FloatArray:
     return sequence.images[index].astype(np.float32) / np.float32(255)
 
 
-def temporal_mean(sequence: Sequence, index: int) -> FloatArray:
+def temporal_mean(sequence: Sequence) -> FloatArray:
     """Mean of the training frames, each pixel over the frames in which it is tissue; 0 where it never is.
 
-    index     ignored: the prediction is one image for all frames (the frame itself is not excluded)
-    returns   (3, H, W) float32, display units [0, 1]
+    returns   (3, H, W) float32, display units [0, 1]: one prediction for all frames, each of them included in its own.
+              Sums are exact integers, so the order of the frames has no effect
     """
-    del index
-    return temporal_mean_image(sequence)
-
-
-def temporal_mean_image(sequence: Sequence) -> FloatArray:
-    """The single image of `temporal_mean`. Sums are exact integers, so the order of the frames has no effect."""
     total = np.zeros(sequence.images.shape[1:], np.int64)
     seen = np.zeros(sequence.images.shape[2:], np.int64)
     for i in sequence.train_index:
@@ -123,7 +117,7 @@ def _blend(before: FloatArray, after: FloatArray, fraction: float) -> FloatArray
 
 
 def _temporal_mean_once(sequence: Sequence) -> RenderFrame:
-    image = temporal_mean_image(sequence)
+    image = temporal_mean(sequence)
     return lambda index: image
 
 

@@ -41,7 +41,7 @@ def held_out_depth(sequence: Sequence, render: Callable[[int, Camera], RenderOut
     makers = {
         "this model": lambda i: normalised_depth(render(i, sequence.cameras[i]), LEAST_OPACITY),
         "blend of the neighbouring priors": lambda i: blended_prior(sequence, i),
-        "prior of the nearest training frame": lambda i: nearest_prior(sequence, i),
+        "prior of the nearest training frame": lambda i: sequence.depth[neighbours(sequence, i).nearest],
     }
     columns: dict[str, list[FloatArray]] = {label: [] for label in makers}
     truths, covered = [], dict.fromkeys(makers, 0)
@@ -82,8 +82,3 @@ def blended_prior(sequence: Sequence, index: int) -> FloatArray:
     both = (before > 0) & (after > 0)
     blend = before + np.float32(near.fraction) * (after - before)
     return np.where(both, blend, np.maximum(before, after))
-
-
-def nearest_prior(sequence: Sequence, index: int) -> FloatArray:
-    """The prior of the training frame nearest in time. (H, W) scene units, 0 = none."""
-    return sequence.depth[neighbours(sequence, index).nearest]

@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 from endotsr.evaluation.baselines import BASELINES, unit_image
 from endotsr.evaluation.lpips import InputRange, LpipsWeights, lpips, lpips_obstacle
 from endotsr.evaluation.metrics import image_metrics, mean_metrics
-from endotsr.evaluation.records import EvaluationRecord, FrameMetrics, FramesMeasured, LabelledFrames, Means
+from endotsr.evaluation.records import (
+    EvaluationRecord,
+    FrameMetrics,
+    FramesMeasured,
+    FramesPart,
+    LabelledFrames,
+    Means,
+)
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 
@@ -63,28 +70,16 @@ def measured_rows(rows: list[FrameMetrics], not_finite: int) -> FramesMeasured:
     }  # fmt: skip
 
 
-def labelled(label: str, measured: FramesMeasured) -> LabelledFrames:
-    """The same with a label."""
-    return {"label": label, **measured}
-
-
 def left_out(evaluation: EvaluationRecord) -> list[str]:
     """Names of the held-out frames without a tissue PSNR, which the means leave out: frames without tissue."""
     rows = (evaluation.get("held_out") or {}).get("per_frame") or []
     return [row["name"] for row in rows if "psnr_tissue" in row and row["psnr_tissue"] is None]
 
 
-def baseline_table(
-    sequence: Sequence, lpips_weights: LpipsWeights | None = None, indices: Iterable[int] | None = None
-) -> dict[str, LabelledFrames]:
-    """The four predictions without a model, measured like a model.
-
-    indices   frames to predict; default: all held-out frames
-    returns   baseline key -> {"label", "mean", "per_frame", "excluded", "not_finite"}, in the order of BASELINES
-    """
-    wanted = [int(i) for i in (sequence.test_index if indices is None else indices)]
+def baseline_table(sequence: Sequence, lpips_weights: LpipsWeights | None = None) -> dict[str, LabelledFrames]:
+    """The four predictions of the held-out frames without a model, by key in the order of BASELINES."""
     return {
-        name: labelled(label, evaluate_frames(sequence, wanted, make(sequence), lpips_weights))
+        name: {"label": label, **evaluate_frames(sequence, sequence.test_index, make(sequence), lpips_weights)}
         for name, (label, make) in BASELINES.items()
     }
 
@@ -111,22 +106,34 @@ def evaluate_model(
     chosen = training_sample(sequence) if training is None else [int(i) for i in training]
     held_out = evaluate_frames(sequence, sequence.test_index, render_frame, lpips_weights)
     inside = evaluate_frames(sequence, chosen, render_frame)
-    baselines = baseline_table(sequence, lpips_weights)
+    frames: FramesPart = {
+        "total": len(sequence.images),
+        "training": len(sequence.train_index),
+        "held_out": [int(i) for i in sequence.test_index],
+        "training_sample": chosen,
+        "tissue_fraction": float(np.mean(sequence.masks)),
+    }
+    obstacle = lpips_obstacle(lpips_weights, *sequence.images.shape[2:])
+    return evaluation_record(frames, held_out, inside, baseline_table(sequence, lpips_weights), obstacle)
+
+
+def evaluation_record(
+    frames: FramesPart,
+    held_out: FramesMeasured,
+    training: FramesMeasured,
+    baselines: dict[str, LabelledFrames],
+    lpips_reason: str | None,
+) -> EvaluationRecord:
+    """The content of metrics.json from what was measured; see `evaluate_model`."""
     return {
         "format": FORMAT,
-        "frames": {
-            "total": len(sequence.images),
-            "training": len(sequence.train_index),
-            "held_out": [int(i) for i in sequence.test_index],
-            "training_sample": chosen,
-            "tissue_fraction": float(np.mean(sequence.masks)),
-        },
+        "frames": frames,
         "held_out": held_out,
-        "training": inside,
-        "temporal_gap": difference(inside["mean"], held_out["mean"]),
+        "training": training,
+        "temporal_gap": difference(training["mean"], held_out["mean"]),
         "baselines": baselines,
-        "lpips_reason": lpips_obstacle(lpips_weights, *sequence.images.shape[2:]),
-        "not_finite": held_out["not_finite"] + inside["not_finite"] + sum(b["not_finite"] for b in baselines.values()),
+        "lpips_reason": lpips_reason,
+        "not_finite": sum(part["not_finite"] for part in (held_out, training, *baselines.values())),
     }
 
 

@@ -29,7 +29,6 @@ KERNELS = (11, 5, 3, 3, 3)
 STRIDES = (4, 1, 1, 1, 1)
 PADDINGS = (2, 2, 1, 1, 1)
 POOL_BEFORE = (False, True, True, False, False)  # 3 x 3 maximum, stride 2
-POOL, POOL_STRIDE = 3, 2
 TINY = 1e-10  # added to the channel norm
 LARGEST_FILE = 1 << 28  # bytes of the weights; those of AlexNet have 10 MB
 SMALLEST_SIDE = 31  # pixels of an image side that leave one feature in the fifth map
@@ -138,14 +137,8 @@ def _convolve(image: FloatArray, kernel: FloatArray, stride: int, padding: int) 
 
 
 def _pool(image: FloatArray) -> FloatArray:
-    """The largest of 3 x 3 neighbours at every second pixel, as nine shifted views."""
-    rows, columns = ((size - POOL) // POOL_STRIDE + 1 for size in image.shape[1:])
-    views = [
-        image[:, y : y + POOL_STRIDE * rows : POOL_STRIDE, x : x + POOL_STRIDE * columns : POOL_STRIDE]
-        for y in range(POOL)
-        for x in range(POOL)
-    ]
-    return np.maximum.reduce(views)
+    """The largest of 3 x 3 neighbours at every second pixel."""
+    return np.lib.stride_tricks.sliding_window_view(image, (3, 3), axis=(1, 2))[:, ::2, ::2].max(axis=(3, 4))
 
 
 def _unit_length(features: FloatArray) -> FloatArray:

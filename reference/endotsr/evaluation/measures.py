@@ -6,20 +6,36 @@ right_view   the view of a right camera against the real right picture, beside t
 
 In: a model, its sequence, and the source of the sequence. Out: plain values for metrics.json, under the name of the
 measurement. One that the sequence does not allow is {"reason": ...}.
+
+Flicker at a pixel is the second difference of its colour over three successive frames,
+
+    d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6),
+
+whose standard deviation is that of the noise if the noise of the frames is independent; a steady change of light gives
+no second difference. A pixel rests if it is tissue in every frame and its optical flow between successive frames stays
+small. The recorded frames flicker by their camera noise; a model that shows more than they do flickers by itself.
 """
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
+
 from endotsr.errors import InputError
+from endotsr.evaluation.baselines import unit_image
 from endotsr.evaluation.depth import held_out_depth
-from endotsr.evaluation.flicker import flicker
 from endotsr.evaluation.right_view import right_view
 from endotsr.fitting.model import render_at, with_corrected_cameras
+from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.runs.model import Model
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
+
+RESTING = 0.5  # px between successive frames: the largest median flow of a resting pixel
+RESTING_HIGH = 1.0  # px: the largest 90th percentile
+LEAST_PIXELS = 100  # resting pixels below which nothing is reported
+LEVELS = 255.0  # results are in grey levels of an 8-bit picture
 
 RenderView = Callable[[int, Camera], RenderOut]  # frame, whose time it is, and camera
 
@@ -65,3 +81,42 @@ def measure_lines(found: dict[str, dict[str, Any]]) -> list[str]:
             values = ", ".join(f"{key} {value:.4g}" for key, value in row.items() if isinstance(value, float))
             lines.append(f"{name}: {row['label']}: {values}")
     return lines
+
+
+def flicker(sequence: Sequence, render: RenderView) -> dict[str, Any]:
+    """Root mean square of d over the resting pixels, all inner frames, and the held-out frames alone; grey levels.
+
+    render   frame number and camera -> render; every frame is rendered once
+    returns  {"pixels", "rows": [{"label", "all_frames", "held_out"}]}: the model, and the recorded frames. `held_out`
+             has d(t) at held-out t only: it is large if the model jumps between training and held-out times
+    """
+    if not sequence.static_camera:
+        return {"reason": "the camera moves, so that no pixel shows the same tissue in all frames"}
+    resting = resting_pixels(sequence)
+    if np.count_nonzero(resting) < LEAST_PIXELS:
+        return {"reason": f"{np.count_nonzero(resting)} pixels rest; needed: {LEAST_PIXELS}"}
+
+    def rendered(index: int) -> FloatArray:
+        return np.clip(render(index, sequence.cameras[index]).colour, 0, 1)
+
+    frames = {"this model": rendered, "the recorded frames": lambda index: unit_image(sequence, index)}
+    rows = [_row(label, sequence, resting, frame) for label, frame in frames.items()]
+    return {"pixels": int(np.count_nonzero(resting)), "rows": rows}
+
+
+def _row(label: str, sequence: Sequence, resting: BoolArray, frame: Callable[[int], FloatArray]) -> dict[str, Any]:
+    values = np.stack([frame(i)[:, resting].astype(np.float64) for i in range(sequence.count)])
+    squares = np.square(values[:-2] - 2 * values[1:-1] + values[2:]).mean(axis=(1, 2)) / 6  # of frames 1 .. n - 2
+    held_out = [int(i) - 1 for i in sequence.test_index if 0 < i < sequence.count - 1]
+    inside = float(np.sqrt(squares[held_out].mean()) * LEVELS) if held_out else None
+    return {"label": label, "all_frames": float(np.sqrt(squares.mean()) * LEVELS), "held_out": inside}
+
+
+def resting_pixels(sequence: Sequence) -> BoolArray:
+    """(H, W) bool: tissue in every frame, with small optical flow between successive recorded frames."""
+    from endotsr.opencv import dense_flow
+
+    flows = [dense_flow(sequence.images[i], sequence.images[i + 1]) for i in range(sequence.count - 1)]
+    lengths = np.stack([np.hypot(*flow) for flow in flows])
+    middle, high = np.quantile(lengths, (0.5, 0.9), axis=0)
+    return sequence.masks.all(axis=0) & (middle <= RESTING) & (high <= RESTING_HIGH)

@@ -55,8 +55,8 @@ def right_view(
     folder = Path(source) / FOLDER
     if not folder.is_dir():
         return {"reason": f"there is no {FOLDER}/ beside the left pictures"}
-    rights = _RightPictures(folder, sequence, settings)
-    found = stereo_baseline(sequence, rights.read)
+    right = _right_pictures(folder, sequence, settings)
+    found = stereo_baseline(sequence, right)
     if found is None:
         return {"reason": "left and right pictures have too few common pixels with depth"}
     baseline, spread = found
@@ -64,17 +64,12 @@ def right_view(
         return {"reason": f"disparity and depth do not give one baseline ({baseline:.3g}, spread {spread:.0%})"}
     rows: dict[str, dict[str, Any]] = {}
     for part, frames in (("held_out", sequence.test_index), ("training", training_sample(sequence))):
-        values = [_frame(sequence, int(i), baseline, rights.read(int(i)), render) for i in frames]
+        values = [_frame(sequence, int(i), baseline, right(int(i)), render) for i in frames]
         for label in values[0] if values else ():
             psnr, ssim = np.array([value[label] for value in values]).T
             row = rows.setdefault(label, {"label": label})
             row |= {f"{part}_psnr": _mean(psnr), f"{part}_ssim": _mean(ssim)}
     return {"baseline": baseline, "spread": spread, "unit": sequence.unit, "rows": list(rows.values())}
-
-
-def right_camera(camera: Camera, baseline: float) -> Camera:
-    """The camera moved by the baseline along its own x axis."""
-    return camera._replace(translation=camera.translation - np.array([baseline, 0.0, 0.0]))
 
 
 def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]]) -> tuple[float, float] | None:
@@ -134,9 +129,10 @@ def _frame(
 ) -> dict[str, tuple[float, float]]:
     """PSNR and SSIM of every row on one frame."""
     truth = right.astype(np.float32) / np.float32(255)
-    moved = moved_left(sequence, index, baseline)
+    moved, left = moved_left(sequence, index, baseline), sequence.cameras[index]
+    camera = left._replace(translation=left.translation - np.array([baseline, 0.0, 0.0]))  # along its own x axis
     pictures = {
-        "this model": np.clip(render(index, right_camera(sequence.cameras[index], baseline)).colour, 0, 1),
+        "this model": np.clip(render(index, camera).colour, 0, 1),
         "left picture moved by the prior depth": moved.picture,
         "left picture as it is": unit_image(sequence, index),
     }
@@ -146,31 +142,27 @@ def _frame(
     }
 
 
-class _RightPictures:
-    """The right pictures of the frames of a sequence, in its size."""
+def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) -> Callable[[int], NDArray[np.uint8]]:
+    """Frame number -> right picture (3, H, W) in the size of the sequence; InputError if it is unreadable or smaller."""
+    from endotsr.opencv import area_resize
+    from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+    from endotsr.sequences.files import list_pictures
+    from endotsr.sequences.recording import colour_picture
+    from endotsr.sequences.splits import parse_frame_range
 
-    def __init__(self, folder: Path, sequence: Sequence, settings: SequenceConfig) -> None:
-        from endotsr.opencv.pictures import PICTURE_ENDINGS
-        from endotsr.sequences.files import list_pictures
-        from endotsr.sequences.splits import parse_frame_range
+    files, width, height = list_pictures(folder, PICTURE_ENDINGS), sequence.width, sequence.height
+    files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
+    if len(files) != sequence.count:
+        raise InputError(f"{folder}: {len(files)} pictures for {sequence.count} frames; allowed: one a frame")
 
-        files = list_pictures(folder, PICTURE_ENDINGS)
-        self._files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
-        self._size = sequence.width, sequence.height
-        if len(self._files) != sequence.count:
-            raise InputError(f"{folder}: {len(self._files)} pictures for {sequence.count} frames; allowed: one a frame")
-
-    def read(self, index: int) -> NDArray[np.uint8]:
-        """(3, H, W) RGB. Raises InputError for a picture that cannot be read or is too small."""
-        from endotsr.opencv import area_resize
-        from endotsr.opencv.pictures import read_picture
-        from endotsr.sequences.recording import colour_picture
-
-        file, (width, height) = self._files[index], self._size
+    def right(index: int) -> NDArray[np.uint8]:
+        file = files[index]
         pixels = colour_picture(read_picture(file), file)
         if pixels.shape[0] < height or pixels.shape[1] < width:
             raise InputError(f"{file}: {pixels.shape[1]}x{pixels.shape[0]} pixels; allowed: at least {width}x{height}")
         return np.ascontiguousarray(area_resize(pixels, width, height).transpose(2, 0, 1))
+
+    return right
 
 
 def _mean(values: NDArray[np.float64]) -> float | None:

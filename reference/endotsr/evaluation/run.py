@@ -1,27 +1,28 @@
 """The evaluation of a trained run: its renders against every frame, beside the baselines, as metrics.json.
 
 In: a model, the sequence that it was trained on, and run.json. Out: the dictionary of metrics.json (metrics of the
-frames, components taken out, what the numbers belong to) and the renders of the held-out frames.
-Writes nothing.
+frames, components taken out, how far the cameras were moved, what the numbers belong to) and the renders of the
+held-out frames. Writes nothing.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from typing import cast
 
 import msgspec
+import numpy as np
 
 from endotsr.evaluation.baselines import neighbours
-from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model, labelled
+from endotsr.evaluation.evaluate import evaluate_frames, evaluate_model
 from endotsr.evaluation.lpips import LpipsWeights
 from endotsr.evaluation.measures import measured
-from endotsr.evaluation.poses import pose_change
 from endotsr.evaluation.records import (
     EvaluationRecord,
     LabelledFrames,
     LabelledMeans,
     Means,
     MotionPart,
+    PosePart,
     RunEvaluation,
     RunPart,
 )
@@ -33,6 +34,7 @@ from endotsr.runs.model import Model, load_model
 from endotsr.runs.records import REPORTED, RunRecord
 from endotsr.runs.sources import run_source, true_positions_of
 from endotsr.sequences.sequence import Sequence
+from endotsr.splatting.camera import Camera, backproject, camera_centre, degrees_between, project
 from endotsr.splatting.render import RenderOut
 
 COMPONENTS = {"appearance": "A, colour residual", "spectral_motion": "S, translation residual"}
@@ -40,48 +42,9 @@ CROSS_FADE = "Blend of this model's own renders at the two neighbouring training
 KEPT = ("seed", "threads", "started", "finished", "seconds", "peak_memory_bytes", "lambda_lap", "versions", "machine")
 
 RENDERS_KEPT = 32  # of the held-out frames: a clip with more of them has others rendered again, and no more memory
+POINTS = 8  # along each side of the picture: where the motion of a camera is seen
 
-Render = Callable[..., RenderOut]
-
-
-class Renders(Mapping[int, RenderOut]):
-    """The renders of frames by number, made when they are asked for; the last `RENDERS_KEPT` are kept."""
-
-    def __init__(self, render: Callable[[int], RenderOut], frames: tuple[int, ...]) -> None:
-        self._frames, self._render = frames, lru_cache(RENDERS_KEPT)(render)
-
-    def __getitem__(self, index: int) -> RenderOut:
-        if index not in self:
-            raise KeyError(index)
-        return self._render(index)
-
-    def __contains__(self, index: object) -> bool:
-        return index in self._frames  # without a render
-
-    def __iter__(self) -> Iterator[int]:
-        return iter(self._frames)
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-
-def measure_run(
-    model: Model,
-    sequence: Sequence,
-    record: RunRecord,
-    weights: LpipsWeights | None = None,
-    true_positions: TruePositions | None = None,
-) -> tuple[RunEvaluation, Mapping[int, RenderOut]]:
-    """metrics.json of a run, and the renders of the held-out frames by frame number.
-
-    record          run.json of the run
-    weights         None: the LPIPS values are None
-    true_positions  of a simulated sequence: the motion is measured too
-    """
-    found, held_out = measure_model(model, sequence, weights, true_positions)
-    metrics = cast(RunEvaluation, found)
-    metrics["run"] = about_run(record, model)
-    return metrics, held_out
+RenderFrame = Callable[[int], RenderOut]  # of a frame number
 
 
 def measure_folder(
@@ -91,15 +54,16 @@ def measure_folder(
     *,
     weights: LpipsWeights | None = None,
     measures: tuple[str, ...] = (),
-) -> tuple[Model, RunEvaluation, Mapping[int, RenderOut]]:
-    """The model of the latest checkpoint of a run, and what `measure_run` returns for it.
+) -> tuple[Model, RunEvaluation, RenderFrame]:
+    """The model of the latest checkpoint of a run, its metrics.json, and the renders of `measure_model`.
 
-    source    where the sequence is now
+    source    where the sequence is now; where it is simulated, the motion is measured too
     measures  names of `evaluation.measures.MEASURES`: their results are `measures` in metrics.json
     """
-    model, (_, simulator) = load_model(folder), run_source(folder)
+    model, (_, simulator), record = load_model(folder), run_source(folder), folder.record(*REPORTED)
     truth = true_positions_of(source, simulator, folder.config(), sequence)
-    metrics, held_out = measure_run(model, sequence, folder.record(*REPORTED), weights, truth)
+    found, held_out = measure_model(model, sequence, weights, truth)
+    metrics: RunEvaluation = {**found, "run": about_run(record, model)}
     if measures:
         metrics["measures"] = measured(measures, model, sequence, source)
     return model, metrics, held_out
@@ -110,15 +74,16 @@ def measure_model(
     sequence: Sequence,
     weights: LpipsWeights | None = None,
     true_positions: TruePositions | None = None,
-) -> tuple[EvaluationRecord, Mapping[int, RenderOut]]:
-    """The part of metrics.json that needs no run folder, and the renders of the held-out frames.
+) -> tuple[EvaluationRecord, RenderFrame]:
+    """The part of metrics.json that needs no run folder, and the render of a held-out frame, of which the last are kept.
 
-    returns  the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at the
-             neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`, or None;
-             `pose_correction`, that of `pose_change`;
-             `components`, the means with one residual left out
+    weights         None: the LPIPS values are None
+    true_positions  of a simulated sequence: the motion is measured too
+    returns         the keys of `evaluate_model`; `cross_fade`, the metrics of the blend of the model's own renders at
+                    the neighbouring training times; `trajectories`, the fields of `TrajectoryError` and their `unit`,
+                    or None; `pose_correction`, that of `pose_change`; `components`, the means with one residual left
+                    out
     """
-
     given, sequence = sequence, with_corrected_cameras(sequence, model.frames)
 
     def render(index: int, taken_out: str = "") -> RenderOut:
@@ -127,9 +92,9 @@ def measure_model(
         return render_at(shown, model.spectral, model.config, camera, time, frames=model.frames)
 
     def colour(index: int) -> FloatArray:
-        return (held_out[index] if index in held_out else render(index)).colour
+        return (held_out if index in sequence.test_index else render)(index).colour
 
-    held_out = Renders(render, tuple(int(i) for i in sequence.test_index))
+    held_out: RenderFrame = lru_cache(RENDERS_KEPT)(render)
     metrics = evaluate_model(sequence, colour, weights)
     metrics["cross_fade"] = _cross_fade(sequence, colour, weights)
     motion = None if true_positions is None else trajectory_error(model, sequence, true_positions)
@@ -152,10 +117,12 @@ def _cross_fade(
         before, after = render(near.before), render(near.after)
         return before + before.dtype.type(near.fraction) * (after - before)
 
-    return labelled(CROSS_FADE, evaluate_frames(sequence, sequence.test_index, blend, weights))
+    return {"label": CROSS_FADE, **evaluate_frames(sequence, sequence.test_index, blend, weights)}
 
 
-def _components(model: Model, sequence: Sequence, render: Render, full: Means) -> list[LabelledMeans]:
+def _components(
+    model: Model, sequence: Sequence, render: Callable[[int, str], RenderOut], full: Means
+) -> list[LabelledMeans]:
     """Held-out means with one spectral component taken out of the trained model, for those it has."""
     rows = [cast(LabelledMeans, {"label": "the whole model", **full})]
     arrays = {
@@ -167,6 +134,32 @@ def _components(model: Model, sequence: Sequence, render: Render, full: Means) -
             partial = evaluate_frames(sequence, sequence.test_index, lambda i, n=name: render(i, n).colour)
             rows.append(cast(LabelledMeans, {"label": f"rendered without {label}", **partial["mean"]}))
     return rows
+
+
+def pose_change(given: Sequence, seen: Sequence) -> PosePart | None:
+    """How far the training moved the cameras (B16): means over the training frames; None if both are one sequence.
+
+    given, seen  the sequence with its given poses, and with those that the model sees it by. A common motion of all
+                 cameras counts too, although it changes no picture
+    returns      `degrees` between the rotations, `scene_units` between the optical centres, `pixels` between the places
+                 of points at the median depth of the tissue, and the `unit` of the scene
+    """
+    if seen is given:
+        return None
+    rows = [_camera_change(given, int(i), seen.cameras[i]) for i in given.train_index]
+    means = dict(zip(("degrees", "scene_units", "pixels"), np.mean(rows, axis=0).tolist(), strict=True))
+    return cast(PosePart, means | {"unit": given.unit})
+
+
+def _camera_change(sequence: Sequence, index: int, seen: Camera) -> tuple[float, float, float]:
+    """Angle in degrees, distance in scene units, and mean displacement in pixels of one frame."""
+    camera, depth = sequence.cameras[index], sequence.tissue_depth(index) or 1.0
+    moved = float(np.linalg.norm(camera_centre(seen) - camera_centre(camera)))
+    ends = (np.linspace(0, size - 1, POINTS) for size in (camera.height, camera.width))
+    row, column = (a.ravel() for a in np.meshgrid(*ends, indexing="ij"))
+    points = backproject(camera, column, row, np.full(row.size, depth))
+    apart = np.subtract(project(seen, points)[:2], project(camera, points)[:2])
+    return degrees_between(seen.rotation, camera.rotation), moved, float(np.hypot(*apart).mean())
 
 
 def about_run(record: RunRecord, model: Model) -> RunPart:

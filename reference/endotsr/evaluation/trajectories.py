@@ -70,12 +70,17 @@ def trajectory_error(
     references      frames; default: every sixth training frame
     """
     chosen = training_sample(sequence) if references is None else [int(i) for i in references]
-    moved = [_scene(model, sequence, frame).position for frame in range(sequence.count)]
+
+    def scene_of(frame: int) -> Scene:
+        return scene_at(model.gaussians, model.spectral, model.config.model, float(sequence.times[frame]))[0]
+
+    scenes = {reference: scene_of(reference) for reference in chosen}
+    moved = [(scenes.get(frame) or scene_of(frame)).position for frame in range(sequence.count)]
     total, pixels = np.zeros(4), 0
     for reference in chosen:
         positions = true_positions(reference, reference)
         tissue = sequence.masks[reference] & np.isfinite(positions).all(axis=0)  # a wound has no material point
-        scene, start, camera = _scene(model, sequence, reference), positions[:, tissue], sequence.cameras[reference]
+        scene, start, camera = scenes[reference], positions[:, tissue], sequence.cameras[reference]
         for frame in range(sequence.count):
             if frame != reference:  # sums, since the lengths of all pairs of a long clip do not fit in memory
                 moves = displacement(scene, scene._replace(position=moved[frame]), camera, model)[:, tissue]
@@ -83,10 +88,6 @@ def trajectory_error(
                 total += _lengths(sequence.cameras[frame], start, moves, truth).sum(axis=1)
                 pixels += start.shape[1]
     return TrajectoryError(*(float(value) for value in total / pixels)) if pixels else None
-
-
-def _scene(model: Model, sequence: Sequence, frame: int) -> Scene:
-    return scene_at(model.gaussians, model.spectral, model.config.model, float(sequence.times[frame]))[0]
 
 
 def _lengths(camera: Camera, start: FloatArray, moves: FloatArray, truth: FloatArray) -> FloatArray:

@@ -58,7 +58,7 @@ def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
     }
     entries = {f"gaussians.{name}": a for name, a in arrays(model.gaussians).items()}
     entries |= {f"frames.{name}": a for name, a in trained(exposures).items()}
-    stored = {name: a.astype(np.float32) if name in KEPT_WHOLE else _half(a) for name, a in entries.items()}
+    stored = {name: a.astype(np.float32) if name in KEPT_WHOLE else np.clip(a, HALF.min, HALF.max).astype(np.float16) for name, a in entries.items()}
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
 
     def write(temporary: Path) -> None:
@@ -66,10 +66,6 @@ def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
             np.savez_compressed(file, allow_pickle=False, **{HEADER: text}, **stored)
 
     replace_file(path, write)
-
-
-def _half(array: NDArray) -> NDArray[np.float16]:
-    return np.clip(array, HALF.min, HALF.max).astype(np.float16)
 
 
 def load_slim_model(path: Path) -> SlimModel:

@@ -8,10 +8,9 @@ from functools import cached_property
 from numbers import Integral
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from endotsr.config import PAPER, ModelConfig
+from endotsr.config import PAPER, ModelConfig, with_settings
 from endotsr.errors import InputError
 from endotsr.export.model import load_slim_model
 from endotsr.export.placement import HERE, Placement, placement_of
@@ -112,17 +111,13 @@ def _from_ply(path: Path) -> MovingScene:
     gaussians = read_gaussians(path)
     camera = facing_camera(gaussians.position, SIDE)
     distance = float(camera.translation[2] + np.median(gaussians.position[2]))
-    config = msgspec.structs.replace(
-        PAPER,
-        model=msgspec.structs.replace(STILL, harmonics_degree=round(len(gaussians.harmonics) ** 0.5) - 1),
-        raster=msgspec.structs.replace(PAPER.raster, near=NEAR * distance),
-    )
+    model = with_settings(STILL, harmonics_degree=round(len(gaussians.harmonics) ** 0.5) - 1)
+    config = with_settings(PAPER, model=model, raster={"near": NEAR * distance})
     record = SequenceRecord(
         unit="scene units", largest_depth=2 * distance, static_camera=True, names=[path.stem], times=[0.0],
         train_index=[0], test_index=[0], cameras=recorded([camera]),
     )  # fmt: skip
-    model = Model(gaussians, spectral_from(config.model, np.zeros(1)), config, 0)
-    return MovingScene(record, model, one_time=True)
+    return MovingScene(record, Model(gaussians, spectral_from(model, np.zeros(1)), config, 0), one_time=True)
 
 
 def facing_camera(position: FloatArray, side: int) -> Camera:

@@ -17,7 +17,7 @@ from endotsr.config import Config
 from endotsr.equations.calibration import calibration_views
 from endotsr.equations.laplacian import laplacian_levels, support_masks
 from endotsr.fitting.model import camera_at, render_at
-from endotsr.fitting.state import TrainingState, Workshop, workshop
+from endotsr.fitting.state import TrainingState, TrainingConstants, training_constants
 from endotsr.losses.masked_l1 import masked_l1_forward
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.smaller import halved
@@ -29,7 +29,7 @@ CHECKED_FRAMES = 8  # training frames, evenly spaced, that a check renders
 class CoarseStart(NamedTuple):
     """Constants of a coarse start."""
 
-    workshop: Workshop  # of the frames of half size
+    constants: TrainingConstants  # of the frames of half size
     frames: NDArray[np.intp]  # that a check renders
     lacking: float  # d, display units
 
@@ -37,7 +37,7 @@ class CoarseStart(NamedTuple):
 def coarse_start(sequence: Sequence, config: Config) -> CoarseStart:
     """The coarse start of a training on a sequence."""
     frames = sequence.train_index[calibration_views(len(sequence.train_index), CHECKED_FRAMES)]
-    small = workshop(halved(sequence, config.sequence.memory), coarse_config(config))
+    small = training_constants(halved(sequence, config.sequence.memory), coarse_config(config))
     return CoarseStart(small, frames, lacking(sequence, frames))
 
 
@@ -49,20 +49,20 @@ def coarse_config(config: Config) -> Config:
 
 def coarse_ends(state: TrainingState, coarse: CoarseStart) -> bool:
     """Whether the coarse start ends before the next iteration; checked every CHECK_EVERY iterations."""
-    if state.iteration >= coarse.workshop.config.density.until:
+    if state.iteration >= coarse.constants.config.density.until:
         return True
     if state.iteration == 0 or state.iteration % CHECK_EVERY:
         return False
-    return fit_error(state, coarse.workshop, coarse.frames) < coarse.lacking  # (20.5)
+    return fit_error(state, coarse.constants, coarse.frames) < coarse.lacking  # (20.5)
 
 
-def fit_error(state: TrainingState, shop: Workshop, frames: NDArray[np.intp]) -> float:
-    """e: the mean masked L1 (B6) of the renders of some frames of a workshop, display units."""
+def fit_error(state: TrainingState, constants: TrainingConstants, frames: NDArray[np.intp]) -> float:
+    """e: the mean masked L1 (B6) of the renders of some frames, display units."""
     errors = []
     for index in map(int, frames):
-        frame = shop.sequence.frame(index, shop.config.training.precision)
+        frame = constants.sequence.frame(index, constants.config.training.precision)
         at = (camera_at(state.frames, frame.camera, frame.time), frame.time)
-        rendered = render_at(state.gaussians, shop.spectral, shop.config, *at, frames=state.frames)
+        rendered = render_at(state.gaussians, constants.spectral, constants.config, *at, frames=state.frames)
         errors.append(masked_l1_forward(rendered.colour, frame.image, frame.mask)[0])
     return float(np.mean(errors))
 

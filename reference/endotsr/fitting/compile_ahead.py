@@ -78,39 +78,39 @@ def done_before(config: Config) -> Path:
 
 def rehearse(config: Config) -> None:
     """Compile or load every kernel of a training with these settings in this process, so that timings exclude it."""
-    shop, state = _small(config)
-    rehearse_picture(shop, state)
-    rehearse_losses(shop, everything=True)
-    rehearse_optimiser(shop, state)
-    rehearse_residuals(shop, state)
-    rehearse_densification(shop, state)
+    constants, state = _small(config)
+    rehearse_picture(constants, state)
+    rehearse_losses(constants, everything=True)
+    rehearse_optimiser(constants, state)
+    rehearse_residuals(constants, state)
+    rehearse_densification(constants, state)
 
 
 def _small(config: Config) -> tuple[Any, Any]:
-    """Workshop and state of a few Gaussians and pixels, with the dtypes and layouts of any training."""
-    from endotsr.fitting.state import bench_state, workshop
+    """Constants and state of a few Gaussians and pixels, with the dtypes and layouts of any training."""
+    from endotsr.fitting.state import bench_state, training_constants
     from endotsr.scene import workload
 
-    shop = workshop(workload.sequence(64, 48, frames=3), config)
-    return shop, bench_state(workload.gaussians(64, config), config, 0)
+    constants = training_constants(workload.sequence(64, 48, frames=3), config)
+    return constants, bench_state(workload.gaussians(64, config), config, 0)
 
 
-def rehearse_picture(shop: Any, state: Any) -> None:
+def rehearse_picture(constants: Any, state: Any) -> None:
     """Deformation, splatting and its reverse pass, density statistics."""
     from endotsr.fitting.model import raster_settings, scene_at, scene_reverse, without
     from endotsr.scene.density_control import gather_statistics
     from endotsr.splatting.render import render_forward, render_reverse
 
-    config, camera = shop.config, shop.sequence.cameras[0]
+    config, camera = constants.config, constants.sequence.cameras[0]
     base = without(state.gaussians, appearance=False, spectral_motion=False)
-    scene, saved = scene_at(base, shop.spectral, config.model, 0.5)
+    scene, saved = scene_at(base, constants.spectral, config.model, 0.5)
     out, render_saved = render_forward(scene, camera, raster_settings(config), degree=0)
     grads = render_reverse(out.colour, out.depth, None, render_saved)
     gather_statistics(state.statistics, grads.d_mean2d, grads.visible, camera.width, camera.height)
     scene_reverse(grads, saved, coefficients=False)
 
 
-def rehearse_losses(shop: Any, everything: bool) -> None:
+def rehearse_losses(constants: Any, everything: bool) -> None:
     """Targets, losses and optimiser; with `everything` also the terms that the schedule switches on later."""
     import numpy as np
 
@@ -118,17 +118,17 @@ def rehearse_losses(shop: Any, everything: bool) -> None:
     from endotsr.losses.masked_ssim import stored_target
     from endotsr.splatting.render import RenderOut
 
-    config, loss = shop.config, shop.config.loss
-    frame = shop.sequence.frame(0, config.training.precision)
+    config, loss = constants.config, constants.config.loss
+    frame = constants.sequence.frame(0, config.training.precision)
     later = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, float(config.model.laplacian))
     weights = later if everything else later._replace(smoothness=0.0, laplacian=0.0)
     seen = RenderOut(1 - frame.image, 1 + frame.depth, 1 + frame.depth)  # no loss term is zero, so every kernel runs
-    image_loss(seen, shop.targets_of(0), weights, config.loss)
+    image_loss(seen, constants.targets_of(0), weights, config.loss)
     if config.training.bridge_fraction > 0:  # the pictures between the frames are stored in finer steps
         stored_target(np.zeros(frame.image.shape, np.uint16), 1, frame.mask, config.training.precision)
 
 
-def rehearse_optimiser(shop: Any, state: Any) -> None:
+def rehearse_optimiser(constants: Any, state: Any) -> None:
     """Adam, fused with the reverse pass of the deformation."""
     import numpy as np
 
@@ -138,7 +138,7 @@ def rehearse_optimiser(shop: Any, state: Any) -> None:
     from endotsr.fitting.schedules import learning_rates
     from endotsr.scene.gaussians import arrays
 
-    config, rates, o = shop.config, learning_rates(1, shop.config), shop.config.optimiser
+    config, rates, o = constants.config, learning_rates(1, constants.config), constants.config.optimiser
     given = {name: array for name, array in arrays(state.gaussians).items() if name in rates and name not in NAMES}
     adam_update(state.adam, given, given, rates, o.beta1, o.beta2, o.epsilon)
     weight, centre, width = (getattr(state.gaussians, name) for name in NAMES)
@@ -149,7 +149,7 @@ def rehearse_optimiser(shop: Any, state: Any) -> None:
         deformation_adam_step(d_offsets, saved, state.adam, fdm_rates, o.beta1, o.beta2, o.epsilon)
 
 
-def rehearse_residuals(shop: Any, state: Any) -> None:
+def rehearse_residuals(constants: Any, state: Any) -> None:
     """Both Fourier residuals, the penalty, and their reverse passes fused with Adam."""
     import numpy as np
 
@@ -159,15 +159,15 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
     from endotsr.fitting.fused.coefficients import coefficients_adam_step
     from endotsr.fitting.schedules import learning_rates
 
-    activated = shop.config.training.residual_activation + 1
-    rates, o, rho = learning_rates(activated, shop.config), shop.config.optimiser, shop.spectral.rho
+    activated = constants.config.training.residual_activation + 1
+    rates, o, rho = learning_rates(activated, constants.config), constants.config.optimiser, constants.spectral.rho
     colour, motion = state.gaussians.appearance_coefficients, state.gaussians.motion_coefficients
     for name, coefficients in (("appearance_coefficients", colour), ("motion_coefficients", motion)):
         if coefficients is None:
             continue
         atoms, shrink = np.zeros(coefficients.shape[1], coefficients.dtype), None
         if coefficients is colour:
-            sums, _ = appearance_forward(coefficients, atoms, shop.config.model.beta)
+            sums, _ = appearance_forward(coefficients, atoms, constants.config.model.beta)
         else:
             sums, _ = motion_forward(coefficients, atoms)
             matern_penalty_forward(coefficients, rho)
@@ -176,14 +176,14 @@ def rehearse_residuals(shop: Any, state: Any) -> None:
         coefficients_adam_step(sums, atoms, shrink, coefficients, state.adam, name, rates, *settings)
 
 
-def rehearse_densification(shop: Any, state: Any) -> None:
+def rehearse_densification(constants: Any, state: Any) -> None:
     """The gather of every array and of its moments."""
     from endotsr.fitting.adam import regather
     from endotsr.scene.density_control import densify
 
     state.statistics.gradient_sum[:] = 1.0
     state.statistics.visits[:] = 1
-    made = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent)
+    made = densify(state.gaussians, state.statistics, constants.config.density, state.rng, constants.extent)
     regather(state.adam, list(state.adam.first), made.plan.source, made.plan.survivors)
 
 
@@ -193,13 +193,13 @@ def _second_process() -> None:
 
     config = msgspec.json.decode(sys.stdin.buffer.read(), type=Config)
     use_threads(1)
-    shop, state = _small(config)
-    rehearse_losses(shop, everything=False)
-    rehearse_optimiser(shop, state)
+    constants, state = _small(config)
+    rehearse_losses(constants, everything=False)
+    rehearse_optimiser(constants, state)
     print(READY, flush=True)
-    rehearse_residuals(shop, state)
-    rehearse_losses(shop, everything=True)
-    rehearse_densification(shop, state)
+    rehearse_residuals(constants, state)
+    rehearse_losses(constants, everything=True)
+    rehearse_densification(constants, state)
     done_before(config).touch()
 
 

@@ -172,7 +172,7 @@ def scene_reverse(grads: RenderGrads, saved: SceneSaved, *, coefficients: bool =
     return SceneGrads(by_field, d_offsets)
 
 
-def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
+def with_exposure(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, ExposureSaved | None]:
     """The images with the exposure of their frame, equation (B13); without one, the images themselves."""
     if exposure is None:
         return rendered, None
@@ -180,7 +180,7 @@ def exposed(rendered: RenderOut, exposure: Exposure | None) -> tuple[RenderOut, 
     return rendered._replace(colour=colour), saved
 
 
-def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[FloatArray, Exposure | None]:
+def with_exposure_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[FloatArray, Exposure | None]:
     """Gradients of the rendered colours and the exposure of the frame, from those of the exposed colours."""
     if saved is None:
         return d_colour, None
@@ -188,7 +188,7 @@ def exposed_reverse(d_colour: FloatArray, saved: ExposureSaved | None) -> tuple[
     return grads.d_colour, Exposure(grads.d_log_gain, grads.d_bias)
 
 
-def corrected(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | None]:
+def with_pose_correction(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | None]:
     """The camera with the correction of its pose, equation (B16); without one, the camera itself."""
     if pose is None:
         return camera, None
@@ -196,7 +196,7 @@ def corrected(camera: Camera, pose: Pose | None) -> tuple[Camera, PoseSaved | No
     return camera._replace(rotation=rotation, translation=translation), saved
 
 
-def corrected_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> Pose | None:
+def with_pose_correction_reverse(d_camera: CameraGrads | None, saved: PoseSaved | None) -> Pose | None:
     """Gradients of the correction, from those of the corrected pose."""
     if saved is None or d_camera is None:
         return None
@@ -211,7 +211,7 @@ def corrected_cameras(frames: FrameParameters | None, cameras: list[Camera], tim
 
 def camera_at(frames: FrameParameters | None, camera: Camera, t: float) -> Camera:
     """A camera with the correction of a model at time t; the camera itself if the model has none."""
-    return corrected(camera, pose_at(frames, t))[0]
+    return with_pose_correction(camera, pose_at(frames, t))[0]
 
 
 def with_corrected_cameras(sequence: Sequence, frames: FrameParameters | None) -> Sequence:
@@ -254,4 +254,4 @@ def render_at(
     check_scene(scene)
     degree = config.model.harmonics_degree  # coefficients of degrees that are not active yet are zero
     rendered, _ = render_forward(scene, camera, raster_settings(config), degree=degree, background=background)
-    return exposed(rendered, exposure_at(frames, t))[0]
+    return with_exposure(rendered, exposure_at(frames, t))[0]

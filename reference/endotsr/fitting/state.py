@@ -1,4 +1,4 @@
-"""The state of a training, and the workshop: its constants.
+"""The state of a training, and its constants.
 
 `TrainingState` holds everything that a run carries from one iteration to the next. A checkpoint holds the same, except
 for `ahead` and `drawn`, which are then computed again. Everything else (targets, atoms, rates) is a function of the
@@ -59,7 +59,7 @@ class TrainingState:
 
 
 @dataclass
-class Workshop:
+class TrainingConstants:
     """Constants of a training: functions of the sequence and the configuration."""
 
     sequence: Sequence
@@ -95,7 +95,7 @@ class Workshop:
         return targets_of(stored_target(sequence.images[index], 255, mask, precision), depth, supports, config)
 
 
-def workshop(sequence: Sequence, config: Config) -> Workshop:
+def training_constants(sequence: Sequence, config: Config) -> TrainingConstants:
     """Spectral constants and scene extent of a sequence.
 
     A quarter of `sequence.memory` each is for the targets of the frames and for the frames in between.
@@ -106,7 +106,7 @@ def workshop(sequence: Sequence, config: Config) -> Workshop:
     extent = scene_extent(config.density, [sequence.cameras[i] for i in sequence.train_index])
     bridged = BridgedTargets(sequence, config, Kept(limit))
     depth = _depth_of_tissue(sequence) if config.model.pose_correction else 1.0
-    return Workshop(sequence, config, spectral, extent, Kept(limit), bridged, depth)
+    return TrainingConstants(sequence, config, spectral, extent, Kept(limit), bridged, depth)
 
 
 def _depth_of_tissue(sequence: Sequence) -> float:

@@ -21,10 +21,10 @@ from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
     SceneGrads,
     SceneSaved,
-    corrected,
-    corrected_reverse,
-    exposed,
-    exposed_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
+    with_exposure,
+    with_exposure_reverse,
     raster_settings,
     scene_at,
     scene_reverse,
@@ -42,7 +42,7 @@ from endotsr.fitting.schedules import (
     smoothness_active,
     statistics_active,
 )
-from endotsr.fitting.state import TrainingState, Workshop, check_state, new_training, workshop
+from endotsr.fitting.state import TrainingState, TrainingConstants, check_state, new_training, training_constants
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
@@ -87,12 +87,12 @@ def train(
     if coarse:
         so_long = "until their fit is as near to them as they are to the full frames"
         on_message(f"coarse start: frames of half size {so_long}")
-    shop = coarse.workshop if coarse else workshop(sequence, config)
+    constants = coarse.constants if coarse else training_constants(sequence, config)
     while state.iteration < config.training.iterations:
         if coarse and coarse_ends(state, coarse):
-            coarse, state.coarse, shop = None, False, workshop(sequence, config)
+            coarse, state.coarse, constants = None, False, training_constants(sequence, config)
             on_message(f"coarse start: the frames have their full size after iteration {state.iteration}")
-        entry = training_step(state, shop)
+        entry = training_step(state, constants)
         on_iteration(entry)
         if advice := watch.see(entry, state.gaussians):
             on_message(advice)
@@ -106,34 +106,34 @@ def calibrated_weight(sequence: Sequence, config: Config) -> float:
     model = msgspec.structs.replace(config.model, appearance=False, spectral_motion=False, laplacian=False)
     loss = msgspec.structs.replace(config.loss, lambda_lap=0.0)
     base = msgspec.structs.replace(config, model=model, loss=loss)
-    shop, state = workshop(sequence, base), new_training(sequence, base)
+    constants, state = training_constants(sequence, base), new_training(sequence, base)
     while state.iteration < config.training.residual_activation:
-        training_step(state, shop)
-    return calibrate_on(state.gaussians, shop.spectral, sequence, base, state.frames).lambda_lap
+        training_step(state, constants)
+    return calibrate_on(state.gaussians, constants.spectral, sequence, base, state.frames).lambda_lap
 
 
-def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER) -> LogEntry:
+def training_step(state: TrainingState, constants: TrainingConstants, timer: Timer = NO_TIMER) -> LogEntry:
     """One iteration; returns its log entry."""
-    config, iteration = shop.config, state.iteration + 1
+    config, iteration = constants.config, state.iteration + 1
     if residuals_activate(iteration, config):
         _activate_residuals(state, config)
-    state.drawn = state.drawn or drawn_view(state.rng, shop.sequence, config.training)
+    state.drawn = state.drawn or drawn_view(state.rng, constants.sequence, config.training)
     view, rng_state = state.drawn
-    targets, camera = shop.observed(view)
-    scene, scene_saved = scene_at(state.gaussians, shop.spectral, config.model, view.t, state.ahead, timer)
+    targets, camera = constants.observed(view)
+    scene, scene_saved = scene_at(state.gaussians, constants.spectral, config.model, view.t, state.ahead, timer)
     degree = active_degree(iteration, config)
-    camera, pose_saved = corrected(camera, pose_at(state.frames, view.t))
+    camera, pose_saved = with_pose_correction(camera, pose_at(state.frames, view.t))
     rendered, render_saved = render_forward(scene, camera, raster_settings(config), degree=degree, timer=timer)
-    rendered, exposure_saved = exposed(rendered, exposure_of(state.frames, shop.column(view)))
+    rendered, exposure_saved = with_exposure(rendered, exposure_of(state.frames, constants.column(view)))
     loss = image_loss(rendered, targets, _weights(state, iteration, config), config.loss, timer=timer)
-    d_colour, d_exposure = exposed_reverse(loss.d_colour, exposure_saved)
+    d_colour, d_exposure = with_exposure_reverse(loss.d_colour, exposure_saved)
     moving = pose_saved is not None
     d_scene = render_reverse(d_colour, loss.d_depth, None, render_saved, pose_gradient=moving, timer=timer)
-    d_pose = corrected_reverse(d_scene.d_camera, pose_saved)
+    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
     watched = statistics_active(iteration, config)
     back, penalty, _ = parallel_calls(
         lambda: scene_reverse(d_scene, scene_saved, coefficients=False),
-        timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, shop)),
+        timed(timer, "Fourier", lambda: _matern_penalty(state.gaussians, constants)),
         timed(timer, "density control", lambda: _watch_density(state, d_scene, camera, watched)),
     )
     _refuse_not_finite(iteration, view, loss, penalty, d_scene, rng_state)
@@ -141,11 +141,11 @@ def training_step(state: TrainingState, shop: Workshop, timer: Timer = NO_TIMER)
     dense, state.ahead = densify_now(iteration, config), None
     state.drawn = None
     if not (dense and config.optimiser.legacy_skip):
-        _optimise(state, shop, scene_saved, d_scene, back, iteration, timer)
-        _optimise_frames(state, shop, view, d_exposure, d_pose, iteration)
+        _optimise(state, constants, scene_saved, d_scene, back, iteration, timer)
+        _optimise_frames(state, constants, view, d_exposure, d_pose, iteration)
     if dense:
         with timer.stage("density control"):
-            _control_density(state, shop, iteration)
+            _control_density(state, constants, iteration)
     state.iteration = iteration
     return entry
 
@@ -167,10 +167,10 @@ def _activate_residuals(state: TrainingState, config: Config) -> None:
             add_array(state.adam, name, array)
 
 
-def _matern_penalty(gaussians: Gaussians, shop: Workshop) -> float | None:
+def _matern_penalty(gaussians: Gaussians, constants: TrainingConstants) -> float | None:
     """L_msp; None without component S. Its gradient is added in `optimise`."""
     coefficients = gaussians.motion_coefficients
-    return None if coefficients is None else matern_penalty_forward(coefficients, shop.spectral.rho)[0]
+    return None if coefficients is None else matern_penalty_forward(coefficients, constants.spectral.rho)[0]
 
 
 def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, active: bool) -> None:
@@ -181,7 +181,7 @@ def _watch_density(state: TrainingState, d_scene: RenderGrads, camera: Camera, a
 
 def _optimise(
     state: TrainingState,
-    shop: Workshop,
+    constants: TrainingConstants,
     saved: SceneSaved,
     d_scene: RenderGrads,
     back: SceneGrads,
@@ -192,34 +192,34 @@ def _optimise(
 
     It is not drawn before density control, which draws random numbers first, and after the last iteration.
     """
-    config, later = shop.config, None
+    config, later = constants.config, None
     if iteration < config.training.iterations and not densify_now(iteration, config):
-        state.drawn = drawn_view(state.rng, shop.sequence, config.training)
+        state.drawn = drawn_view(state.rng, constants.sequence, config.training)
         later = state.drawn.view.t
     rates = learning_rates(iteration, config)
-    gaussians, adam, spectral = state.gaussians, state.adam, shop.spectral
+    gaussians, adam, spectral = state.gaussians, state.adam, constants.spectral
     state.ahead = optimise(gaussians, adam, spectral, config, saved, d_scene, back, rates, later, timer)
 
 
 def _optimise_frames(
-    state: TrainingState, shop: Workshop, view: View, d_exposure: Exposure | None, d_pose: Pose | None, iteration: int
+    state: TrainingState, constants: TrainingConstants, view: View, d_exposure: Exposure | None, d_pose: Pose | None, iteration: int
 ) -> None:
     """One Adam step of the parameters of frames: of all columns, with gradient 0 for the frames that were not seen."""
     if state.frames is None:
         return
-    gradients, o = {}, shop.config.optimiser
+    gradients, o = {}, constants.config.optimiser
     if d_exposure is not None:
-        gradients |= exposure_gradients(state.frames, shop.column(view), d_exposure)
+        gradients |= exposure_gradients(state.frames, constants.column(view), d_exposure)
     if d_pose is not None:
         gradients |= pose_gradients(state.frames, view.t, d_pose)
-    rates = shop.in_scene_units(learning_rates(iteration, shop.config))
+    rates = constants.in_scene_units(learning_rates(iteration, constants.config))
     adam_update(state.adam, trained(state.frames), gradients, rates, o.beta1, o.beta2, o.epsilon)
 
 
-def _control_density(state: TrainingState, shop: Workshop, iteration: int) -> None:
+def _control_density(state: TrainingState, constants: TrainingConstants, iteration: int) -> None:
     """Clone, split and prune. Moments are gathered too; those of clones and children, and all statistics, are zero."""
-    left = densifications_left(iteration, shop.config)
-    result = densify(state.gaussians, state.statistics, shop.config.density, state.rng, shop.extent, left)
+    left = densifications_left(iteration, constants.config)
+    result = densify(state.gaussians, state.statistics, constants.config.density, state.rng, constants.extent, left)
     regather(state.adam, arrays(result.gaussians), result.plan.source, result.plan.survivors)
     state.gaussians, state.statistics = result.gaussians, result.statistics
 

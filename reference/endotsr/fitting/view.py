@@ -19,10 +19,10 @@ from endotsr.equations.deformation import deformation_reverse
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
 from endotsr.fitting.model import (
     Spectral,
-    corrected,
-    corrected_reverse,
-    exposed,
-    exposed_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
+    with_exposure,
+    with_exposure_reverse,
     raster_settings,
     scene_at,
     scene_reverse,
@@ -80,14 +80,14 @@ def view_gradients(
     degree = config.model.harmonics_degree if degree is None else degree
 
     scene, scene_saved = scene_at(gaussians, spectral, config.model, t)
-    camera, pose_saved = corrected(camera, pose)
+    camera, pose_saved = with_pose_correction(camera, pose)
     rendered, render_saved = render_forward(scene, camera, raster, degree=degree, compositor=compositor)
-    rendered, exposure_saved = exposed(rendered, exposure)
+    rendered, exposure_saved = with_exposure(rendered, exposure)
     loss, terms, d_colour, d_depth = image_loss(rendered, targets, weights, config.loss, edges)
 
-    d_colour, d_exposure = exposed_reverse(d_colour, exposure_saved)
+    d_colour, d_exposure = with_exposure_reverse(d_colour, exposure_saved)
     d_scene = render_reverse(d_colour, d_depth, None, render_saved, pose_gradient=pose is not None)
-    d_pose = corrected_reverse(d_scene.d_camera, pose_saved)
+    d_pose = with_pose_correction_reverse(d_scene.d_camera, pose_saved)
     gradients, d_offsets = scene_reverse(d_scene, scene_saved)
     if scene_saved.deformation is not None and d_offsets is not None:
         fdm = deformation_reverse(d_offsets, scene_saved.deformation)

@@ -19,24 +19,22 @@ def check_page(checked: Checked) -> str:
         f'<p class="eyebrow">endotsr check</p><h1>{parts.text(checked.source)} {verdict}</h1><p class="lead">{lead}</p>'
     ]
     body += [parts.section(title, _table(checked, level)) for level, title in TITLES.items() if counts[level]]
-    shown = "".join(
-        f"<figure>{parts.image(picture, caption)}<figcaption>{parts.text(caption)}</figcaption></figure>"
-        for caption, picture in checked.pictures
-    )
+    shown = "".join(parts.figure(caption, parts.image(picture, caption)) for caption, picture in checked.pictures)
     body.append(parts.section("Pictures", f'<div class="charts">{shown}</div>' if shown else ""))
     facts = {key: value for key, value in checked.facts.items() if not isinstance(value, dict)}
     facts |= {key.replace("_", " "): round(value, 1) for key, value in checked.facts.get("cost", {}).items()}
-    rows = "".join(f"<dt>{parts.text(key)}</dt><dd>{parts.cell(value)}</dd>" for key, value in facts.items())
-    body.append(parts.section("Size and estimated cost", f"<dl>{rows}</dl>" if rows else ""))
+    rows = parts.definitions((parts.text(key), parts.cell(value)) for key, value in facts.items())
+    body.append(parts.section("Size and estimated cost", rows))
     return parts.page(f"endotsr check: {checked.source}", "\n".join(part for part in body if part))
 
 
 def _table(checked: Checked, level: str) -> str:
-    rows = [
-        f"<dt><code>{parts.text(f.code)}</code>{'' if f.frame is None else f' frame {f.frame}'}</dt>"
-        f"<dd>{parts.text(f.where)}: {parts.text(f.what)}. {parts.text(f.why.capitalize())}."
-        f" <b>{parts.text(f.remedy.capitalize())}.</b></dd>"
+    return parts.definitions(
+        (
+            f"<code>{parts.text(f.code)}</code>{'' if f.frame is None else f' frame {f.frame}'}",
+            f"{parts.text(f.where)}: {parts.text(f.what)}. {parts.text(f.why.capitalize())}."
+            f" <b>{parts.text(f.remedy.capitalize())}.</b>",
+        )
         for f in checked.findings
         if f.level == level
-    ]
-    return f"<dl>{''.join(rows)}</dl>"
+    )

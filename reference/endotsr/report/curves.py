@@ -7,22 +7,17 @@ not drawn; a chart without any curve is left out.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.errors import InputError
 from endotsr.evaluation.records import EvaluationRecord
 from endotsr.fitting.records import LogEntry
+from endotsr.report import parts
 from endotsr.report.style import LIGHT, THEMES, Theme, encoded, legend, name_axes, new_figure, plain_axes
-from endotsr.untrusted.files import read_bytes
-from endotsr.untrusted.json import parsed
 
 LogEntries = list[LogEntry]
-
-LARGEST_LOG = 1 << 30  # bytes: several million iterations
 
 TERMS = ("l1", "ssim", "depth", "smoothness", "matern_penalty", "laplacian")
 
@@ -34,21 +29,6 @@ class Chart:
     title: str
     draw: Callable[[Any, Theme], None]
     along: str = "iteration"  # unit of the horizontal axis
-
-
-def read_log(path: Path) -> LogEntries:
-    """The entries of a JSON-lines log. A last line cut short by an interruption is left out; none if no file."""
-    if not Path(path).exists():
-        return []
-    entries = []
-    for line in read_bytes(Path(path), LARGEST_LOG).splitlines():
-        try:
-            entry = parsed(line, "a line of the log")
-        except InputError:
-            continue
-        if isinstance(entry, dict) and isinstance(entry.get("iteration", 0), int):
-            entries.append(cast(LogEntry, entry))
-    return entries
 
 
 def series(log: LogEntries, key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -108,12 +88,18 @@ def frame_lines(evaluation: EvaluationRecord | None, key: str) -> list[tuple[str
     return lines
 
 
-def chart_png(chart: Chart, theme: str, width: float = 4.4, height: float = 2.75, dots: int = 220) -> bytes:
-    """One chart as a PNG file with a transparent background, `width` x `height` inches."""
-    figure = new_figure(width, height, constrained=False)
+def chart_png(chart: Chart, theme: str, dots: int = 220) -> bytes:
+    """One chart as a PNG file with a transparent background, 4.4 x 2.75 inches."""
+    figure = new_figure(4.4, 2.75, constrained=False)
     figure.subplots_adjust(left=0.13, right=0.985, top=0.97, bottom=0.17)
     _draw(figure.add_subplot(), chart, THEMES[theme], title=False)
     return encoded(figure, "png", dots, transparent=True)
+
+
+def chart_figure(chart: Chart) -> str:
+    """A chart as HTML with its title, for a light and for a dark page."""
+    light, dark = chart_png(chart, "light"), chart_png(chart, "dark")
+    return parts.figure(chart.title, parts.themed_image(light, dark, chart.title))
 
 
 def curves_png(log: LogEntries, evaluation: EvaluationRecord | None = None) -> bytes | None:

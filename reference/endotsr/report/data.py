@@ -1,7 +1,7 @@
 """The input of a report: plain arrays, dictionaries and text. This module handles no file, picture or HTML."""
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,6 @@ COLUMNS = (
     ("lpips_symmetric", "LPIPS [−1,1]", 4, -1),
 )
 DECIDING = tuple(column for column in COLUMNS if not column[0].endswith("_8bit"))  # shown without unfolding anything
-
-Facts = dict[str, str | int | float | None]  # label -> value
 
 
 class Preview(NamedTuple):
@@ -51,16 +49,6 @@ class FramePictures:
 
 
 @dataclass(frozen=True)
-class FreeTable:
-    """A table given as data, such as what each component contributed."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]  # first cell of a row is its name
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class ReportData:
     """The contents of the page. Every part but the title may be empty and is then left out."""
 
@@ -68,12 +56,7 @@ class ReportData:
     evaluation: EvaluationRecord = field(default_factory=lambda: cast(EvaluationRecord, {}))  # metrics.json
     log: list[LogEntry] = field(default_factory=list)  # log.jsonl
     frames: tuple[FramePictures, ...] = ()
-    components: tuple[FreeTable, ...] = ()
-    facts: Facts = field(default_factory=dict)  # sequence, seed, machine, time, memory ...
     configuration: str = ""  # TOML
-    versions: dict[str, str] = field(default_factory=dict)
-    input_hashes: dict[str, str] = field(default_factory=dict)  # file -> SHA-256
-    notes: tuple[str, ...] = ()  # sentences with the assumptions and findings of the reader
     depth_unit: str = "scene units"
     preview: Preview | None = None
     viewer: str = ""  # file name of the viewer page beside the report

@@ -21,6 +21,7 @@ DEPTH_MAP = "viridis"
 EXCLUDED = (96, 96, 102)
 NOT_FINITE = (255, 0, 255)
 INSET_FACTOR = 4
+GAP = 6  # pixels between the pictures of one frame
 ERROR_SCALES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # few steps, so that similar runs have the same scale
 
 
@@ -92,16 +93,16 @@ def triptych(render: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], sca
     return Triptych(bytes_image(render), bytes_image(truth), colours, row, column, height, width, scale)
 
 
-def triptych_picture(panels: Triptych, gap: int = 6) -> ByteImage:
+def triptych_picture(panels: Triptych) -> ByteImage:
     """One picture to save: the three images, the window framed in each, and below them the window enlarged 4x."""
     columns = []
     for image in (panels.render, panels.truth, panels.error):
         enlarged = panels.window(image).repeat(INSET_FACTOR, axis=0).repeat(INSET_FACTOR, axis=1)
         inset = np.full_like(image, 255)
         inset[: enlarged.shape[0], : enlarged.shape[1]] = enlarged[: image.shape[0], : image.shape[1]]
-        bar = np.full((gap, image.shape[1], 3), 255, np.uint8)
+        bar = np.full((GAP, image.shape[1], 3), 255, np.uint8)
         columns += [np.concatenate([framed(image, panels), bar, inset])]
-    side = np.full((columns[0].shape[0], gap, 3), 255, np.uint8)
+    side = np.full((columns[0].shape[0], GAP, 3), 255, np.uint8)
     return np.concatenate([columns[0], side, columns[1], side, columns[2]], axis=1)
 
 
@@ -153,21 +154,15 @@ def colour_table(name: str) -> ByteImage:
 
 
 def encode(image: ByteImage, kind: str = "png") -> bytes:
-    """File bytes of an (H, W, 3) image. kind: `png` (lossless) or `webp` (quality 90, about a tenth of the size)."""
+    """File bytes of an (H, W, 3) image, or of one with opacity, (H, W, 4).
+
+    kind   `png` (lossless) or `webp` (quality 90, about a tenth of the size)
+    """
     from PIL import Image
 
     buffer = io.BytesIO()
     options = {"png": {}, "webp": {"quality": 90, "method": 3}}[kind]
     Image.fromarray(image).save(buffer, format=kind, **options)
-    return buffer.getvalue()
-
-
-def encode_transparent(image: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of an (H, W, 4) image, RGB and opacity."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, format="png")
     return buffer.getvalue()
 
 

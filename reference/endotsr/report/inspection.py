@@ -3,7 +3,6 @@
 In: an `Inspection` and its `Plan`. Out: HTML, or lines for a terminal.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,8 @@ from endotsr.effects.plan import Plan
 from endotsr.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.report import curves, figures, parts, tables
 from endotsr.report.style import Theme
-from endotsr.untrusted.writing import replace_text
 
 SMALL = ("none", "good", "degree 0")
-
-
-def write_inspection(path: Path, title: str, inspection: Inspection, plan: Plan) -> None:
-    """Write the page, complete or not at all. Raises OSError as the file system reports it."""
-    content = inspection_html(title, inspection, plan)
-    replace_text(Path(path), content)
 
 
 def inspection_html(title: str, inspection: Inspection, plan: Plan) -> str:
@@ -96,15 +88,15 @@ def _verdicts(inspection: Inspection) -> str:
         for v in inspection.verdicts.values()
     ]  # fmt: skip
     columns = ("Effect", "Found", "Statistic", "Threshold", "Unit", "False positives by design", "Confidence")
-    reasons = "".join(
-        f"<dt>{parts.text(v.effect)}</dt><dd>{parts.text(v.reason)} <small>{parts.text(v.test)}</small></dd>"
+    reasons = parts.definitions(
+        (parts.text(v.effect), f"{parts.text(v.reason)} <small>{parts.text(v.test)}</small>")
         for v in inspection.verdicts.values()
     )
     note = (
         "Every test reads training frames only. Confidence is the distance of the statistic from its threshold: 0.5 at "
         "the threshold, 1 far from it or where the answer is a fact."
     )
-    return parts.section("What was found", tables.html_table(columns, rows), f"<dl>{reasons}</dl>", note=note)
+    return parts.section("What was found", tables.html_table(columns, rows), reasons, note=note)
 
 
 def _plan(plan: Plan) -> str:
@@ -114,8 +106,8 @@ def _plan(plan: Plan) -> str:
         for c in plan.changes
     ]  # fmt: skip
     table = tables.html_table(("Setting", "Now", "Plan", "Time saved", "Memory saved", "Reason"), rows) if rows else ""
-    kept = "".join(f"<dt><code>{parts.text(key)}</code></dt><dd>{parts.text(reason)}</dd>" for key, reason in plan.kept)
-    stays = f"<h3>What stays</h3><dl>{kept}</dl>" if kept else ""
+    kept = parts.definitions((f"<code>{parts.text(key)}</code>", parts.text(reason)) for key, reason in plan.kept)
+    stays = f"<h3>What stays</h3>{kept}" if kept else ""
     remarks = "".join(f'<p class="note">{parts.text(remark)}</p>' for remark in plan.remarks)
     note = "<code>endotsr train --effects auto</code> follows this plan; a setting that is given explicitly stays."
     return parts.section("The plan", table or "<p>Nothing to switch off.</p>", stays, remarks, note=note)
@@ -129,31 +121,24 @@ def _dictionary(inspection: Inspection, plan: Plan) -> str:
         ("Dictionary that the stamps carry", f"{d.frequencies} frequencies up to {d.frequency_max:g} cycles, rank "
                                              f"{d.rank}, condition {d.condition:.3g}"),
     ]  # fmt: skip
-    listed = "".join(f"<dt>{name}</dt><dd>{parts.text(value)}</dd>" for name, value in facts)
-    return parts.section("Rates and time stamps", f"<dl>{listed}</dl>")
+    return parts.section("Rates and time stamps", parts.definitions((name, parts.text(value)) for name, value in facts))
 
 
 def _pictures(inspection: Inspection) -> str:
     shown = [_panel(v) for v in inspection.verdicts.values()]
     frame = inspection.clip.images[inspection.clip.reference]
-    first = _figure("Reference frame", parts.image(figures.bytes_image(frame), "the reference frame"))
+    first = parts.figure("Reference frame", parts.image(figures.bytes_image(frame), "the reference frame"))
     return parts.section("What the tests saw", f'<div class="charts">{first}{"".join(shown)}</div>')
 
 
 def _panel(verdict: EffectVerdict) -> str:
     found = ""
     if verdict.map is not None:
-        found += _figure(f"{verdict.effect}: {verdict.map.name}", _map_image(verdict.map))
+        found += parts.figure(f"{verdict.effect}: {verdict.map.name}", _map_image(verdict.map))
     if verdict.curve is not None:
         title = f"{verdict.effect}: {verdict.curve.name}"
-        chart = curves.Chart(title, _drawer(verdict.curve), verdict.curve.x_name)
-        light, dark = curves.chart_png(chart, "light"), curves.chart_png(chart, "dark")
-        found += _figure(title, parts.themed_image(light, dark, title))
+        found += curves.chart_figure(curves.Chart(title, _drawer(verdict.curve), verdict.curve.x_name))
     return found
-
-
-def _figure(caption: str, content: str) -> str:
-    return f"<figure><figcaption>{parts.text(caption)}</figcaption>{content}</figure>"
 
 
 def _map_image(shown: Map) -> str:

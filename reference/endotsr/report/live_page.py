@@ -18,10 +18,10 @@ from endotsr.evaluation.metrics import psnr_tissue
 from endotsr.fitting.model import camera_at, render_at, spectral_from
 from endotsr.fitting.records import LogEntry
 from endotsr.report import parts
-from endotsr.report.curves import read_log
 from endotsr.report.figures import bytes_image
 from endotsr.report.line_chart import ChartCurve, chart_svg
 from endotsr.runs.folder import RunFolder
+from endotsr.runs.log import log_until
 from endotsr.runs.machine import now
 from endotsr.sequences.sequence import Sequence
 from endotsr.untrusted.writing import replace_text
@@ -51,7 +51,7 @@ class LivePage:
     def begin(self, state: "TrainingState") -> None:
         """The training begins with `state`, which it changes in place. Nothing is rendered yet: kernels compile now."""
         self._state = state
-        self._log = [_kept(entry) for entry in read_log(self._folder.log) if entry["iteration"] <= state.iteration]
+        self._log = [_kept(entry) for entry in log_until(self._folder.log, state.iteration)]
         self._write("running", None, picture=False)
         self._due = 0.0
 
@@ -69,7 +69,7 @@ class LivePage:
     def _write(self, status: str, left: str | None, picture: bool = True) -> None:
         began = time.monotonic()
         with contextlib.suppress(OSError):  # a disk without space: the training itself says so
-            _replace(self._folder.path, self._html(status, left, picture))
+            replace_text(self._folder.path / LIVE_PAGE, self._html(status, left, picture))
         done = time.monotonic()
         self._due = done + min(max(FEWEST_SECONDS, (done - began) / LARGEST_FRACTION), MOST_SECONDS)
 
@@ -106,7 +106,7 @@ class LivePage:
         self._psnr.x.append(float(state.iteration))
         self._psnr.y.append(psnr_tissue(out.colour, truth, mask))
         shown = "".join(
-            f"<figure><figcaption>{label}</figcaption>{parts.image(bytes_image(colour), label)}</figure>"
+            parts.figure(label, parts.image(bytes_image(colour), label))
             for label, colour in (("Render", out.colour), ("Truth", truth))
         )
         title = f"{self._kind.capitalize()} frame {index} after iteration {state.iteration}"
@@ -123,18 +123,15 @@ class LivePage:
             ("Loss", chart_svg("Loss", [loss], planned, logarithmic=True)),
             ("PSNR, dB", chart_svg("PSNR, dB", [views, self._psnr], planned)),
         )
-        figures = "".join(f"<figure><figcaption>{title}</figcaption>{svg}</figure>" for title, svg in charts if svg)
+        figures = "".join(parts.figure(title, svg) for title, svg in charts if svg)
         return parts.section("Curves", f'<div class="charts">{figures}</div>') if figures else ""
 
 
 def lead_to_report(folder: Path) -> None:
     """Let the page of a training show the report, once there is one; a run without the page gets none."""
     if (folder / LIVE_PAGE).is_file():
-        _replace(folder, parts.page("Endo-TSR", f'<p><a href="{REPORT}">The report</a></p>', f"0; url={REPORT}"))
-
-
-def _replace(folder: Path, page: str) -> None:
-    replace_text(folder / LIVE_PAGE, page)
+        page = parts.page("Endo-TSR", f'<p><a href="{REPORT}">The report</a></p>', f"0; url={REPORT}")
+        replace_text(folder / LIVE_PAGE, page)
 
 
 def _kept(entry: LogEntry) -> LogEntry:

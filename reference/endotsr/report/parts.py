@@ -6,6 +6,7 @@ that to the viewer page beside the report.
 
 import html
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from endotsr.report import figures
@@ -53,6 +54,17 @@ def section(title: str, *content: str, note: str = "") -> str:
 def details(summary: str, content: str, opened: bool = False) -> str:
     """A part that can be folded. Both arguments are HTML already."""
     return f"<details{' open' if opened else ''}><summary>{summary}</summary>{content}</details>"
+
+
+def definitions(pairs: Iterable[tuple[str, str]]) -> str:
+    """A list of names with what belongs to each, both HTML already; empty without one."""
+    rows = "".join(f"<dt>{name}</dt><dd>{content}</dd>" for name, content in pairs)
+    return f"<dl>{rows}</dl>" if rows else ""
+
+
+def figure(caption: str, content: str) -> str:
+    """HTML with a caption above it."""
+    return f"<figure><figcaption>{text(caption)}</figcaption>{content}</figure>"
 
 
 def image(picture: ByteImage, alternative: str, css: str = "") -> str:

@@ -6,28 +6,25 @@ In: the metrics of a run and the renders of its held-out frames. Each file and f
 import math
 import os
 import shutil
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
 from endotsr.config import config_to_toml
 from endotsr.errors import InputError
 from endotsr.evaluation.records import FrameMetrics, RunEvaluation
-from endotsr.fitting.records import LogEntry
 from endotsr.opencv import write_png
-from endotsr.report.curves import curves_png, read_log
+from endotsr.report.curves import curves_png
 from endotsr.report.data import FramePictures, Preview, ReportData
-from endotsr.report.figures import triptych, triptych_picture
+from endotsr.report.figures import bytes_image, triptych, triptych_picture
 from endotsr.report.live_page import REPORT, lead_to_report
-from endotsr.report.pictures import rgb_bytes
-from endotsr.report.run_text import component_table, facts
-from endotsr.report.sections import write_report
+from endotsr.report.sections import report_html
 from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder
+from endotsr.runs.log import log_until
 from endotsr.sequences.sequence import Sequence
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.names import file_name
-from endotsr.untrusted.writing import replace_file, replacing_folder
+from endotsr.untrusted.writing import replace_file, replace_text, replacing_folder
 
 MOST_SHOWN = 24  # of the held-out frames, the worst, with their pictures in the report: some 0.25 MB each
 
@@ -36,30 +33,41 @@ def write_evaluation(
     folder: RunFolder,
     sequence: Sequence,
     metrics: RunEvaluation,
-    held_out: Mapping[int, RenderOut],
+    held_out: Callable[[int], RenderOut],
     preview: Preview | None = None,
     viewer: str = "",
 ) -> None:
     """Write the files of `endotsr evaluate` in a run folder.
 
-    metrics     of `evaluation.run.measure_run`
-    held_out    frame number -> render
+    metrics     of `evaluation.run.measure_folder`
+    held_out    number of a held-out frame -> render
     preview     moving picture of the report
     viewer      name of the viewer page in the folder, which the report links to; "" = there is none
     """
     _write_pictures(folder, metrics["run"]["iteration"], sequence, held_out)
     write_json(folder.path / "metrics.json", metrics)
-    reached = metrics["run"]["iteration"]
-    log = [entry for entry in read_log(folder.log) if entry.get("iteration", 0) <= reached]
+    log = log_until(folder.log, metrics["run"]["iteration"])
     picture = curves_png(log, metrics)
     if picture:
         replace_file(folder.path / "curves.png", lambda path: path.write_bytes(picture))
-    data = _report_data(folder, sequence, metrics, held_out, log)
-    write_report(folder.path / REPORT, replace(data, preview=preview, viewer=viewer))
+    about = metrics["run"]["input"]
+    data = ReportData(
+        title=f"{Path(about.get('source', '')).name}: {folder.path.absolute().name}",
+        evaluation=metrics,
+        log=log,
+        frames=_worst_frames(sequence, metrics["held_out"]["per_frame"], held_out),
+        configuration=config_to_toml(folder.config()),
+        depth_unit=sequence.unit,
+        preview=preview,
+        viewer=viewer,
+    )
+    replace_text(folder.path / REPORT, report_html(data))
     lead_to_report(folder.path)
 
 
-def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_out: Mapping[int, RenderOut]) -> None:
+def _write_pictures(
+    folder: RunFolder, iteration: int, sequence: Sequence, held_out: Callable[[int], RenderOut]
+) -> None:
     """renders/<name>.png and <name>_comparison.png; test/ours_<iteration>/{renders,gt,masks} as the peers name them."""
     peers = folder.path / "test" / f"ours_{iteration}"
     if peers.parent.is_symlink():
@@ -68,13 +76,13 @@ def _write_pictures(folder: RunFolder, iteration: int, sequence: Sequence, held_
     with replacing_folder(folder.path / "renders") as renders, replacing_folder(peers) as test:
         for name in ("renders", "gt", "masks"):
             (test / name).mkdir()
-        for number, (index, out) in enumerate(held_out.items()):
-            name = file_name(sequence.names[index], "names of the frames")
+        for number, index in enumerate(map(int, sequence.test_index)):
+            out, name = held_out(index), file_name(sequence.names[index], "names of the frames")
             truth, mask = sequence.frame(index).image, sequence.masks[index]
-            write_png(renders / f"{name}.png", rgb_bytes(out.colour))
+            write_png(renders / f"{name}.png", bytes_image(out.colour))
             write_png(renders / f"{name}_comparison.png", triptych_picture(triptych(out.colour, truth, mask)))
             _link(renders / f"{name}.png", test / "renders" / f"{number:05d}.png")
-            write_png(test / "gt" / f"{number:05d}.png", rgb_bytes(truth))
+            write_png(test / "gt" / f"{number:05d}.png", bytes_image(truth))
             write_png(test / "masks" / f"{number:05d}.png", (mask * 255).astype("uint8"))  # white = tissue
 
 
@@ -85,41 +93,22 @@ def _link(source: Path, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _report_data(
-    folder: RunFolder,
-    sequence: Sequence,
-    metrics: RunEvaluation,
-    held_out: Mapping[int, RenderOut],
-    log: list[LogEntry],
-) -> ReportData:
-    run = metrics["run"]
-    about = run["input"]
-    rows = {row["frame"]: row for row in metrics["held_out"]["per_frame"]}
-    frames = tuple(
+def _worst_frames(
+    sequence: Sequence, per_frame: list[FrameMetrics], held_out: Callable[[int], RenderOut]
+) -> tuple[FramePictures, ...]:
+    rows = {row["frame"]: row for row in per_frame}
+    return tuple(
         FramePictures(
             index=i,
             name=sequence.names[i],
             time=float(sequence.times[i]),
-            render=held_out[i].colour,
+            render=held_out(i).colour,
             truth=sequence.frame(i).image,
             mask=sequence.masks[i],
-            depth=held_out[i].depth,
+            depth=held_out(i).depth,
             metrics=rows[i],
         )
         for i in sorted(worst_first(rows)[:MOST_SHOWN])
-    )
-    return ReportData(
-        title=f"{Path(about.get('source', '')).name}: {folder.path.absolute().name}",
-        evaluation=metrics,
-        log=log,
-        frames=frames,
-        components=(component_table(metrics),),
-        facts=facts(metrics),
-        configuration=config_to_toml(folder.config()),
-        versions=run["versions"],
-        input_hashes=about.get("files_sha256") or about.get("arrays_sha256", {}),
-        notes=tuple(about.get("notes", ())),
-        depth_unit=sequence.unit,
     )
 
 

@@ -6,7 +6,6 @@ readable on a phone. It links to the viewer page beside it, if there is one.
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,8 @@ from endotsr.evaluation.evaluate import left_out
 from endotsr.evaluation.records import Means
 from endotsr.report import curves, figures, parts
 from endotsr.report.data import COLUMNS, DECIDING, FramePictures, ReportData
-from endotsr.report.run_text import pose_sentence, trajectory_sentence
-from endotsr.report.tables import html_table
-from endotsr.untrusted.writing import replace_text
+from endotsr.report.run_text import SHOWN, facts, pose_sentence, trajectory_sentence
+from endotsr.report.tables import duration, html_table
 
 Column = tuple[str, str, int, int]  # of COLUMNS
 MetricsRow = tuple[str, Mapping[str, Any], str]  # label, means by metric, and the kind of row
@@ -48,8 +46,8 @@ def headline(data: ReportData) -> str:
     seconds = curves.series(data.log, "seconds")[1]
     if gaussians.size:
         boxes.append(parts.card(parts.cell(int(gaussians[-1])), "", f"Gaussians at iteration {reached[-1]:.0f}"))
-    if "Training time" in data.facts:
-        boxes.append(parts.card(parts.text(data.facts["Training time"]), "", "training time"))
+    if run := data.evaluation.get("run"):
+        boxes.append(parts.card(duration(run["seconds"] or 0.0), "", "training time"))
     elif seconds.size:
         boxes.append(parts.card(f"{seconds.sum() / 60:.1f}", "min", "training time"))
     frames = f"{count} held-out frame{'s' if count != 1 else ''}" if count else "report"
@@ -169,7 +167,7 @@ def temporal_gap(data: ReportData) -> str:
             rows.append([parts.text(label), *(parts.number(value, digits) for value in values)])
         table = html_table(["Mean over frames", "Training", "Held-out", "Gap"], rows)
     chart = curves.frame_chart(data.evaluation, "psnr_tissue")
-    pair = f'<div class="charts">{table}{_chart(chart)}</div>' if chart else table
+    pair = f'<div class="charts">{table}{curves.chart_figure(chart)}</div>' if chart else table
     note = (
         "A model that reproduces its training frames better than the frames between them is limited by time, "
         "not by capacity: the difference is the temporal gap."
@@ -195,17 +193,12 @@ def _motion(data: ReportData) -> str:
     return "".join(f"<p>{parts.text(sentence)}</p>" for sentence in sentences)
 
 
-def _chart(chart: curves.Chart) -> str:
-    light, dark = curves.chart_png(chart, "light"), curves.chart_png(chart, "dark")
-    caption = f"<figcaption>{parts.text(chart.title)}</figcaption>"
-    return f"<figure>{caption}{parts.themed_image(light, dark, chart.title)}</figure>"
-
-
 def training(data: ReportData) -> str:
     """The curves of the log."""
     found = curves.charts(data.log, data.evaluation)
-    figures_ = "".join(_chart(chart) for chart in found)
-    return parts.section("Training", f'<div class="charts">{figures_}</div>' if found else "")
+    return parts.section(
+        "Training", f'<div class="charts">{"".join(map(curves.chart_figure, found))}</div>' if found else ""
+    )
 
 
 def pictures(data: ReportData) -> str:
@@ -268,34 +261,37 @@ def _frame(frame: FramePictures, scale: float, span: tuple[float, float], opened
 
 
 def components(data: ReportData) -> str:
-    """Contributions of the components, as tables given with the data."""
-    blocks = []
-    for entry in data.components:
-        rows = [[_free_cell(value, column) for value, column in zip(row, entry.columns)] for row in entry.rows]
-        note = f'<p class="note">{parts.text(entry.note)}</p>' if entry.note else ""
-        blocks.append(f"<h3>{parts.text(entry.title)}</h3>{note}{html_table(entry.columns, rows)}")
-    return parts.section("Contribution of each component", *blocks)
-
-
-def _free_cell(value: Any, column: str) -> str:
-    return parts.number(value, 2) if isinstance(value, float) and "dB" in column else parts.cell(value)
+    """Held-out means of the model rendered without one component at a time."""
+    found, rows = data.evaluation.get("components", []), []
+    for row in found:
+        ours, whole = row.get("psnr_tissue"), found[0].get("psnr_tissue")
+        gain = None if ours is None or whole is None or row is found[0] else ours - whole
+        change = "" if gain is None else f"{gain:+.2f} dB"
+        rows.append([parts.text(row["label"]), *(parts.number(row.get(key), n) for key, _, n in SHOWN), change])
+    note = (
+        "Held-out means of the trained model, rendered with the named residual set to zero. Component L, the Laplacian "
+        "loss, acts in training only; to see it, train with --model.no-laplacian."
+    )
+    table = html_table(["Rendered", *(label for _, label, _ in SHOWN), "Change, PSNR tissue"], rows) if rows else ""
+    return parts.section("Contribution of each component", table, note=note)
 
 
 def the_run(data: ReportData) -> str:
     """Facts, configuration, versions and input hashes."""
-    pairs = data.facts | (
-        {"Versions": ", ".join(f"{k} {v}" for k, v in data.versions.items())} if data.versions else {}
-    )
-    facts = "".join(f"<dt>{parts.text(k)}</dt><dd>{parts.cell(v)}</dd>" for k, v in pairs.items())
-    blocks = [f'<div class="panel"><dl>{facts}</dl></div>' if facts else ""]
-    if data.notes:
-        lines = "".join(f"<li>{parts.text(note)}</li>" for note in data.notes)
+    run, blocks = data.evaluation.get("run"), []
+    about = run["input"] if run else {}
+    if run:
+        pairs = facts(run) | {"Versions": ", ".join(f"{k} {v}" for k, v in run["versions"].items())}
+        listed = parts.definitions((parts.text(k), parts.cell(v)) for k, v in pairs.items())
+        blocks.append(f'<div class="panel">{listed}</div>')
+    if notes := about.get("notes"):
+        lines = "".join(f"<li>{parts.text(note)}</li>" for note in notes)
         blocks.append(parts.details("Assumptions and findings of the reader", f"<ul>{lines}</ul>"))
     if data.configuration:
         content = f'<div class="panel"><pre>{parts.text(data.configuration)}</pre></div>'
         blocks.append(parts.details("Configuration (TOML)", content))
-    if data.input_hashes:
-        rows = [[parts.text(k), f"<code>{parts.text(v)}</code>"] for k, v in data.input_hashes.items()]
+    if hashes := about.get("files_sha256") or about.get("arrays_sha256"):
+        rows = [[parts.text(k), f"<code>{parts.text(v)}</code>"] for k, v in hashes.items()]
         summary = f"Input files<small>{len(rows)}, SHA-256</small>"
         blocks.append(parts.details(summary, html_table(["File", "SHA-256"], rows)))
     return parts.section("The run", *blocks)
@@ -312,15 +308,6 @@ def footer(data: ReportData) -> str:
 
 
 SECTIONS = (headline, moving, held_out, temporal_gap, pictures, training, components, the_run, footer)
-
-
-def write_report(path: Path, data: ReportData) -> None:
-    """Write the page to `path`: complete or not at all (an older file stays until the new one is whole).
-
-    Raises   OSError as the file system reports it
-    """
-    content = report_html(data)
-    replace_text(Path(path), content)
 
 
 def report_html(data: ReportData) -> str:

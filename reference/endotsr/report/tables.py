@@ -1,7 +1,6 @@
-"""Tables from rows of text in three forms: aligned text, Markdown, HTML.
+"""Quantities as text, and tables of them in three forms: aligned text, Markdown, HTML.
 
-In: column heads, and rows whose cells are text already; for HTML, the cells are HTML already. Out: one string. The
-caller formats the numbers.
+In: column heads, and rows whose cells are text already; for HTML, the cells are HTML already. Out: one string.
 """
 
 import html
@@ -12,6 +11,23 @@ LONGEST_VALUE = 32  # characters of a cell that stands on one line
 FEW = 6  # columns after the first of a table that does not scroll on a telephone
 # Pixels of such a row, of the edges of a cell, of a letter of a cell and of a head (`report.parts.STYLE`, at 390 px).
 ROW, EDGES, LETTER, HEAD_LETTER = 355, 10, 7.9, 7.4
+
+
+def duration(seconds: float) -> str:
+    """1:02:03 or 2:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def memory(found: int | None) -> str:
+    """Bytes of memory as text; "memory not known" where the system does not report them."""
+    return f"{found / 1e9:.2f} GB" if found else "memory not known"
+
+
+def fixed(value: float | None, digits: int, sign: str = "") -> str:
+    """A number with fixed decimals, "-" without a value. sign = "+" shows the sign of every number."""
+    return "-" if value is None else f"{value:{sign}.{digits}f}"
 
 
 def plain(columns: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = (0,), rule: bool = False) -> str:

@@ -48,11 +48,11 @@ def repeat_iteration(run: str | Path, sequence: "Sequence | None" = None) -> Log
     Raises: Diverged as in the run; InputError if there is no diverged.npz or it cannot be used.
     """
     from endotsr.fitting.checkpoint import load_checkpoint
-    from endotsr.fitting.state import state_from_checkpoint, workshop
+    from endotsr.fitting.state import state_from_checkpoint, training_constants
     from endotsr.fitting.trainer import training_step
     from endotsr.runs.sources import load_run_sequence
 
     folder = open_run(Path(run))
     config = folder.config()
     state = state_from_checkpoint(load_checkpoint(folder.path / NAME), config)
-    return training_step(state, workshop(load_run_sequence(folder) if sequence is None else sequence, config))
+    return training_step(state, training_constants(load_run_sequence(folder) if sequence is None else sequence, config))

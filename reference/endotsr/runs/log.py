@@ -9,9 +9,11 @@ from typing import IO, cast
 from endotsr.errors import InputError
 from endotsr.fitting.records import LogEntry
 from endotsr.runs.files import finite, refuse_link
+from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import integer, number, parsed
 
 LONGEST_LINE = 1 << 20  # bytes
+LARGEST_LOG = 1 << 30  # bytes: several million iterations
 LONGEST_TAIL = 1 << 13  # bytes that hold the last line of a log, and more
 
 
@@ -70,6 +72,14 @@ def last_entry(path: Path) -> LogEntry | None:
     except OSError:
         return None
     return next((entry for line in reversed(lines) if (entry := _entry(line)) is not None), None)
+
+
+def log_until(path: Path, iteration: int) -> list[LogEntry]:
+    """The whole lines of a log up to an iteration, without those of anything else; none if there is no file."""
+    if not path.exists():
+        return []
+    lines = read_bytes(path, LARGEST_LOG).splitlines(keepends=True)
+    return [entry for line in lines if (entry := _entry(line)) is not None and entry["iteration"] <= iteration]
 
 
 def _entry(line: bytes) -> LogEntry | None:

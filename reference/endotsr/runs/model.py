@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from endotsr.config import Config
+from endotsr.config import Config, by_key
 from endotsr.errors import InputError
 from endotsr.runs.files import warn
 from endotsr.runs.folder import RunFolder
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from endotsr.scene.parameters import FrameParameters
 
 CHANGE_NO_NUMBER = {  # settings that may differ from the checkpoint's; the length of the run is `training.iterations`
+    "preset",
     "training.threads",
     "training.checkpoint_every",
     "training.visits_per_frame",
@@ -96,8 +97,8 @@ def _checkpoint_of(folder: RunFolder, config: Config) -> tuple["Checkpoint", boo
             f"{folder.checkpoint}: trained on another sequence than the one in {folder.path / 'run.json'}; "
             "allowed: checkpoint and records of one run, as it wrote them"
         )
-    asked = dict(_named(msgspec.json.decode(msgspec.json.encode(config))))  # as JSON, which the checkpoint holds
-    for key, value in (*_named(checkpoint.header.get("config")), *_seen_in_arrays(checkpoint, config)):
+    asked = by_key(msgspec.json.decode(msgspec.json.encode(config)))  # as JSON, which the checkpoint holds
+    for key, value in (*by_key(checkpoint.header.get("config")).items(), *_seen_in_arrays(checkpoint, config)):
         if key in asked and key not in CHANGE_NO_NUMBER and asked[key] != value:
             raise InputError(
                 f"{folder.checkpoint}: trained with {key} = {value!r}, but {folder.path / 'config.toml'} says "
@@ -110,13 +111,6 @@ def sequence_fingerprint(record: RunRecord) -> str | None:
     """SHA-256 over the hashes of the pictures, times and cameras in run.json; None where it holds none."""
     hashes = record.get("input", {}).get("arrays_sha256")
     return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest() if hashes else None
-
-
-def _named(settings: Any) -> Iterator[tuple[str, Any]]:
-    """`section.key` and value of every setting; none where there are no sections."""
-    for section, values in settings.items() if isinstance(settings, dict) else ():
-        for key, value in values.items() if isinstance(values, dict) else ():
-            yield f"{section}.{key}", value
 
 
 def _seen_in_arrays(checkpoint: "Checkpoint", config: Config) -> Iterator[tuple[str, Any]]:

@@ -8,11 +8,9 @@ few iterations of a model without motion, which is thrown away.
 import statistics
 import time
 
-import msgspec
-
-from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations
+from endotsr.config import QUICK, SHARP, Config, lengthened, with_iterations, with_settings
 from endotsr.errors import InputError
-from endotsr.fitting.state import new_training, workshop
+from endotsr.fitting.state import new_training, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.sequences.checks.cost import at_start, iteration_work, work_left
 from endotsr.sequences.sequence import Sequence
@@ -30,20 +28,15 @@ def paced(config: Config, x: float) -> Config:
     def between(low: int, high: int, at: float) -> int:
         return max(1, round(low * (high / low) ** at))
 
-    growing, first, best = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
+    growing, quick, sharp = min(x, 1.0), QUICK.initialisation, SHARP.initialisation
     timed = with_iterations(config, between(QUICK.training.iterations, SHARP_LENGTH, x))
     maximum = between(QUICK.density.maximum, SHARP.density.maximum, growing)
     points = {
-        name: between(getattr(first, name), getattr(best, name), growing)
+        name: between(getattr(quick, name), getattr(sharp, name), growing)
         for name in ("first_frame_points", "other_frame_points")
     }
-    replace = msgspec.structs.replace
-    return replace(
-        timed,
-        density=replace(timed.density, growth="budget", maximum=maximum),
-        initialisation=replace(timed.initialisation, **points),
-        training=replace(timed.training, coarse_start=x <= COARSE_BELOW),
-    )
+    density, training = {"growth": "budget", "maximum": maximum}, {"coarse_start": x <= COARSE_BELOW}
+    return with_settings(timed, density=density, initialisation=points, training=training)
 
 
 def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -> Config:
@@ -71,16 +64,13 @@ def paced_for(minutes: float, sequence: Sequence, config: Config, unit: float) -
 
 def seconds_of_unit(sequence: Sequence, config: Config) -> float:
     """Seconds of a unit of work on this machine and this clip: the median of a few iterations, kernels compiled."""
-    replace = msgspec.structs.replace
-    first = replace(QUICK.initialisation, motion="none")
-    short = replace(
-        config, initialisation=first, training=replace(config.training, bridge_fraction=0.0, coarse_start=False)
-    )
-    state, shop, found = new_training(sequence, short), workshop(sequence, short), []
+    still = with_settings(QUICK.initialisation, motion="none")
+    short = with_settings(config, initialisation=still, training={"bridge_fraction": 0.0, "coarse_start": False})
+    state, constants, found = new_training(sequence, short), training_constants(sequence, short), []
     state.lambda_lap = state.lambda_lap or 0.0
     for _ in range(WARM + TIMED):
         began = time.perf_counter()
-        training_step(state, shop)
+        training_step(state, constants)
         seconds = time.perf_counter() - began
         found.append(seconds / float(iteration_work(state.gaussians.count, sequence.width * sequence.height)))
     return statistics.median(found[WARM:])

@@ -1,4 +1,4 @@
-"""run.json: at the start of a run, and what that of another person may say.
+"""run.json: what that of any person may say.
 
 Every key that is there must have the type and the range below. A key may be missing: whoever needs it names it
 (`RunFolder.record`), because earlier versions wrote fewer.
@@ -9,8 +9,7 @@ from typing import Annotated, Any, TypedDict, cast
 
 import msgspec
 
-from endotsr.config import Config
-from endotsr.runs.machine import MachinePart, machine, now, versions
+from endotsr.runs.machine import MachinePart
 from endotsr.untrusted.json import Count, Fraction, Side, Text, typed
 
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
@@ -87,31 +86,6 @@ REPORTED = (
     *(f"machine.{key}" for key in ("processor", "cores", "memory_bytes", "system")),
 )
 """Keys of run.json that a report needs."""
-
-
-def new_record(command: list[str], config: Config, threads: int, source: InputPart) -> RunRecord:
-    """The entries of run.json at the start of a run.
-
-    command   command line of the run, one string a word
-    threads   kernel threads in use
-    source    `input_record` of the sequence
-    """
-    return {
-        "status": "running",
-        "command": command,
-        "started": now(),
-        "finished": None,
-        "seconds": 0.0,
-        "iterations_done": 0,
-        "lambda_lap": None,
-        "peak_memory_bytes": None,
-        "seed": config.training.seed,
-        "threads": threads,
-        "versions": versions(),
-        "machine": machine(),
-        "input": source,
-        "resumed": [],
-    }
 
 
 def checked_run_record(record: dict[str, Any], path: Path) -> RunRecord:

@@ -12,7 +12,8 @@ from endotsr.config import Config, checked
 from endotsr.errors import InputError
 from endotsr.runs.files import refuse_inside
 from endotsr.runs.folder import RunFolder
-from endotsr.runs.records import InputPart
+from endotsr.runs.machine import machine, now, versions
+from endotsr.runs.records import InputPart, RunRecord
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
@@ -59,6 +60,32 @@ def simulated_settings(simulator: SimulatorSettings, config: Config) -> Simulato
         "height": round(simulator.height * wanted.scale),
     }
     return checked(msgspec.to_builtins(simulator) | changes, SimulatorSettings, "command line", "simulator.")
+
+
+def start_record(
+    command: list[str], source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings, threads: int
+) -> RunRecord:
+    """The entries of run.json at the start of a run.
+
+    command   command line of the run, one string a word
+    threads   kernel threads in use
+    """
+    return {
+        "status": "running",
+        "command": command,
+        "started": now(),
+        "finished": None,
+        "seconds": 0.0,
+        "iterations_done": 0,
+        "lambda_lap": None,
+        "peak_memory_bytes": None,
+        "seed": config.training.seed,
+        "threads": threads,
+        "versions": versions(),
+        "machine": machine(),
+        "input": input_record(source, sequence, config, simulator),
+        "resumed": [],
+    }
 
 
 def input_record(source: str, sequence: Sequence, config: Config, simulator: SimulatorSettings) -> InputPart:

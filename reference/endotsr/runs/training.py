@@ -14,9 +14,7 @@ import shutil
 import time
 from typing import TYPE_CHECKING, Protocol
 
-import msgspec
-
-from endotsr.config import Config, config_to_toml
+from endotsr.config import Config, config_to_toml, with_settings
 from endotsr.errors import InputError
 from endotsr.fitting.divergence import Diverged
 from endotsr.fitting.records import LogEntry
@@ -24,7 +22,7 @@ from endotsr.runs.files import os_error_line
 from endotsr.runs.folder import RunFolder, create_run
 from endotsr.runs.log import RunLog
 from endotsr.runs.machine import now, peak_memory_bytes
-from endotsr.runs.records import ExtendedEntry, ResumedEntry, RunRecord, new_record
+from endotsr.runs.records import ExtendedEntry, ResumedEntry, RunRecord
 from endotsr.runs.stopping import finishing, stop_asked
 from endotsr.untrusted.writing import replace_text
 
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
 
     from endotsr.fitting.state import TrainingState
     from endotsr.sequences.sequence import Sequence
-    from endotsr.simulator.settings import SimulatorSettings
 
 
 FEWEST_SECONDS, MOST_SECONDS = 10.0, 300.0  # of training between two checkpoints
@@ -59,16 +56,6 @@ class Observer(Protocol):
 
     def close(self) -> None:
         """The training has ended."""
-
-
-def start_record(
-    command: list[str], source: str, sequence: "Sequence", config: Config, simulator: "SimulatorSettings", threads: int
-) -> RunRecord:
-    """run.json at the start of a run."""
-    from endotsr.runs.sources import input_record
-
-    about = input_record(source, sequence, config, simulator)
-    return new_record(command, config, threads, about)
 
 
 def train_new_run(
@@ -119,12 +106,10 @@ def extend_run(folder: RunFolder, iterations: int) -> None:
 
     with folder.locked():
         before = folder.config()
-        training = msgspec.structs.replace(before.training, iterations=iterations)
-        config = msgspec.structs.replace(before, training=training)
+        config = with_settings(before, training={"iterations": iterations})
         if folder.checkpoint.exists():
             save_training(folder, load_training(folder, before), config)
-        text = config_to_toml(config)
-        replace_text(folder.path / "config.toml", text)
+        replace_text(folder.path / "config.toml", config_to_toml(config))
         entry: ExtendedEntry = {"iterations": iterations, "before": before.training.iterations, "time": now()}
         folder.update({"extended": [*folder.record().get("extended", []), entry]})
 

@@ -14,7 +14,7 @@ from endotsr.config import Config, DensityConfig
 from endotsr.fitting import schedules
 from endotsr.fitting.adam import AdamState, adam_state, adam_update, regather
 from endotsr.fitting.objective import calibrate_on
-from endotsr.fitting.state import TrainingState, workshop
+from endotsr.fitting.state import TrainingState, training_constants
 from endotsr.fitting.trainer import training_step
 from endotsr.scene.density_control import densify, empty_statistics, gather_statistics, scene_extent
 from endotsr.scene.gaussians import Gaussians, arrays
@@ -108,12 +108,12 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     config = config_of(settings, dtype)
     sequence = sequence_of(inputs, settings["camera"])
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
-    shop = workshop(sequence, config)
+    constants = training_constants(sequence, config)
     given = config.loss.lambda_lap
-    weight = calibrate_on(gaussians, shop.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
+    weight = calibrate_on(gaussians, constants.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
-    log = [training_step(state, shop) | _sizes(state) for _ in range(config.training.iterations)]
+    log = [training_step(state, constants) | _sizes(state) for _ in range(config.training.iterations)]
     found: dict[str, Any] = {name: np.array([entry.get(key, 0.0) for entry in log]) for name, key in SERIES.items()}
     found |= {f"final_{name}": a for name, a in arrays(state.gaussians).items()}
     return found | {

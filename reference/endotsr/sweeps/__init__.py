@@ -1,9 +1,9 @@
 """Sweeps: lists of independent runs, on the cores of this machine or on a cluster, and what their results say.
 
 spec       a SPEC.toml, checked                 jobs      the runs of a spec, and what their folders say
-execute    one run: trained, continued, measured       capacity  workers, threads and memory of this machine
+execute    one run: trained, continued, measured       place     this machine, its memory and cores, or a cluster
 local      the runs on a pool of processes      cluster   the same runs on an existing Dask cluster
-place      one of the two, as a command asks    sweep     all of it, resumable run by run
+sweep      all of it, resumable run by run
 results    the table of the runs as JSON, CSV and Markdown
 ablation   the configurations of the paper's claims, and paired differences with intervals
 

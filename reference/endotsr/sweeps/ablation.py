@@ -9,19 +9,19 @@ from the smallest to the largest difference, which misses the true one in a quar
 """
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, Required, cast
 
 import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.evaluation.compare import CONFIDENCE, bootstrapped
+from endotsr.evaluation.records import MetricValues
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sweeps.execute import FINISHED
-from endotsr.sweeps.row import Level, RunRow
+from endotsr.sweeps.results import METRICS, RunRow
 
 FIXED = " fixed"  # ends the names of configurations that begin with the shared checkpoint, without density control
 NO_PRIOR = "S without prior"
-METRICS = ("psnr_full", "psnr_tissue", "ssim_full", "ssim_tissue", "lpips", "lpips_symmetric")
 COMPONENTS = {"A": "appearance", "S": "spectral_motion", "L": "laplacian"}
 MATCHED = ("iterations", "preset", "arrays_sha256")  # keys of a row that are equal in both runs of a pair
 
@@ -195,6 +195,16 @@ def _student(samples: tuple[FloatArray, ...]) -> Limits:
     freedom = variances.sum() ** 2 / sum(v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True))
     half = float(t.ppf((1 + CONFIDENCE) / 2, freedom) * np.sqrt(variances.sum()) / len(samples))
     return middle - half, middle + half
+
+
+class Level(MetricValues, total=False):
+    """The means of a configuration on a split, sequences weighted equally."""
+
+    split: Required[str]
+    configuration: Required[str]
+    runs: Required[int]
+    gaussians: float | None
+    training_psnr_tissue: float | None
 
 
 def levels(rows: Iterable[RunRow]) -> list[Level]:

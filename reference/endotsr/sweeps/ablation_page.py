@@ -4,15 +4,15 @@ In: rows of a sweep. Out: `ablation.json`, `ablation.md` and `ablation.png`, wri
 """
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypedDict, cast
 
 from endotsr.report import style
-from endotsr.report.tables import markdown
+from endotsr.report.tables import fixed, markdown
 from endotsr.runs.files import write_json
-from endotsr.runs.machine import machine, now, versions
-from endotsr.sweeps.ablation import Increment, increments, levels
+from endotsr.runs.machine import MachinePart, machine, now, versions
+from endotsr.sweeps.ablation import Increment, Level, increments, levels
 from endotsr.sweeps.execute import FAILED, FINISHED
-from endotsr.sweeps.row import AblationRecord, IncrementRow, RunRow
+from endotsr.sweeps.results import RunRow
 from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of ablation.json; raised when a key changes its name or meaning
@@ -24,6 +24,32 @@ ROW_KEYS = (
     "arrays_sha256",
 )  # fmt: skip
 SHOWN = (("psnr_full", "PSNR full, dB", 2), ("psnr_tissue", "PSNR tissue, dB", 2), ("lpips", "LPIPS", 4))
+
+
+IncrementRow = TypedDict(
+    "IncrementRow",
+    {
+        "claim": str, "with": str, "without": str, "published": float | None, "split": str, "metric": str,
+        "mean": float, "student_low": float | None, "student_high": float | None, "mean_low": float | None,
+        "mean_high": float | None, "median": float, "median_low": float | None, "median_high": float | None,
+        "pairs": int, "sequences": int, "of": list[dict[str, Any]],
+    },
+)  # fmt: skip
+"""A paired difference: contrast, split and metric; the fields of `Estimate`; and its pairs."""
+
+
+class AblationRecord(TypedDict):
+    """ablation.json."""
+
+    format: int
+    date: str
+    command: list[str]
+    machine: MachinePart
+    versions: dict[str, str]
+    runs: dict[str, Any]  # planned, finished, and the names of the failed ones
+    levels: list[Level]
+    increments: list[IncrementRow]
+    rows: list[RunRow]
 
 
 def ablation_record(rows: list[RunRow], command: list[str]) -> AblationRecord:
@@ -60,8 +86,7 @@ def write_ablation(out: Path, rows: list[RunRow], command: list[str]) -> Ablatio
     """Write the three files in the folder of the sweep; returns the content of ablation.json. Raises OSError."""
     record = ablation_record(rows, command)
     write_json(out / FILES[0], record)
-    text = ablation_markdown(record) + "\n"
-    replace_text(out / FILES[1], text)
+    replace_text(out / FILES[1], ablation_markdown(record) + "\n")
     if record["increments"]:
         draw(record, out / FILES[2])
     return record
@@ -83,8 +108,8 @@ def level_table(record: AblationRecord, split: str) -> str:
     chosen = [level for level in record["levels"] if level["split"] == split]
     columns = [column for column in SHOWN if any(level.get(column[0]) is not None for level in chosen)]
     rows = [
-        [level["configuration"], str(level["runs"]), *(_number(level.get(key), d) for key, _, d in columns),
-         _number(level.get("gaussians"), 0)]
+        [level["configuration"], str(level["runs"]), *(fixed(level.get(key), d) for key, _, d in columns),
+         fixed(level.get("gaussians"), 0)]
         for level in chosen
     ]  # fmt: skip
     return markdown(["configuration", "runs", *(head for _, head, _ in columns), "Gaussians"], rows)
@@ -100,9 +125,9 @@ def increment_table(record: AblationRecord, split: str) -> str:
         label = next(head for key, head, _ in SHOWN if key == found["metric"])
         stated = found["published"] if found["metric"] == "psnr_full" else None
         rows.append([
-            name_of(found), label, _signed(found["mean"], digits),
+            name_of(found), label, fixed(found["mean"], digits, "+"),
             *(interval_text(found, of, digits) for of in ("student", "mean")),
-            _signed(found["median"], digits), interval_text(found, "median", digits), _signed(stated, digits),
+            fixed(found["median"], digits, "+"), interval_text(found, "median", digits), fixed(stated, digits, "+"),
             f"{found['pairs']} on {found['sequences']}",
         ])  # fmt: skip
     heads = ("difference", "metric", "mean", "95 % interval", "bootstrap", "median", "bootstrap", "published", "pairs")
@@ -117,7 +142,7 @@ def name_of(found: IncrementRow) -> str:
 def interval_text(found: IncrementRow, of: str, digits: int) -> str:
     """An interval, `of` being student, mean or median: "-0.02 to +0.11"; "-" where one pair has none."""
     low, high = found.get(f"{of}_low"), found.get(f"{of}_high")
-    return "-" if low is None or high is None else f"{_signed(low, digits)} to {_signed(high, digits)}"
+    return "-" if low is None or high is None else f"{low:+.{digits}f} to {high:+.{digits}f}"
 
 
 def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
@@ -154,11 +179,3 @@ def _panel(axes: Any, chosen: list[IncrementRow]) -> None:
         axes.plot(*zip(*stated, strict=True), "x", color=style.ORANGE, zorder=4, label="as published")
     axes.set_yticks(list(places), [name_of(found) for found in chosen])
     axes.invert_yaxis()
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
-def _signed(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:+.{digits}f}"

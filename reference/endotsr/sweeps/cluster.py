@@ -117,7 +117,7 @@ def _work(
     if wrong := _difference(_fingerprint(), expected):
         return Outcome(job.name, FAILED, f"worker {worker.address}: {wrong}", ends_sweep=True)
     chosen = threads or max(1, usable_cores() // on_host.get(_host(worker.address), 1))
-    return execute(job, chosen, sequence, _Asked(Path(out) / STOP))
+    return execute(job, chosen, sequence, _StopFile(Path(out) / STOP))
 
 
 def _host(address: str) -> str:
@@ -125,7 +125,7 @@ def _host(address: str) -> str:
     return address.split("://")[-1].rsplit(":", 1)[0]
 
 
-class _Asked:
+class _StopFile:
     """Whether a file has appeared; looked for about once a second."""
 
     def __init__(self, file: Path) -> None:

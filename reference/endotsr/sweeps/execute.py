@@ -118,7 +118,8 @@ def _trained(job: Job, sequence: Sequence, threads: int, observer: Silent) -> Ru
 def _begun(job: Job, sequence: Sequence, threads: int, observer: Silent) -> RunFolder:
     """A new run, trained to the end."""
     from endotsr.runs.model import save_training
-    from endotsr.runs.training import start_record, train_new_run, train_run
+    from endotsr.runs.sources import start_record
+    from endotsr.runs.training import train_new_run, train_run
     from endotsr.sequences.record import record_of
 
     record = start_record([*COMMAND, job.name], job.source, sequence, job.config, job.simulator, threads)
@@ -152,16 +153,16 @@ def _start_state(job: Job, sequence: Sequence) -> "TrainingState":
 def _train_start(job: Job, sequence: Sequence, path: Path) -> None:
     """Train the other configuration to the iteration at which this one begins, with its own schedule."""
     from endotsr.fitting.compile_ahead import compile_ahead
-    from endotsr.fitting.state import new_training, save_state, workshop
+    from endotsr.fitting.state import new_training, save_state, training_constants
     from endotsr.fitting.trainer import training_step
     from endotsr.runs.stopping import stop_asked
 
     assert isinstance(job.start, Start)
     config = job.start.config
     compile_ahead(config, lambda line: None)
-    shop, state = workshop(sequence, config), new_training(sequence, config)
+    constants, state = training_constants(sequence, config), new_training(sequence, config)
     while state.iteration < job.start.iteration:
-        training_step(state, shop)
+        training_step(state, constants)
         if stop_asked():
             raise KeyboardInterrupt
     save_state(path, state, config)

@@ -6,12 +6,13 @@ A job holds all that another process or machine needs to make the run.
 
 import contextlib
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import msgspec
 
-from endotsr.config import Config, lengthened
+from endotsr.config import Config, by_key, lengthened, with_settings
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -93,12 +94,11 @@ def jobs_of(spec: Spec, out: Path, training_frames: Callable[[Job], int]) -> lis
     Raises:           InputError for a sequence that cannot be used, or two runs of one name.
     """
     names, jobs = sequence_names(spec.sequences), []
-    for seed in spec.seeds:
-        for source in spec.sequences:
-            for split in spec.splits or ("",):
-                for configuration in spec.configurations:
-                    job = _job(spec, configuration, names[source], source, split, seed, out)
-                    jobs.append(_lengthened(job, training_frames(job)))
+    for seed, source, split, configuration in product(
+        spec.seeds, spec.sequences, spec.splits or ("",), spec.configurations
+    ):
+        job = _job(spec, configuration, names[source], source, split, seed, out)
+        jobs.append(_lengthened(job, training_frames(job)))
     seen: set[str] = set()
     for job in jobs:
         if job.name.lower() in seen:
@@ -113,7 +113,7 @@ def _job(spec: Spec, configuration: Configuration, name: str, source: str, split
     run = file_word(f"{name}-{shown}-{configuration.name}-seed{seed}")
     start = None
     if configuration.start is not None:
-        other, iteration = configuration.start
+        other, iteration = configuration.start.configuration, configuration.start.iteration
         found = next(c for c in spec.configurations if c.name == other)
         start = Start(_of_run(found.config, split, seed), other, iteration)
     return Job(
@@ -124,12 +124,7 @@ def _job(spec: Spec, configuration: Configuration, name: str, source: str, split
 
 def _of_run(config: Config, split: str, seed: int) -> Config:
     """The settings with the split and the seed of a run."""
-    sequence = config.sequence
-    if split:
-        sequence = msgspec.structs.replace(sequence, **split_settings(split))
-    return msgspec.structs.replace(
-        config, sequence=sequence, training=msgspec.structs.replace(config.training, seed=seed)
-    )
+    return with_settings(config, sequence=split_settings(split) if split else {}, training={"seed": seed})
 
 
 def _lengthened(job: Job, training_frames: int) -> Job:
@@ -165,11 +160,10 @@ def measured_at_the_end(job: Job) -> bool:
 
 def refuse_other_settings(job: Job, folder: RunFolder) -> None:
     """Raises InputError if the folder holds a run of other settings than those of the job, threads apart."""
-    ours, theirs = msgspec.to_builtins(job.config), msgspec.to_builtins(folder.config())
-    for section, values in ours.items():
-        for key, value in values.items() if isinstance(values, dict) else ():
-            if theirs[section][key] != value and (section, key) != ("training", "threads"):
-                raise InputError(
-                    f"{folder.path}: holds a run with {section}.{key} = {theirs[section][key]!r}, the sweep asks for "
-                    f"{value!r}; allowed: the settings that the sweep began with, or another --out"
-                )
+    theirs = by_key(msgspec.to_builtins(folder.config()))
+    for key, value in by_key(msgspec.to_builtins(job.config)).items():
+        if theirs[key] != value and key not in ("preset", "training.threads"):
+            raise InputError(
+                f"{folder.path}: holds a run with {key} = {theirs[key]!r}, the sweep asks for {value!r}; allowed: the "
+                "settings that the sweep began with, or another --out"
+            )

@@ -5,16 +5,16 @@ reason of a failed one is kept in results.json alone.
 """
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Required, cast
 
 from endotsr.errors import InputError
-from endotsr.report.spreadsheet import csv_text
+from endotsr.evaluation.records import FrameMetrics, MetricValues
+from endotsr.report.comparison import csv_text
 from endotsr.report.tables import markdown
 from endotsr.runs.files import read_json, write_json
-from endotsr.runs.machine import now
+from endotsr.runs.machine import MachinePart, now
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job
-from endotsr.sweeps.row import RunRow
 from endotsr.untrusted.writing import replace_text
 
 FORMAT = 1  # of results.json; raised when a key changes its name or meaning
@@ -32,6 +32,37 @@ SHOWN = (
 )  # fmt: skip
 
 
+class RunRow(MetricValues, total=False):
+    """One run; a run that is not finished has no numbers, a failed one a reason."""
+
+    name: Required[str]
+    sequence: Required[str]
+    split: Required[str]
+    configuration: Required[str]
+    seed: Required[int]
+    status: Required[str]
+    reason: str
+    training_psnr_full: float | None
+    training_psnr_tissue: float | None
+    cross_fade_psnr_full: float | None
+    cross_fade_psnr_tissue: float | None
+    iterations: int | None
+    gaussians: int | None
+    seconds: float | None
+    peak_memory_bytes: int | None
+    threads: int | None
+    preset: str
+    width: int | None
+    height: int | None
+    arrays_sha256: dict[str, str]
+    settings: dict[str, Any]
+    per_frame: list[FrameMetrics]
+    baselines: dict[str, dict[str, Any]]  # label and mean of each
+    measures: dict[str, dict[str, Any]]
+    versions: dict[str, str] | None
+    machine: MachinePart | None
+
+
 def finished_row(job: Job) -> RunRow:
     """The numbers of a run that is trained and measured. Raises InputError if its metrics.json lacks a key."""
     path = Path(job.folder) / "metrics.json"
@@ -46,10 +77,7 @@ def finished_row(job: Job) -> RunRow:
         **{f"training_{name}": inside.get(name) for name in names},
         **{f"cross_fade_{name}": faded.get(name) for name in names},
         "iterations": run.get("iteration"),
-        "gaussians": run.get("gaussians"),
-        "seconds": run.get("seconds"),
-        "peak_memory_bytes": run.get("peak_memory_bytes"),
-        "threads": run.get("threads"),
+        **{name: run.get(name) for name in (*COSTS[1:], "threads", "versions", "machine")},
         "preset": run["settings"]["preset"],
         "width": run["input"].get("width"),
         "height": run["input"].get("height"),
@@ -58,8 +86,6 @@ def finished_row(job: Job) -> RunRow:
         "per_frame": held_out["per_frame"],
         "baselines": {name: {"label": row["label"], "mean": row["mean"]} for name, row in metrics["baselines"].items()},
         "measures": metrics.get("measures", {}),
-        "versions": run.get("versions"),
-        "machine": run.get("machine"),
     }
     return cast(RunRow, row)
 

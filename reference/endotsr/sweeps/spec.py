@@ -17,13 +17,13 @@ The runs are all combinations. Order of the settings: preset < iterations < sett
 
 import re
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Annotated, Any, NamedTuple, get_args
 
 import msgspec
 
 from endotsr.config import (
-    PRESETS,
     Config,
+    Section,
     SequenceConfig,
     checked,
     config_from_dict,
@@ -36,17 +36,45 @@ from endotsr.errors import InputError
 from endotsr.evaluation.measures import check_measures
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.untrusted.json import integer, listed, text
+from endotsr.untrusted.json import Text, integer
 from endotsr.untrusted.toml import read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9+_. -]{0,60}")
-KEYS = (
-    "sequences", "seeds", "splits", "measures", "preset", "iterations", "lpips", "keep_checkpoints", "settings",
-    "simulator", "configurations",
-)  # fmt: skip
 SPLITS = get_args(next(field.type for field in msgspec.structs.fields(SequenceConfig) if field.name == "split"))
 LONGEST_BLOCK = 1 << 20  # frames
-LARGEST = 1 << 53  # of a seed or a number of iterations
+Seed = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
+Iteration = Annotated[int, msgspec.Meta(ge=1, le=1 << 53)]
+
+
+class StartAt(Section, frozen=True, kw_only=True):
+    """The configuration and the iteration whose state a run begins with."""
+
+    configuration: Text
+    iteration: Iteration
+
+
+class ConfigurationKeys(Section, frozen=True, kw_only=True):
+    """The keys of a configuration beside its settings."""
+
+    preset: Text | None = None
+    iterations: Iteration | None = None
+    start: StartAt | None = None
+
+
+class SpecFile(Section, frozen=True, kw_only=True):
+    """The keys of SPEC.toml."""
+
+    sequences: Annotated[tuple[Text, ...], msgspec.Meta(min_length=1)]
+    seeds: Annotated[tuple[Seed, ...], msgspec.Meta(min_length=1)] = (0,)
+    splits: tuple[Text, ...] = ()
+    measures: tuple[Text, ...] = ()
+    preset: Text = "paper"
+    iterations: Iteration | None = None
+    lpips: Text | None = None
+    keep_checkpoints: bool = True
+    settings: dict[str, Any] = {}
+    simulator: SimulatorSettings = SimulatorSettings()
+    configurations: Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
 
 
 class Start(NamedTuple):
@@ -62,7 +90,7 @@ class Configuration(NamedTuple):
 
     name: str
     config: Config
-    start: tuple[str, int] | None  # name of the configuration and iteration that it begins with
+    start: StartAt | None
 
 
 class Spec(NamedTuple):
@@ -89,31 +117,16 @@ def spec_of(data: dict[str, Any], where: str, folder: Path) -> Spec:
     folder   paths are relative to it
     Raises:  InputError naming `where`, the key and what is allowed.
     """
-    for key in data:
-        if key not in KEYS:
-            raise InputError(f"{where}: unknown key {key}; allowed: {', '.join(KEYS)}")
-    for key in ("sequences", "configurations"):
-        if key not in data:
-            raise InputError(f"{where}: {key} is missing; allowed: at least one")
-    sequences = tuple(_source(word, where, folder) for word in _texts(data["sequences"], f"{where}: sequences"))
-    seeds = tuple(_seed(value, where) for value in listed(data.get("seeds", [0]), f"{where}: seeds"))
-    splits = tuple(_split(word, where) for word in _texts(data.get("splits", []), f"{where}: splits", least=0))
-    measures = _texts(data.get("measures", []), f"{where}: measures", least=0)
-    check_measures(measures, f"{where}: measures =")
-    for key, values in (("sequences", sequences), ("seeds", seeds), ("splits", splits)):
-        if len(set(values)) < len(values) or (key == "seeds" and not values):
-            raise InputError(f"{where}: {key}: one is named twice or none at all; allowed: each once")
-    lpips = data.get("lpips")
-    return Spec(
-        sequences,
-        seeds,
-        splits,
-        _configurations(data, where),
-        _simulator(data.get("simulator", {}), where),
-        measures,
-        None if lpips is None else str(folder / text(lpips, f"{where}: lpips")),
-        _switch(data.get("keep_checkpoints", True), f"{where}: keep_checkpoints"),
-    )
+    refuse_unknown_keys(data, SpecFile, where)
+    file = checked(data, SpecFile, where)
+    sequences = tuple(_source(word, where, folder) for word in file.sequences)
+    splits = tuple(_split(word, where) for word in file.splits)
+    check_measures(file.measures, f"{where}: measures =")
+    for key, values in (("sequences", sequences), ("seeds", file.seeds), ("splits", splits)):
+        if len(set(values)) < len(values):
+            raise InputError(f"{where}: {key}: one is named twice; allowed: each once")
+    made, lpips = _configurations(file, where), None if file.lpips is None else str(folder / file.lpips)
+    return Spec(sequences, file.seeds, splits, made, file.simulator, file.measures, lpips, file.keep_checkpoints)
 
 
 def split_settings(split: str) -> dict[str, Any]:
@@ -127,64 +140,43 @@ def split_name(settings: SequenceConfig) -> str:
     return f"{settings.split} {settings.block_length}" if settings.split in ("blocks", "end") else settings.split
 
 
-def _configurations(data: dict[str, Any], where: str) -> tuple[Configuration, ...]:
-    found = _table(data["configurations"], f"{where}: configurations")
-    if not found:
-        raise InputError(f"{where}: configurations: there is none; allowed: at least one table [configurations.NAME]")
-    made = [_configuration(name, values, data, where) for name, values in found.items()]
-    for configuration in made:
-        if configuration.start and configuration.start[0] not in found:
-            raise InputError(
-                f"{where}: configurations.{configuration.name}.start.configuration = {configuration.start[0]!r} is "
-                f"not allowed; allowed: {', '.join(found)}"
-            )
+def _configurations(file: SpecFile, where: str) -> tuple[Configuration, ...]:
+    made = tuple(_configuration(name, values, file, where) for name, values in file.configurations.items())
     starts = {configuration.name: configuration.start for configuration in made}
     for name, start in starts.items():
-        if start and starts[start[0]]:
-            raise InputError(
-                f"{where}: configurations.{name}.start: {start[0]} has a start itself; allowed: one without"
-            )
-    return tuple(made)
+        here = f"{where}: configurations.{name}.start"
+        if start and start.configuration not in starts:
+            allowed = ", ".join(starts)
+            raise InputError(f"{here}.configuration = {start.configuration!r} is not allowed; allowed: {allowed}")
+        if start and starts[start.configuration]:
+            raise InputError(f"{here}: {start.configuration} has a start itself; allowed: one without")
+    return made
 
 
-def _configuration(name: str, values: Any, data: dict[str, Any], where: str) -> Configuration:
+def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Configuration:
     here = f"{where}: configurations.{name}"
     if not NAME.fullmatch(name):
         raise InputError(f"{here}: the name is not allowed; allowed: letters, digits, space, + - _ . (at most 61)")
-    own = dict(_table(values, here))
-    start = own.pop("start", None)
-    preset = text(own.pop("preset", data.get("preset", "paper")), f"{here}: preset")
-    iterations = own.pop("iterations", data.get("iterations"))
-    if preset not in PRESETS:
-        raise InputError(f"{here}: preset = {preset!r} is not allowed; allowed: {', '.join(PRESETS)}")
-    config = PRESETS[preset]
-    if iterations is not None:
-        config = with_iterations(config, integer(iterations, f"{here}: iterations", low=1, high=LARGEST))
-    for changes in (_table(data.get("settings", {}), f"{where}: settings"), own):
+    if not isinstance(values, dict):
+        raise InputError(f"{here} = {values!r} is not allowed; allowed: a table of keys")
+    beside = ConfigurationKeys.__struct_fields__
+    keys = checked({key: value for key, value in values.items() if key in beside}, ConfigurationKeys, here)
+    config = config_from_dict({"preset": file.preset if keys.preset is None else keys.preset}, here)
+    if iterations := keys.iterations or file.iterations:
+        config = with_iterations(config, iterations)
+    for changes in (file.settings, {key: value for key, value in values.items() if key not in beside}):
         config = _changed(config, changes, here)
-    return Configuration(name, config, None if start is None else _start(start, f"{here}.start", config))
+    if keys.start:
+        integer(keys.start.iteration, f"{here}.start.iteration", low=1, high=config.training.iterations - 1)
+    return Configuration(name, config, keys.start)
 
 
 def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
+    if "preset" in changes:
+        raise InputError(f"{where}: settings.preset is not allowed; allowed: preset beside settings")
     changes = without_former_keys(changes, where, config.training.bridge_fraction)
     refuse_unknown_keys(changes, Config, where)
-    for section, values in changes.items():
-        if section == "preset":
-            raise InputError(f"{where}: settings.preset is not allowed; allowed: preset beside settings")
-        _table(values, f"{where}: {section}")
     return config_from_dict(merged(msgspec.to_builtins(config), changes), where)
-
-
-def _start(value: Any, where: str, config: Config) -> tuple[str, int]:
-    found = _table(value, where)
-    if set(found) != {"configuration", "iteration"}:
-        raise InputError(f"{where}: has the keys {', '.join(found) or 'none'}; allowed: configuration, iteration")
-    last = config.training.iterations - 1
-    return text(found["configuration"], where), integer(found["iteration"], f"{where}.iteration", low=1, high=last)
-
-
-def _seed(value: Any, where: str) -> int:
-    return integer(value, f"{where}: seeds", low=0, high=LARGEST)
 
 
 def _split(word: str, where: str) -> str:
@@ -208,28 +200,3 @@ def _source(word: str, where: str, folder: Path) -> str:
     if not there:
         raise InputError(f"{where}: sequences = {word!r} is not allowed; allowed: a folder, or {SIMULATED}")
     return str(found)
-
-
-def _simulator(value: Any, where: str) -> SimulatorSettings:
-    found = _table(value, f"{where}: simulator")
-    refuse_unknown_keys(found, SimulatorSettings, where, "simulator.")
-    return checked(found, SimulatorSettings, where, "simulator.")
-
-
-def _table(value: Any, where: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{where} = {value!r} is not allowed; allowed: a table of keys")
-    return value
-
-
-def _texts(value: Any, where: str, least: int = 1) -> tuple[str, ...]:
-    found = tuple(text(word, where) for word in listed(value, where))
-    if len(found) < least:
-        raise InputError(f"{where}: the list is empty; allowed: at least one")
-    return found
-
-
-def _switch(value: Any, where: str) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{where} = {value!r} is not allowed; allowed: true, false")
-    return value

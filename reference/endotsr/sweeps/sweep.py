@@ -16,12 +16,11 @@ from endotsr.errors import InputError
 from endotsr.runs.files import refuse_folder
 from endotsr.runs.log import last_iteration
 from endotsr.sequences.sequence import Sequence
-from endotsr.sweeps.capacity import Size
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome, loaded_sequence
 from endotsr.sweeps.jobs import RUNS, Job, finished_folder, jobs_of
 from endotsr.sweeps.locks import file_lock
-from endotsr.sweeps.results import failures, finished_row, open_row, write_results
-from endotsr.sweeps.row import RunRow
+from endotsr.sweeps.place import Size
+from endotsr.sweeps.results import RunRow, failures, finished_row, open_row, write_results
 from endotsr.sweeps.spec import Spec
 
 LOCK = "sweep.lock"

@@ -5,6 +5,8 @@ depth with random weights (as the signs of an L1 loss are), so that every settin
 """
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numba
@@ -13,6 +15,7 @@ import numpy as np
 from endotsr.bench.pairs import count_pairs
 from endotsr.fitting.model import SceneSaved, Spectral, scene_at, scene_reverse
 from endotsr.kernels.arrays import FloatArray
+from endotsr.kernels.threads import use_threads
 from endotsr.scene.gaussians import Gaussians
 from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderGrads, RenderOut, RenderSaved, render_forward, render_reverse
@@ -169,16 +172,13 @@ def seconds(prepared: Prepared) -> tuple[float, float]:
         return middle - began, time.perf_counter() - began
 
 
-class threads:
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
     """Run kernels with this number of threads within the block (None = unchanged)."""
-
-    def __init__(self, count: int | None) -> None:
-        self._count = count
-
-    def __enter__(self) -> None:
-        self._before = numba.get_num_threads()
-        if self._count is not None:
-            numba.set_num_threads(min(self._count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-
-    def __exit__(self, *_: object) -> None:
-        numba.set_num_threads(self._before)
+    before = numba.get_num_threads()
+    if count is not None:
+        use_threads(count)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)

@@ -1,20 +1,29 @@
-"""The rendered scene: one moment of a simulated scene, of a trained run, or of a file of Gaussians."""
+"""The rendered scene: one moment of a simulated scene, of a trained run, or of a file of Gaussians.
+
+A file is a 3DGS `.ply` (`export.ply`) or the `.npz` of `export.npz`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from endotsr.config import DEMO, ModelConfig, with_iterations
+from endotsr.config import DEMO, ModelConfig, with_iterations, with_settings
+from endotsr.errors import InputError
+from endotsr.export.npz import read_arrays
+from endotsr.export.ply import read_gaussians, sound
+from endotsr.export.scene import NEAR, STILL, facing_camera
+from endotsr.kernels.constants import Y00
 from endotsr.scene.gaussians import Gaussians, arrays
 from endotsr.splatting.camera import Camera, scale_camera
 
 SIMULATED_WIDTH, SIMULATED_HEIGHT = 128, 96
 ITERATIONS = 150  # of the training that gives the simulated scene its Gaussians
 POINTS = {"first_frame_points": 2500, "other_frame_points": 400}
+SIDE = 320  # pixels of the picture of a file
+OPACITY_STEP = 1 / 255  # of 8-bit files: an opacity of 0 or 1 means half a step from it
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,6 @@ class StudyScene:
 def simulated_scene(
     iterations: int = ITERATIONS,
     width: int = SIMULATED_WIDTH,
-    seed: int = 0,
     step: Callable[[], None] = lambda: None,
 ) -> StudyScene:
     """The simulated sequence after a short training with every component, in a picture `width` wide.
@@ -67,12 +75,11 @@ def simulated_scene(
     from endotsr.simulator.simulate import simulate
 
     height = width * SIMULATED_HEIGHT // SIMULATED_WIDTH
-    simulator = SimulatorSettings(width=width, height=height, seed=seed)
+    simulator = SimulatorSettings(width=width, height=height)
     sequence = simulate(simulator).sequence
-    config = with_iterations(DEMO, iterations)
     fraction = (width / SIMULATED_WIDTH) ** 2  # of the pixels, and so of the points
     points = {name: max(4, round(count * fraction)) for name, count in POINTS.items()}
-    config = msgspec.structs.replace(config, initialisation=msgspec.structs.replace(config.initialisation, **points))
+    config = with_settings(with_iterations(DEMO, iterations), initialisation=points)
     state = new_training(sequence, config)
     train(state, sequence, config, lambda entry: step(), lambda reached: None)
     frame = int(sequence.test_index[len(sequence.test_index) // 2])
@@ -111,6 +118,33 @@ def run_scene(path: Path, scale: float = 1.0) -> StudyScene:
         model.config.raster.near,
         None,
     )
+
+
+def splat_scene(path: Path, side: int = SIDE) -> StudyScene:
+    """The Gaussians of a file in a square picture, seen from the front. Raises InputError naming file and reason."""
+    path = Path(path)
+    gaussians = read_splats(path)
+    camera = facing_camera(gaussians.position, side)
+    distance = float(camera.translation[2] + np.median(gaussians.position[2]))
+    return StudyScene(
+        path.stem.removesuffix("_splats"),
+        f"{path.name}, {gaussians.count} trained Gaussians seen from the front",
+        gaussians, None, STILL, 0.0, camera, near=NEAR * distance, noise=None,
+    )  # fmt: skip
+
+
+def read_splats(path: Path) -> Gaussians:
+    """The Gaussians, float32; those with a number that is not finite are left out. Raises InputError."""
+    kind = path.suffix.lower()
+    if kind not in (".ply", ".npz"):
+        raise InputError(f"{path}: not a splat file; allowed: a name that ends in .ply or .npz")
+    if kind == ".ply":
+        return read_gaussians(path)
+    data = read_arrays(path)
+    opacity = np.clip(data["opacity"].astype(np.float64), OPACITY_STEP / 2, 1 - OPACITY_STEP / 2)
+    colour = (data["rgb"].astype(np.float64) - 0.5) / Y00
+    logit = np.log(opacity / (1 - opacity))
+    return sound(Gaussians(data["xyz"].T, data["quat_wxyz"].T, data["log_scale"].T, logit, colour.T[None]), path)
 
 
 def scaled(camera: Camera, scale: float) -> Camera:

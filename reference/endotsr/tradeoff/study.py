@@ -4,15 +4,14 @@ The result is one JSON-able dictionary, `tradeoff.json`; `text` and `budget` rea
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.runs.machine import dated
-from endotsr.tradeoff.front import Ranked, non_dominated
 from endotsr.tradeoff.measure import Prepared, RenderedFrame, errors, frame, prepare, seconds, terms
 from endotsr.tradeoff.results import FORMAT
 from endotsr.tradeoff.scenes import StudyScene
@@ -145,6 +144,23 @@ def _spread(values: NDArray[np.float64]) -> dict[str, float]:
 def cost_of(point: dict[str, Any], cost: str) -> float:
     """Seconds (median) or visits of a point."""
     return float(point["visits"] if cost == "visits" else point[cost]["median"])
+
+
+class Ranked(NamedTuple):
+    """A point of a work-precision diagram."""
+
+    name: str
+    cost: float
+    errors: tuple[float, ...]
+
+
+def non_dominated(points: Iterable[Ranked]) -> list[Ranked]:
+    """The Pareto front in cost and first error, cheapest first: what no other point matches at less cost or error."""
+    front: list[Ranked] = []
+    for point in sorted(points, key=lambda p: (p.cost, p.errors[0])):
+        if not front or point.errors[0] < front[-1].errors[0]:
+            front.append(point)
+    return front
 
 
 def _front(points: list[dict[str, Any]], candidates: set[str], cost: str) -> list[str]:

@@ -15,10 +15,10 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1e3:.3g} ms"
 
 
-def front_rows(result: dict[str, Any], cost: str = "forward") -> list[list[str]]:
-    """The settings that are not dominated, cheapest first: name, times, visits, errors."""
+def front_rows(result: dict[str, Any]) -> list[list[str]]:
+    """The settings that are not dominated, fastest first: name, times, visits, errors."""
     by_name = {p["name"]: p for p in result["points"]}
-    return [_row(by_name[name]) for name in result["fronts"][cost]]
+    return [_row(by_name[name]) for name in result["fronts"]["forward"]]
 
 
 COLUMNS = ("Setting", "frame", "with reverse", "visits", "largest error", "RMS", "worst gradient block")

@@ -85,28 +85,20 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
     Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
-    counted = _Counted(pictures)
-    writer = _write_gif if file.suffix.lower() == ".gif" else _write_video
-    replace_file(file, lambda temporary: writer(temporary, iter(counted), rate))
-    return counted.count
+    count = 0
 
-
-class _Counted:
-    """Pictures, counted while they pass."""
-
-    def __init__(self, pictures: Iterable[ByteImage]) -> None:
-        self.count, self._pictures = 0, pictures
-
-    def __iter__(self) -> Iterator[ByteImage]:
-        for picture in self._pictures:
-            self.count += 1
+    def counted() -> Iterator[ByteImage]:
+        nonlocal count
+        for count, picture in enumerate(pictures, start=1):
             yield picture
 
+    if file.suffix.lower() == ".gif":
+        replace_file(file, lambda temporary: _write_gif(temporary, counted(), rate))
+    else:
+        from endotsr.sequences.film_file import write_video
 
-def _write_video(file: Path, pictures: Iterator[ByteImage], rate: float) -> None:
-    from endotsr.sequences.film_file import write_video
-
-    write_video(file, (_even(picture) for picture in pictures), rate)
+        replace_file(file, lambda temporary: write_video(temporary, map(_even, counted()), rate))
+    return count
 
 
 def _even(picture: ByteImage) -> ByteImage:

@@ -18,7 +18,7 @@ from endotsr.errors import InputError
 from endotsr.evaluation.depth import normalised_depth
 from endotsr.export.scene import MovingScene
 from endotsr.fitting.model import raster_settings
-from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode_transparent
+from endotsr.report.figures import DEPTH_MAP, ERROR_MAP, colour_table, data_uri, depth_range, encode
 from endotsr.sequences.record import SequenceRecord
 from endotsr.sequences.sequence import Sequence
 from endotsr.untrusted.writing import replace_file
@@ -139,6 +139,6 @@ def held_out_frames(sequence: Sequence) -> list[HeldOut]:
     found = []
     for i in map(int, sequence.test_index):
         picture = np.dstack([sequence.images[i].transpose(1, 2, 0), sequence.masks[i] * np.uint8(255)])
-        uri = data_uri(encode_transparent(picture), "png")
+        uri = data_uri(encode(picture), "png")
         found.append(HeldOut(sequence.names[i], float(sequence.times[i]), uri))
     return found

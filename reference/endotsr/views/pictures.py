@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.evaluation.depth import normalised_depth
@@ -16,9 +17,9 @@ from endotsr.export.files import check_folder_name
 from endotsr.export.placement import Placement, placed_camera
 from endotsr.export.scene import MovingScene
 from endotsr.export.times import chosen_times
+from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv import write_png
-from endotsr.report.figures import ByteImage
-from endotsr.report.pictures import depth_bytes, depth_step, grey_bytes, rgb_bytes
+from endotsr.report.figures import ByteImage, bytes_image
 from endotsr.runs.files import refuse_unwritable, write_json
 from endotsr.runs.folder import refuse_existing
 from endotsr.runs.sources import load_run_sequence
@@ -27,7 +28,7 @@ from endotsr.splatting.camera import Camera
 from endotsr.splatting.render import RenderOut
 from endotsr.untrusted.writing import replacing_folder
 from endotsr.views.cameras import TURNING, pivot_depth_of
-from endotsr.views.film import check_film, film_rate, write_film
+from endotsr.views.film import check_film
 from endotsr.views.panels import NEEDS_TRUTH, Panel, scale_of, side_by_side
 from endotsr.views.plan import PlannedView, ViewRequest, check_request, views_of
 
@@ -36,6 +37,8 @@ ABOUT_DEPTH = {
     "accumulated": "not normalised by opacity",
     "normalised": "normalised by opacity",
 }
+DEPTH_LEVELS = 65535  # of a 16-bit picture
+DEPTH_HEADROOM = 1.5  # over the largest prior depth, since rendered depth may be a little larger
 
 
 class ReadFrames(Protocol):
@@ -73,13 +76,14 @@ def requested_views(scene: MovingScene, request: ViewRequest, default: str) -> l
     default   frames to show if no times are chosen
     Raises: InputError as `views_of`, before the model is read; and as `MovingScene.model`.
     """
-    check_request(request, scene.record, default)
+    wanted = chosen_times("render", request.times, scene.record, default)
+    check_request(request, scene.record.count)
     pivot_depth, _ = 1.0, scene.model
     if request.camera in TURNING:
-        time, frame, _, _ = chosen_times("render", request.times, scene.record, default)[0]
+        time, frame, _, _ = wanted[0]
         out = scene.render(time, scene.cameras[frame])
         pivot_depth = pivot_depth_of(out.depth, out.opacity)
-    return views_of(request, scene.record, scene.cameras, pivot_depth, default, scene.placement)
+    return views_of(request, wanted, scene.cameras, pivot_depth, scene.placement)
 
 
 def check_outputs(out: Path | None, film: Path | None, rate: float | None = None, slow: float | None = None) -> None:
@@ -92,11 +96,6 @@ def check_outputs(out: Path | None, film: Path | None, rate: float | None = None
     if film is not None:
         check_film(film, rate, slow)
         refuse_unwritable(film)
-
-
-def rate_of(film: Path, scene: MovingScene, views: list[PlannedView], rate: float | None, slow: float | None) -> float:
-    """Pictures a second of a film of these views, see `film_rate`. Raises InputError."""
-    return rate or film_rate(film, [view.time for view in views], scene.record.duration, slow)
 
 
 def frames_of(
@@ -163,36 +162,36 @@ def _entry(view: PlannedView, placement: Placement) -> dict[str, Any]:
 
 
 def _write_view(target: Path, label: str, out: RenderOut, step: float, npy: bool) -> None:
-    write_png(target / "colour" / f"{label}.png", rgb_bytes(out.colour))
+    write_png(target / "colour" / f"{label}.png", bytes_image(out.colour))
     write_png(target / "depth" / f"{label}.png", depth_bytes(out.depth, step))
-    write_png(target / "opacity" / f"{label}.png", grey_bytes(out.opacity))
+    write_png(target / "opacity" / f"{label}.png", np.rint(np.clip(out.opacity, 0, 1) * 255).astype(np.uint8))
     if npy:
         for name in ("colour", "depth", "opacity"):
             np.save(target / name / f"{label}.npy", getattr(out, name))
+
+
+def depth_step(largest_depth: float, depth: FloatArray) -> float:
+    """Scene units of one step of a 16-bit depth picture: a power of two that leaves headroom, one for all views."""
+    largest = max(largest_depth, float(np.nan_to_num(depth).max()), 1e-6) * DEPTH_HEADROOM
+    return float(2.0 ** np.ceil(np.log2(largest / DEPTH_LEVELS)))
+
+
+def depth_bytes(depth: FloatArray, step: float) -> NDArray[np.uint16]:
+    """(H, W) scene units as whole steps, clipped to 16 bits; 0 = no depth."""
+    return np.clip(np.rint(np.nan_to_num(depth) / step), 0, DEPTH_LEVELS).astype(np.uint16)
 
 
 def _as_json(camera: Camera) -> dict[str, Any]:
     return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in camera._asdict().items()}
 
 
-def write_views_film(
-    file: Path,
-    pictures: Iterator[tuple[PlannedView, RenderOut]],
-    look: Look,
-    rate: float,
-    sequence: ReadFrames | None = None,
-) -> int:
-    """Write a film of panels; returns the number of its pictures.
-
-    sequence   the frames; needed for the panels truth and error
-    """
-    return write_film(file, film_pictures(pictures, look, sequence), rate)
-
-
 def film_pictures(
     pictures: Iterator[tuple[PlannedView, RenderOut]], look: Look, sequence: ReadFrames | None = None
 ) -> Iterator[ByteImage]:
-    """The panels of every view; depth and error have the same colours in all of them."""
+    """The panels of every view; depth and error have the same colours in all of them.
+
+    sequence   the frames; needed for the panels truth and error
+    """
     scale = None
     for view, out in pictures:
         scale = scale or scale_of(out.depth)

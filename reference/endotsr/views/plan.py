@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from endotsr.errors import InputError
 from endotsr.export.placement import HERE, Placement, training_camera
-from endotsr.export.times import Times, chosen_times
-from endotsr.sequences.record import SequenceRecord
+from endotsr.export.times import Times
 from endotsr.splatting.camera import Camera
 from endotsr.views.cameras import PATHS, along, checked_side, fitted, path_cameras, read_cameras, shifted
 
@@ -37,16 +36,15 @@ class ViewRequest(NamedTuple):
     angle: float = 8.0  # degrees, of orbit and sway
 
 
-def check_request(request: ViewRequest, record: SequenceRecord, default: str = "test") -> None:
-    """Everything that can be refused without a model and its cameras. Raises: InputError."""
-    chosen_times("render", request.times, record, default)
+def check_request(request: ViewRequest, count: int) -> None:
+    """Everything that can be refused without a model and its cameras, of `count` frames. Raises: InputError."""
     if request.size:
         read_size(request.size)
     if not 0.0 <= request.angle <= LARGEST_ANGLE:
         raise InputError(f"render: --angle {request.angle:g} is not allowed; allowed: 0 to {LARGEST_ANGLE:g} degrees")
     if not all(math.isfinite(number) for number in request.offset):
         raise InputError("render: --offset is not allowed; allowed: three finite numbers")
-    camera, count = request.camera, record.count
+    camera = request.camera
     if camera.lstrip("-").isdecimal() and not 0 <= int(camera) < count:
         raise InputError(f"render: --camera {camera} is not allowed; allowed: a frame from 0 to {count - 1}")
     if not (camera in PATHS or camera.isdecimal() or camera.lower().endswith(".json")):
@@ -56,24 +54,21 @@ def check_request(request: ViewRequest, record: SequenceRecord, default: str = "
 
 def views_of(
     request: ViewRequest,
-    record: SequenceRecord,
+    wanted: list[tuple[float, int, str, bool]],
     observed: list[Camera],
     pivot_depth: float,
-    default: str = "test",
     placement: Placement = HERE,
 ) -> list[PlannedView]:
     """The views of a request.
 
     request       checked by `check_request`
-    record        sequence.json
-    observed      the cameras of its frames
+    wanted        its `chosen_times`
+    observed      the cameras of the frames
     pivot_depth   depth of the point around which `orbit` and `sway` turn, scene units
-    default       frames to show if no times are chosen
     placement     of the outputs: the cameras of a file are in its axes
 
     Raises: InputError for a file of cameras that cannot be used.
     """
-    wanted = chosen_times("render", request.times, record, default)
     cameras, own = _cameras(request, observed, [frame for _, frame, _, _ in wanted], pivot_depth, placement)
     if any(request.offset):
         cameras = [shifted(camera, request.offset) for camera in cameras]

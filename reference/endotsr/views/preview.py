@@ -54,12 +54,11 @@ def preview_pictures(scene: MovingScene) -> list[ByteImage]:
     observed = [fitted(camera, PREVIEW_WIDTH, height) for camera in near]
     first = scene.render(float(wanted[0]), observed[0])
     moving = path_cameras("sway", observed, ANGLE, pivot_depth_of(first.depth, first.opacity))
-    return [_pair(scene, float(time), a, b) for time, a, b in zip(wanted, observed, moving)]
-
-
-def _pair(scene: MovingScene, time: float, observed: Any, moving: Any) -> ByteImage:
-    left, right = (bytes_image(scene.render(time, camera).colour) for camera in (observed, moving))
-    return np.concatenate([left, np.full((left.shape[0], GAP, 3), 255, np.uint8), right], axis=1)
+    found, gap = [], np.full((height, GAP, 3), 255, np.uint8)
+    for time, pair in zip(wanted, zip(observed, moving)):
+        left, right = (bytes_image(scene.render(float(time), camera).colour) for camera in pair)
+        found.append(np.concatenate([left, gap, right], axis=1))
+    return found
 
 
 def _animated(pictures: list[Any], quality: int) -> bytes:

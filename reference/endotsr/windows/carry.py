@@ -15,10 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import msgspec
 import numpy as np
 
-from endotsr.config import Config
+from endotsr.config import Config, with_settings
 from endotsr.equations.dictionary import dictionary_forward
 from endotsr.equations.motion import motion_forward
 from endotsr.errors import InputError
@@ -209,7 +208,7 @@ def _new_tissue(
     wanted = config.initialisation
     first = min(max(1, round(wanted.first_frame_points * fraction)), room)
     others = min(wanted.other_frame_points, room - first)
-    wanted = msgspec.structs.replace(wanted, first_frame_points=first, other_frame_points=others)
+    wanted = with_settings(wanted, first_frame_points=first, other_frame_points=others)
     try:
         points = training_points(replace(sequence, masks=missing), wanted, rng)
     except InputError:  # no depth where tissue is missing

@@ -7,19 +7,16 @@ whose neighbour has failed starts cold. Finished windows are kept, and one that 
 """
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations
+from endotsr.config import Config, config_to_toml, lengthened, load_config, with_iterations, with_settings
 from endotsr.errors import InputError
 from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.sweeps.capacity import Size
+from endotsr.sweeps.place import Size
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job, finished_folder
 from endotsr.sweeps.locks import file_lock
@@ -36,16 +33,14 @@ VISITS = 36  # least iterations of a cold window per training frame, unless the 
 WARM = 0.4  # of the iterations of a cold window, into which the schedule of a warm one is compressed
 
 
-def plan_recording(
-    source: Path, config: Config, wanted: Wanted, out: Path, on_frame: Callable[[], object] = lambda: None
-) -> WindowsRecord:
+def plan_recording(source: Path, config: Config, wanted: Wanted, out: Path) -> WindowsRecord:
     """Survey a recording and write the run folder with the plan of its windows; no window is trained.
 
     Raises: InputError for settings, a recording or a folder that cannot be used, and where no window remains.
     """
     refuse_existing(out)
     check_wanted(wanted, config.sequence)
-    found = survey(source, config.sequence, on_frame)
+    found = survey(source, config.sequence)
     windows, left_out = planned_windows(found, wanted, config.sequence)
     if not windows:
         raise InputError(f"{source}: no window remains: {left_out[0].reason}")
@@ -65,8 +60,7 @@ def with_visits(config: Config) -> Config:
 
     36 is what preset `demo` gives a window of 48 frames. 15 leave such a window far from a fit (B18).
     """
-    visits = max(VISITS, config.training.visits_per_frame)
-    return msgspec.structs.replace(config, training=msgspec.structs.replace(config.training, visits_per_frame=visits))
+    return with_settings(config, training={"visits_per_frame": max(VISITS, config.training.visits_per_frame)})
 
 
 def window_length(config: Config, training_frames: int) -> Config:
@@ -134,9 +128,9 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
     cold   also where the plan says warm; a window that was begun cold stays so
     """
     window, folder = record.windows[k], window_folder(run, record.windows[k])
-    sequence = msgspec.structs.replace(config.sequence, frames=frame_range(config.sequence.frames, window))
-    train, _ = split_frames(window.count, sequence.split, sequence.block_length)
-    own, start = window_length(msgspec.structs.replace(config, sequence=sequence), len(train)), None
+    config = with_settings(config, sequence={"frames": frame_range(config.sequence.frames, window)})
+    train, _ = split_frames(window.count, config.sequence.split, config.sequence.block_length)
+    own, start = window_length(config, len(train)), None
     begun_cold = (folder / "run.json").exists() and "start" not in open_run(folder).record()
     if window.start == "warm" and not cold and not begun_cold:
         neighbour, shorter = record.windows[k - 1], warm_settings(own)
@@ -155,10 +149,8 @@ def window_job(run: Path, record: WindowsRecord, k: int, config: Config, *, cold
 def warm_settings(cold: Config) -> Config:
     """The settings of a warm window: the schedule in fewer iterations, residuals and all degrees from the start."""
     shorter = with_iterations(cold, max(1, round(WARM * cold.training.iterations)))
-    training = msgspec.structs.replace(
-        shorter.training, residual_activation=0, harmonics_interval=1, coarse_start=False
-    )
-    return msgspec.structs.replace(shorter, training=training)
+    whole = {"residual_activation": 0, "harmonics_interval": 1, "coarse_start": False}
+    return with_settings(shorter, training=whole)
 
 
 def no_larger(config: Config, gaussians: int | None) -> Config:
@@ -169,7 +161,7 @@ def no_larger(config: Config, gaussians: int | None) -> Config:
     """
     if gaussians is None or gaussians >= config.density.maximum:
         return config
-    return msgspec.structs.replace(config, density=msgspec.structs.replace(config.density, maximum=max(1, gaussians)))
+    return with_settings(config, density={"maximum": max(1, gaussians)})
 
 
 def size_of(job: Job) -> Size:

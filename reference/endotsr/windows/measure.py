@@ -9,7 +9,7 @@ optical flow of the *recorded* frames, and
     d(t) = (I(t-1) - 2 I(t) + I(t+1)) / sqrt(6).
 
 The root mean square of d over the tissue is given for frames in an overlap (at a seam) and for all others (inside), of
-the model and of the recorded frames. It needs no resting camera, unlike `evaluation.flicker`.
+the model and of the recorded frames. It needs no resting camera, unlike `evaluation.measures.flicker`.
 """
 
 from collections.abc import Iterator
@@ -18,17 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from endotsr.evaluation.baselines import BASELINES, unit_image
-from endotsr.evaluation.evaluate import (
-    EVERY_TRAINING_FRAME,
-    FORMAT,
-    difference,
-    evaluate_model,
-    labelled,
-    measured_rows,
-)
+from endotsr.evaluation.baselines import unit_image
+from endotsr.evaluation.evaluate import EVERY_TRAINING_FRAME, FORMAT, evaluate_model, evaluation_record, measured_rows
 from endotsr.evaluation.lpips import LpipsWeights
-from endotsr.evaluation.records import EvaluationRecord, FramesMeasured
+from endotsr.evaluation.records import EvaluationRecord, FramesMeasured, FramesPart, LabelledFrames
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
 from endotsr.windows.make import window_cost
@@ -97,33 +90,24 @@ def _rendered(scene: WindowedScene, g: int) -> FloatArray:
 
 def _joined(parts: list[EvaluationRecord]) -> EvaluationRecord:
     """The metrics of all windows as those of one sequence: rows one after another, means over all of them."""
-    held_out, training = (_joined_rows([part[name] for part in parts]) for name in ("held_out", "training"))
-    baselines = {
-        name: labelled(label, _joined_rows([part["baselines"][name] for part in parts]))
-        for name, (label, _) in BASELINES.items()
-    }
-    return {
-        "format": FORMAT,
-        "frames": {
-            "total": sum(part["frames"]["total"] for part in parts),
-            "training": sum(part["frames"]["training"] for part in parts),
-            "held_out": [i for part in parts for i in part["frames"]["held_out"]],
-            "training_sample": [i for part in parts for i in part["frames"]["training_sample"]],
-            "tissue_fraction": float(np.mean([part["frames"]["tissue_fraction"] for part in parts])),
-        },
-        "held_out": held_out,
-        "training": training,
-        "temporal_gap": difference(training["mean"], held_out["mean"]),
-        "baselines": baselines,
-        "lpips_reason": parts[0]["lpips_reason"],
-        "not_finite": sum(part["not_finite"] for part in parts),
-    }
 
+    def joined_rows(found: list[FramesMeasured]) -> FramesMeasured:
+        rows = [row for part in found for row in part["per_frame"]]
+        return measured_rows(rows, sum(part["not_finite"] for part in found))
 
-def _joined_rows(parts: list[FramesMeasured]) -> FramesMeasured:
-    """Evaluations as one."""
-    rows = [row for part in parts for row in part["per_frame"]]
-    return measured_rows(rows, sum(part["not_finite"] for part in parts))
+    frames: FramesPart = {
+        "total": sum(part["frames"]["total"] for part in parts),
+        "training": sum(part["frames"]["training"] for part in parts),
+        "held_out": [i for part in parts for i in part["frames"]["held_out"]],
+        "training_sample": [i for part in parts for i in part["frames"]["training_sample"]],
+        "tissue_fraction": float(np.mean([part["frames"]["tissue_fraction"] for part in parts])),
+    }
+    held_out, training = (joined_rows([part[name] for part in parts]) for name in ("held_out", "training"))
+    baselines: dict[str, LabelledFrames] = {
+        name: {"label": row["label"], **joined_rows([part["baselines"][name] for part in parts])}
+        for name, row in parts[0]["baselines"].items()
+    }
+    return evaluation_record(frames, held_out, training, baselines, parts[0]["lpips_reason"])
 
 
 def _seams(scene: WindowedScene, frames: WindowFrames) -> dict[str, Any]:

@@ -11,7 +11,7 @@ Windows begin at multiples of the period of the split, counted from the stretch,
 the windows that share it (ruling in the specification).
 """
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -109,14 +109,10 @@ def _reasons(frames: list[SurveyedFrame]) -> list[str]:
     """Why each frame is left out; "" for a frame that is not."""
     reasons = [frame.fault for frame in frames]
     empty = [not frame.fault and frame.tissue < LEAST_TISSUE for frame in frames]
-    first = 0
-    while first < len(frames):
-        end = first
-        while end < len(frames) and empty[end]:
-            end += 1
-        if end - first >= EMPTY_RUN:
-            reasons[first:end] = [f"tissue on less than {LEAST_TISSUE:.0%} of the pixels"] * (end - first)
-        first = end + 1
+    for without_tissue, places in groupby(range(len(frames)), empty.__getitem__):
+        run = list(places)
+        if without_tissue and len(run) >= EMPTY_RUN:
+            reasons[run[0] : run[-1] + 1] = [f"tissue on less than {LEAST_TISSUE:.0%} of the pixels"] * len(run)
     return reasons
 
 

@@ -90,5 +90,4 @@ class WindowedRun:
         from endotsr.evaluation.lpips import load_lpips_weights
         from endotsr.windows.measure import measure_windows
 
-        weights = load_lpips_weights(None if lpips is None else Path(lpips))
-        return measure_windows(self.scene, WindowFrames(self.scene, self._source), weights)
+        return measure_windows(self.scene, WindowFrames(self.scene, self._source), load_lpips_weights(lpips))

@@ -4,7 +4,7 @@ In: a folder that `train` reads, and the settings of its section `sequence`. Out
 frame. Two frames are held in memory, however long the recording is.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,16 +47,15 @@ class _Shown(NamedTuple):
     depth: float | None  # median over the tissue, unit of the recording
 
 
-def survey(source: Path, config: SequenceConfig, on_frame: Callable[[], object] = lambda: None) -> list[SurveyedFrame]:
+def survey(source: Path, config: SequenceConfig) -> list[SurveyedFrame]:
     """Read every selected frame once.
 
     Motion and cuts are measured between frames that follow one another and can both be read. A frame begins another
     scene if its correlation with the frame before, moved along the flow, is below 0.5, or if the camera moves by more
     than a tenth of the depth or turns by more than 10 degrees.
 
-    on_frame  called after each frame
-    Raises:   InputError for a folder that `train` does not read, and for one of arbitrary unit, whose windows would
-              each have a scale of their own. A frame that cannot be read raises nothing: its fault says why.
+    Raises: InputError for a folder that `train` does not read, and for one of arbitrary unit, whose windows would each
+            have a scale of their own. A frame that cannot be read raises nothing: its fault says why.
     """
     readable_layout(source)
     recording = open_recording(source, SourceOptions(excluded_value=config.excluded_value))
@@ -66,12 +65,10 @@ def survey(source: Path, config: SequenceConfig, on_frame: Callable[[], object] 
         frames = parse_frame_range(config.frames, recording.count)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-    return list(_surveyed(recording, frames, config.masks != NO_MASKS, on_frame))
+    return list(_surveyed(recording, frames, config.masks != NO_MASKS))
 
 
-def _surveyed(
-    recording: Recording, frames: range, masked: bool, on_frame: Callable[[], object]
-) -> Iterator[SurveyedFrame]:
+def _surveyed(recording: Recording, frames: range, masked: bool) -> Iterator[SurveyedFrame]:
     before: _Shown | None = None
     for i in frames:
         found, shown = SurveyedFrame(recording.names[i]), None
@@ -84,7 +81,6 @@ def _surveyed(
             if before is not None:
                 found = found._replace(**_between(before, shown))
         before = shown
-        on_frame()
         yield found
 
 

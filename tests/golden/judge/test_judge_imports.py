@@ -9,7 +9,7 @@ import endotsr.golden.judge
 
 ROOM = Path(endotsr.golden.judge.__file__).parent
 OWN = ("endotsr.errors", "endotsr.golden.judge", "endotsr.untrusted.files", "endotsr.untrusted.names")
-LIBRARIES = {"numpy", "msgspec", "pytest"}  # pytest by the door for ports in Python, where it is called
+LIBRARIES = {"numpy", "msgspec", "pytest"}  # pytest by the tests of ports in Python
 
 
 def imported(path: Path) -> set[str]:

@@ -1,11 +1,17 @@
-"""`endotsr evaluate` with several methods: runs and pictures in one table, with paired differences."""
+"""`endotsr evaluate`: its options, the sequence that pictures show, and several methods in one table."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from endotsr.cli.parts.shown import ShownSettings, shown_sequence
+import msgspec
+
+from endotsr.cli.parts.fields import Option
+from endotsr.cli.parts.result import JsonFile
+from endotsr.config import PAPER, Section, SequenceConfig
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json, write_json
+from endotsr.runs.folder import open_run
 from endotsr.untrusted.writing import replace_text
 from endotsr.windows.record import is_windowed
 
@@ -14,24 +20,87 @@ if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
 
 
-class Comparison(NamedTuple):
-    """What is compared, and where the table goes."""
+class ShownSettings(Section, frozen=True, kw_only=True):
+    """The settings of a sequence, as options `--sequence.scale` and so on."""
 
-    methods: tuple[str, ...]  # run folders, JSON files, folders of pictures and videos, each PATH or NAME=PATH
-    baselines: bool  # of the first method
-    seed: int  # of the resampling
-    sequence: str | None  # that folders of pictures show; None = that of the first run
-    settings: ShownSettings  # of that sequence
-    lpips: Path | None
-    json: Path | None
-    csv: Path | None
+    sequence: SequenceConfig = SequenceConfig()
 
 
-def compare_methods(asked: Comparison) -> None:
-    """Print the means of every method and their differences to the first one frame by frame, with intervals."""
+SHOWN = ShownSettings()
+
+
+@dataclass
+class EvaluateOptions:
+    """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
+
+    Several METHODs are compared on the same held-out frames: means, and differences to the first one frame by frame.
+    Each is a run folder that was evaluated, a JSON file of --json, or pictures; NAME=PATH gives it another
+    name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
+
+    With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
+    of the run or on --sequence. One picture a held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
+    .npy (float, display units) in a folder, paired by the names of the frames, by their numbers, or in order; or a
+    video of all frames or of the held-out ones. The run, if one is named, is not changed.
+    """
+
+    methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
+    """run folder, or several methods to compare; with --pictures it may be left out"""
+    pictures: Annotated[Path | None, Option("FOLDER|VIDEO")] = None
+    """measure the pictures of this folder or video, not the run"""
+    label: Annotated[str, Option("TEXT")] = ""
+    """name of the method in the tables (default: the name of the folder)"""
+    sequence: Annotated[str | None, Option("SEQUENCE")] = None
+    """sequence folder, or `simulated`; of a run: its current location (default: the recorded one)"""
+    json: JsonFile = None
+    """also write the metrics as JSON"""
+    csv: Annotated[Path | None, Option("FILE", written=True)] = None
+    """also write the metrics of every held-out frame as CSV"""
+    lpips: Annotated[Path | None, Option("FILE")] = None
+    """AlexNet LPIPS weights (.npz)"""
+    measures: Annotated[tuple[str, ...], Option("NAME")] = ()
+    """measure more of a run, each with rows to compare: depth, flicker, right_view"""
+    view: bool = True
+    """write the viewer page that the report links to, view.html"""
+    compare: bool = False
+    """compare a single METHOD with its baselines as several are compared"""
+    baselines: bool = True
+    """compare the baselines of the first METHOD too"""
+    seed: int = 0
+    """seed of the resampling of a comparison"""
+    threads: int = 0
+    """threads, 0 = all cores"""
+    settings: Annotated[ShownSettings, Option(flat=True)] = SHOWN
+
+    @property
+    def run(self) -> Path | None:
+        """The one run folder."""
+        return Path(self.methods[0]) if self.methods else None
+
+
+def shown_sequence(command: str, run: Path | None, source: str | None, settings: ShownSettings) -> "Sequence":
+    """The sequence of `run` (at `source`, if it has moved), or the sequence `source` read with these settings.
+
+    Raises: InputError if neither is named, or if settings are given that the run has fixed.
+    """
+    from endotsr.runs.sources import load_run_sequence, load_sequence
+    from endotsr.simulator.settings import SimulatorSettings
+
+    if run is not None:
+        if settings != SHOWN:
+            raise InputError(f"{command}: --sequence.* beside {run} is not allowed: the run has fixed these settings")
+        return load_run_sequence(open_run(run), source)
+    if source is None:
+        raise InputError(f"{command}: --sequence is missing: the sequence that the pictures show, or a run folder")
+    return load_sequence(source, msgspec.structs.replace(PAPER, sequence=settings.sequence), SimulatorSettings())
+
+
+def compare_methods(asked: EvaluateOptions) -> None:
+    """Print the means of every method and their differences to the first one frame by frame, with intervals.
+
+    A method is a run folder, a JSON file, or a folder of pictures or a video, each PATH or NAME=PATH.
+    """
     from endotsr.evaluation.compare import compare, methods_of
-    from endotsr.report.comparison_text import METRICS, comparison_table
-    from endotsr.report.spreadsheet import comparison_csv
+    from endotsr.report.comparison import METRICS, comparison_csv, comparison_table
 
     if asked.seed < 0:
         raise InputError(f"evaluate: --seed {asked.seed} is not allowed; allowed: an integer >= 0")
@@ -46,8 +115,7 @@ def compare_methods(asked: Comparison) -> None:
     if asked.json:
         write_json(asked.json, {"against": methods[0].label, "rows": [_as_dict(row) for row in rows]})
     if asked.csv:
-        text = comparison_csv(rows)
-        replace_text(asked.csv, text)
+        replace_text(asked.csv, comparison_csv(rows))
 
 
 def _named(word: str) -> tuple[str, Path]:
@@ -59,7 +127,7 @@ def _named(word: str) -> tuple[str, Path]:
 
 
 def _metrics(
-    label: str, path: Path, asked: Comparison, paths: list[Path], sequence: "Sequence | None"
+    label: str, path: Path, asked: EvaluateOptions, paths: list[Path], sequence: "Sequence | None"
 ) -> tuple["EvaluationRecord", "Sequence | None"]:
     """The metrics of one argument, and the sequence if it had to be read."""
     if (path / "run.json").exists() or is_windowed(path):

@@ -18,6 +18,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import msgspec
 
+from endotsr.config import is_section
+
 REQUIRED: Any = dataclasses.MISSING  # the default of an option that must be given
 METAVARS = {int: "INT", float: "FLOAT", str: "TEXT"}
 
@@ -29,7 +31,9 @@ class Option:
     metavar: str = ""  # the value in the help; empty = derived from the type
     positional: bool = False  # given without a name
     may_be_empty: bool = False  # of several values: also without any value
+    written: bool = False  # a file that the command writes: refused before the work if it cannot be
     flat: bool = False  # a section of settings whose keys are options without the name of the field in front
+    short: tuple[str, ...] = ()  # keys of such a section that are options without their section, too: `--scale`
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,7 @@ class Field:
     metavar: str
     positional: bool
     may_be_empty: bool = False
+    written: bool = False
 
     @property
     def in_section(self) -> bool:
@@ -91,8 +96,11 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
         note, plain = _split_note(annotated)
         value = fallback if values is None else getattr(values, name)
         if is_section(plain):
-            inner = prefix if note.flat else f"{prefix}{name}."
-            yield from _walk(plain, value, (*path, name), inner, plain)
+            inside = list(_walk(plain, value, (*path, name), prefix if note.flat else f"{prefix}{name}.", plain))
+            for field in (field for field in inside if field.key in note.short):
+                short, about = f"--{field.key.rpartition('.')[2]}", f"{field.help} (= {field.name})"
+                yield dataclasses.replace(field, name=short, help=about, section=None)
+            yield from inside
         else:
             yield Field(
                 path=(*path, name),
@@ -104,12 +112,8 @@ def _walk(kind: type, values: Any, path: tuple[str, ...], prefix: str, section: 
                 metavar=note.metavar or _metavar(plain),
                 positional=note.positional,
                 may_be_empty=note.may_be_empty,
+                written=note.written,
             )
-
-
-def is_section(kind: Any) -> bool:
-    """Whether a type is a section of settings."""
-    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
 
 
 def _declared(kind: type) -> list[tuple[str, Any, Any]]:

@@ -15,22 +15,13 @@ from endotsr.config import (
     MILESTONES,
     Config,
     Preset,
+    by_key,
     config_from_dict,
-    with_fixed_length,
     with_iterations,
+    with_settings,
 )
 from endotsr.errors import InputError
 from endotsr.untrusted.toml import read_toml
-
-# Options that are a setting under a shorter name.
-SHORT_NAMES = {
-    "scale": "sequence.scale",
-    "frames": "sequence.frames",
-    "masks": "sequence.masks",
-    "seed": "training.seed",
-    "threads": "training.threads",
-}
-
 
 @dataclass
 class Sources:
@@ -60,9 +51,9 @@ def base_settings(words: list[str]) -> tuple[Config, str]:
         raise InputError(f"--iterations {sources.iterations} is not allowed; allowed: an integer >= 1")
     before = config.training.iterations
     if sources.schedule == "absolute":
-        training = msgspec.structs.replace(config.training, iterations=sources.iterations)
         note = f"schedule: {sources.iterations} iterations, milestones at their absolute iterations"
-        return with_fixed_length(msgspec.structs.replace(config, training=training)), note
+        length = {"iterations": sources.iterations, "visits_per_frame": 0}
+        return with_settings(config, training=length), note
     note = (
         f"schedule: stretched from {before} to {sources.iterations} iterations, every milestone keeps its fraction "
         "(--schedule absolute leaves them in place)"
@@ -95,31 +86,10 @@ def explicit_settings(options: type, words: list[str]) -> frozenset[str]:
     """Keys of the settings that the command line or its TOML file names: `model.bases`. A preset names none."""
     sources = parse_known(Sources, words)
     asked = read_toml(sources.config) if sources.config else {}
-    in_file = {f"{section}.{key}" for section, values in asked.items() if isinstance(values, dict) for key in values}
-    given = given_keys(options, words)
-    return frozenset(
-        in_file | {key for key in given if "." in key} | {SHORT_NAMES[k] for k in given & set(SHORT_NAMES)}
-    )
-
-
-def with_short_names(config: Config, given: dict[str, Any]) -> Config:
-    """The settings with the short options that were given (not None), checked."""
-    data = msgspec.to_builtins(config)
-    for name, value in given.items():
-        if value is not None:
-            section, key = SHORT_NAMES[name].split(".")
-            data[section][key] = value
-    return config_from_dict(data, "command line")
+    return frozenset(key for key in by_key(asked).keys() | given_keys(options, words) if "." in key)
 
 
 def differences(config: Config, other: Config, name: str) -> list[str]:
     """`section.key = value (name: other value)` for every setting that differs from the `other` called `name`."""
-    ours, theirs = msgspec.to_builtins(config), msgspec.to_builtins(other)
-    preset = [f"preset = {config.preset!r} ({name}: {other.preset!r})"] if config.preset != other.preset else []
-    return preset + [
-        f"{section}.{key} = {value!r} ({name}: {theirs[section][key]!r})"
-        for section, values in ours.items()
-        if isinstance(values, dict)
-        for key, value in values.items()
-        if value != theirs[section][key]
-    ]
+    ours, theirs = by_key(msgspec.to_builtins(config)), by_key(msgspec.to_builtins(other))
+    return [f"{key} = {ours[key]!r} ({name}: {theirs[key]!r})" for key in ours if ours[key] != theirs[key]]

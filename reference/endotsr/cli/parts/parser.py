@@ -17,6 +17,7 @@ from endotsr.cli.parts.help_page import help_page, short_fields, terminal_width
 from endotsr.cli.parts.mistakes import unknown_word
 from endotsr.config import allowed_values, checked, merged
 from endotsr.errors import InputError
+from endotsr.runs.files import refuse_unwritable
 
 T = TypeVar("T")
 HELP_ALL = "--help-all"
@@ -30,7 +31,8 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
 
     `--help` prints those that people set, `--help-all` prints all of them; both leave with SystemExit(0).
 
-    Raises:  InputError for an unknown option, a value of the wrong type or range, and a missing option.
+    Raises:  InputError for an unknown option, a value of the wrong type or range, a missing option, and a file that
+             cannot be written.
     """
     fields = fields_of(options, default)
     if HELP & set(words):
@@ -44,7 +46,9 @@ def parse(options: type[T], words: list[str], command: str, default: T | None = 
     if missing:
         names = ", ".join(f.name if f.positional else f"{f.name} {f.metavar}" for f in missing)
         raise InputError(f"{command}: missing: {names}; `endotsr {command} --help` lists the options")
-    return _built(options, fields, given, default)
+    found = _built(options, fields, given, default)
+    refuse_unwritable(*(getattr(found, field.path[0]) for field in fields if field.written))
+    return found
 
 
 def parse_known(options: type[T], words: list[str]) -> T:
@@ -54,7 +58,7 @@ def parse_known(options: type[T], words: list[str]) -> T:
 
 
 def given_keys(options: type, words: list[str]) -> frozenset[str]:
-    """Keys of the options that the words name: `model.bases` for `--model.bases 9`, `seed` for `--seed 3`."""
+    """Keys of the options that the words name: `model.bases` for `--model.bases 9`, `sequence.scale` for `--scale 3`."""
     fields = fields_of(options)
     named = {field.path: field.key for field in fields}
     return frozenset(named[path] for path in _given(fields, words)[0])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from endotsr.config import Config
 from endotsr.fitting.records import LogEntry
-from endotsr.report.words import duration
+from endotsr.report.tables import duration
 from endotsr.sequences.checks.cost import Standing, gaussians_at_end, iteration_work, work_left
 
 if TYPE_CHECKING:

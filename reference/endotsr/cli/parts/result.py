@@ -6,10 +6,10 @@ from typing import Annotated, Any
 from endotsr.cli.parts.fields import Option
 from endotsr.runs.files import write_json
 
-JsonFile = Annotated[Path | None, Option("FILE")]
+JsonFile = Annotated[Path | None, Option("FILE", written=True)]
 
 
 def write_result(file: Path | None, **result: Any) -> None:
     """Write the result as JSON if a file is named; paths become text, and numbers that are not finite null."""
     if file is not None:
-        write_json(file, {key: str(value) if isinstance(value, Path) else value for key, value in result.items()})
+        write_json(file, result)

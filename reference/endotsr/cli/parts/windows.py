@@ -1,12 +1,12 @@
 """`endotsr train --windows`, and the evaluation of such a run."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from endotsr.cli.parts.progress import StepBar
 from endotsr.config import Config
 from endotsr.errors import InputError
-from endotsr.report.words import duration
+from endotsr.report.tables import duration
 from endotsr.runs.files import refuse_inside, write_json
 from endotsr.runs.sources import SIMULATED
 
@@ -17,55 +17,37 @@ if TYPE_CHECKING:
 AUTO = "auto"
 
 
-class WindowsWanted(NamedTuple):
-    """What the options of `train` ask for."""
-
-    source: str
-    out: Path
-    config: Config
-    windows: str  # a number of frames, or auto
-    overlap: int
-    chain: int
-    place: "Place"
-
-
-def train_windows(asked: WindowsWanted, *, resume: bool) -> int:
-    """Plan the windows, unless a run is resumed, and train them; 0, or 1 if a window failed."""
+def train_windows(out: Path, place: "Place") -> int:
+    """Train the windows of a plan; 0, or 1 if a window failed."""
     from endotsr.sweeps.execute import FINISHED
-    from endotsr.sweeps.place import check_place, outcomes_at
+    from endotsr.sweeps.place import outcomes_at
     from endotsr.windows.make import make_windows, size_of
     from endotsr.windows.record import read_record
 
-    check_place("train", asked.place)
-    if not resume:
-        _plan(asked)
-    record = read_record(asked.out)
+    record = read_record(out)
     for gap in record.left_out:
         print(f"left out: frames {gap.first}:{gap.end}: {gap.reason}")
     for window in record.windows:
         print(f"window {window.name}: frames {window.first}:{window.end}, {window.start} start, {window.begins}")
-    outcomes = lambda jobs: outcomes_at(asked.place, jobs, asked.out, size_of, what="windows")
+    outcomes = lambda jobs: outcomes_at(place, jobs, out, size_of, what="windows")
     with StepBar("iterations") as bar:
-        found = make_windows(asked.out, outcomes, bar)
+        found = make_windows(out, outcomes, bar)
     return 0 if all(outcome.status == FINISHED for outcome in found) else 1
 
 
-def _plan(asked: WindowsWanted) -> None:
+def plan_windows(source: str, out: Path, config: Config, windows: str, overlap: int, chain: int) -> None:
+    """Survey a recording and write the plan of its windows: a number of frames each, or `auto`."""
     from endotsr.windows.make import plan_recording
     from endotsr.windows.plan import Wanted
 
-    if asked.source in ("", SIMULATED):
+    if source in ("", SIMULATED):
         raise InputError("train: --windows cuts a sequence folder; allowed: a folder of `prepare` or `simulate`")
-    frames = None if asked.windows == AUTO else _frames(asked.windows)
-    refuse_inside(asked.out, Path(asked.source), "the sequence")
-    print(f"reading every frame of {asked.source} once", flush=True)
-    plan_recording(Path(asked.source), asked.config, Wanted(frames, asked.overlap, asked.chain), asked.out)
-
-
-def _frames(text: str) -> int:
-    if not (text.isascii() and text.isdecimal()):
-        raise InputError(f"train: --windows {text!r} is not allowed; allowed: auto, or a number of frames")
-    return int(text)
+    if windows != AUTO and not (windows.isascii() and windows.isdecimal()):
+        raise InputError(f"train: --windows {windows!r} is not allowed; allowed: auto, or a number of frames")
+    refuse_inside(out, Path(source), "the sequence")
+    print(f"reading every frame of {source} once", flush=True)
+    wanted = Wanted(None if windows == AUTO else int(windows), overlap, chain)
+    plan_recording(Path(source), config, wanted, out)
 
 
 def evaluate_windows(run: Path, lpips: Path | None = None, source: str | None = None) -> dict[str, Any]:

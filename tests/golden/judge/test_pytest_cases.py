@@ -1,4 +1,4 @@
-"""The door for ports in Python: a right port, a wrong one, one that is not finished, and known failures."""
+"""One pytest test a case for ports in Python: a right port, a wrong one, one that is not finished, and known failures."""
 
 import textwrap
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endotsr.errors import InputError
-from endotsr.golden.judge.pytest_door import answered, door, explain
+from endotsr.golden.judge.pytest_cases import answered, explain, golden_test
 from endotsr.golden.judge.store import golden_folder, read_golden
 
 
@@ -45,9 +45,9 @@ def test_known_failures_are_strict(tmp_path):
             textwrap.dedent(f"""
             import sys
             sys.path.insert(0, {str(__file__.rsplit("/", 1)[0])!r})
-            from test_pytest_door import {port}
-            from endotsr.golden.judge.pytest_door import door
-            test_port = door({port}, level=1, known_failures={known!r})
+            from test_pytest_cases import {port}
+            from endotsr.golden.judge.pytest_cases import golden_test
+            test_port = golden_test({port}, level=1, known_failures={known!r})
             """)
         )
         found = pytest.main(["-q", "-p", "no:cacheprovider", "-p", "no:randomly", str(file)])
@@ -57,4 +57,4 @@ def test_known_failures_are_strict(tmp_path):
 def test_a_known_failure_that_is_no_case_is_refused(tmp_path):
     (tmp_path / "known.txt").write_text("motion/nothing\n")
     with pytest.raises(InputError, match="no such case"):
-        door(answer, known_failures=tmp_path / "known.txt")
+        golden_test(answer, known_failures=tmp_path / "known.txt")

@@ -17,7 +17,7 @@ from endotsr.golden.judge.verdict import CaseReport, judge_case
 Answer = Callable[[str, dict[str, NDArray], dict[str, Any]], Mapping[str, NDArray | float] | None]
 
 
-def door(
+def golden_test(
     answer: Answer,
     *,
     precision: Precision = "float32",
