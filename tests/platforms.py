@@ -23,8 +23,9 @@ from packaging.version import Version
 
 ROOT = Path(__file__).parents[1]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-SHOWN = ("numpy", "numba", "llvmlite", "scipy", "opencv-contrib-python-headless")
+SHOWN = ("numpy", "numba", "llvmlite", "scipy", "opencv-contrib-python-headless", "av")
 NO_OPENCV = dict.fromkeys(PYTHONS, "opencv-contrib-python-headless")
+NO_AV = dict.fromkeys(PYTHONS, "av")
 NO_NUMBA = {"3.14": "numba"}
 
 
@@ -42,7 +43,7 @@ SYSTEMS = (
     System("Windows ARM64", "aarch64-pc-windows-msvc", NO_OPENCV | {"3.11": "numba"}),
     System("macOS 15 Apple silicon", "aarch64-apple-darwin", {}, "15.0"),
     System("macOS 14 Apple silicon", "aarch64-apple-darwin", {}, "14.0"),
-    System("macOS 13 Apple silicon", "aarch64-apple-darwin", {}, "13.0"),
+    System("macOS 13 Apple silicon", "aarch64-apple-darwin", NO_AV, "13.0"),
     System("macOS 12 Apple silicon", "aarch64-apple-darwin", NO_OPENCV, "12.0"),
     System("macOS 15 Intel", "x86_64-apple-darwin", NO_NUMBA, "15.0"),
     System("macOS 14 Intel", "x86_64-apple-darwin", NO_NUMBA, "14.0"),
@@ -69,7 +70,7 @@ def resolved(system: System, python: str) -> dict[str, Any]:
     )  # fmt: skip
     found = {"system": system.name, "python": python}
     if done.returncode:
-        names = [name for name in SHOWN if name in done.stderr]
+        names = [name for name in SHOWN if f"`{name}`" in done.stderr or f"{name}>" in done.stderr]
         return found | {"complete": False, "lacks": names[0] if names else done.stderr[:300]}
     pairs = (line.split("==") for line in done.stdout.splitlines() if "==" in line)
     versions = {name: version.split(";")[0].strip() for name, version in pairs}
@@ -95,6 +96,7 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(words)
+    subprocess.run([sys.executable, "-m", "uv", "--version"], check=True)
     with ThreadPoolExecutor(4) as pool:
         rows = list(pool.map(lambda pair: resolved(*pair), [(s, p) for s in SYSTEMS for p in PYTHONS]))
     for row in rows:

@@ -61,6 +61,22 @@ def test_points_move_as_the_scene_does(tmp_path):
     assert about["nodes"][0]["rotation"] == [1, 0, 0, 0] and about["nodes"][0]["scale"] == [0.001] * 3, "mm"
 
 
+def test_another_program_reads_the_same_points(tmp_path):
+    """trimesh: metres, y up, z backward; `in_blender.py` compares the animation as well."""
+    trimesh = pytest.importorskip("trimesh")
+    scene = timed(2.0)
+    export(scene, tmp_path / "a.glb", Times((0.25, 0.9)), Content(least_opacity=0.6))
+    loaded = trimesh.load_scene(tmp_path / "a.glb")
+    (node,) = loaded.graph.nodes_geometry
+    placed, name = loaded.graph[node]
+    moment = scene.at(0.25)
+    chosen = 1 / (1 + np.exp(-moment.opacity_logit)) >= 0.6
+    x, y, z = placed_points(moment.position, scene.placement)[:, chosen] / 1e3
+    found = trimesh.transform_points(loaded.geometry[name].vertices, placed)
+    assert np.allclose(found, np.stack([x, -y, -z], axis=1), atol=1e-8)
+    assert len(loaded.geometry[name].colors) == len(found)
+
+
 def test_colours_are_linear(tmp_path):
     scene = timed(0.0)
     export(scene, tmp_path / "a.glb", Times((0.4,)))

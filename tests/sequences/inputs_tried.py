@@ -68,6 +68,7 @@ from input_kinds import (
     without_zeros,
 )
 from made_videos import HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven
+from odd_inputs import ODD_ROWS
 from test_stated_depth import WRONG as NO_LENGTHS
 from test_stated_depth import true_depth
 
@@ -278,6 +279,7 @@ ROWS = [
     Row("masks of a round field of view", scope, "told", "field of view: ", view_is_kept),
     *(Row(f"export to {name}", exported(name, *words), "refused", "allowed: FILE.ply")
       for name, *words in (("a.spz",), ("a.splat",), ("a.obj", "--content", "mesh"), ("a.gltf", "--content", "mesh"))),
+    *ODD_ROWS,
 ]  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
 
     milliseconds  of every frame; None: evenly spaced at `rate`
     more          `options` of the encoder, those of the `container`, `layout` (pixel format), `shape` (of a pixel),
-                  `transfer` (function)
+                  `transfer` (function), `primaries` (of colour)
     """
     with av.open(str(path), "w", options=more.get("container") or {}) as container:
         stream = container.add_stream(codec, rate=1000 if milliseconds else rate, options=more.get("options") or {})
@@ -48,6 +48,8 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
         stream.pix_fmt = more.get("layout") or "yuv420p"
         if "shape" in more:
             stream.codec_context.sample_aspect_ratio = more["shape"]
+        if "primaries" in more:
+            stream.codec_context.color_primaries = more["primaries"]
         if "transfer" in more:
             stream.codec_context.color_trc = more["transfer"]
         for i, pixels in enumerate(frames):

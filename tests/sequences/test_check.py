@@ -139,6 +139,11 @@ WRONG = {
     "pose jump": (lambda p: poses(p, jump), "pose-jump", "warning", 5),
     "pose turn": (lambda p: poses(p, turn), "pose-turn", "warning", 4),
     "poses in metres": (lambda p: poses(p, lambda r: drift(r, 1e-4 / 8)), "pose-unit", "warning", None),
+    "poses in micrometres": (lambda p: poses(p, lambda r: drift(r, 1e3)), "pose-unit", "warning", None),
+    "red and blue exchanged": (lambda p: each(p, "images", lambda x: x[:, :, ::-1]), "blue-pictures", "warning", None),
+    "two views in turn": (lambda p: each(p, "images", lambda x: np.roll(x, 20, 1), range(1, FRAMES, 2)),
+                          "alternating-views", "warning", None),
+    "65535 without depth": (lambda p: each(p, "depth", without), "marked-depth", "warning", None),
     "far away": (lambda p: poses(p, entry(0, 3, 1e9)), "far-from-origin", "note", None),
     "focal length in mm": (lambda p: poses(p, entry(2, 4, 4.0)), "field-of-view", "warning", None),
     "grey image": (lambda p: each(p, "images", lambda x: x[:, :, 0], [3]), "picture", "refusal", 3),
@@ -159,6 +164,10 @@ WRONG = {
 
 def cut(file):
     file.write_bytes(file.read_bytes()[:-20])
+
+
+def without(depth):
+    return np.where(np.arange(depth.shape[1]) < 4, 65535, depth).astype(np.uint16)
 
 
 def combed(image):

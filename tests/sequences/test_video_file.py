@@ -1,5 +1,6 @@
 """Videos: what they hold, decoded or refused, and never another picture, time or orientation in silence."""
 
+import av
 import numpy as np
 import pytest
 from made_videos import CAMERA, HEIGHT, INTERLACED, UNEVEN, WIDTH, picture, pictures, turn, woven, write
@@ -116,6 +117,21 @@ def test_a_video_that_shows_nothing_is_refused_by_prepare(tmp_path, capsys):
         said = capsys.readouterr().err
         assert ("all 6 frames are one picture" if name == "frozen" else "6 of 6 frames are black") in said
         assert "000000, 000001" in said and not (tmp_path / "o").exists()
+
+
+def test_metadata_that_are_no_text_do_not_hide_the_pictures(tmp_path):
+    """A title in another encoding, as recorders write it."""
+    with av.open(str(tmp_path / "a.mkv"), "w") as container:
+        container.metadata["title"] = "OPERATION"
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for shown in pictures(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="rgb24")))
+        container.mux(stream.encode())
+    data = (tmp_path / "a.mkv").read_bytes()
+    assert data.count(b"OPERATION") == 1
+    (tmp_path / "a.mkv").write_bytes(data.replace(b"OPERATION", b"OP\xc4RATI\xff"))
+    assert video_facts(tmp_path / "a.mkv").count == 3
 
 
 def test_a_truncated_video_is_refused(tmp_path):

@@ -49,7 +49,7 @@ class PrepareOptions:
     masks: Annotated[Path | None, Option("FOLDER")] = None
     """masks of another program, one a frame, or one file for all frames"""
     excluded_value: Literal["white", "black"] = "white"
-    """which value of these masks is excluded; white = any value above 0"""
+    """which value of these masks is excluded; white = above half of the largest value"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
     """depth of every frame: png, tiff, npy or pfm"""
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"

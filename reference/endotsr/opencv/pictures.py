@@ -36,6 +36,7 @@ STARTS = {  # kind of a file by its ending, and the first bytes of such a file
     ".exr": ("EXR", (b"v/1\x01",)),
 }
 PLUGINS = {"PNG": "PngImage", "JPEG": "JpegImage", "TIFF": "TiffImage", "WebP": "WebPImage", "BMP": "BmpImage"}
+GAMMA = 1 / 2.2  # as PNG states that of sRGB
 ORIENTATION = 0x0112  # EXIF tag: 1 = shown as it is stored
 GREY = ("1", "L")  # modes of Pillow
 NOT_DECODED = ("LA", "La", "PA", "LAB")  # of these OpenCV drops the transparency, or takes them for RGB
@@ -61,7 +62,10 @@ def read_picture(path: Path) -> Array:
 
 
 def other_profile(path: Path) -> bool:
-    """Whether a picture states a colour profile (ICC) that is not sRGB. False for a file that cannot be read."""
+    """Whether a picture states a colour profile (ICC) or a gamma (PNG) that is not that of sRGB.
+
+    False for a file that cannot be read.
+    """
     kind = "PNG" if path.suffix.lower() == ".png" else STARTS.get(path.suffix.lower(), ("", ()))[0]
     if kind not in PLUGINS:
         return False
@@ -70,9 +74,11 @@ def other_profile(path: Path) -> bool:
         if kind == "WebP":
             _check_size(_webp_size(data), path)
         with _plugin(kind)(io.BytesIO(data)) as picture:
-            profile = picture.info.get("icc_profile") or b""
+            profile, stated = picture.info.get("icc_profile") or b"", picture.info
     except Exception:  # the reader of the pixels names what is wrong
         return False
+    if not profile and "srgb" not in stated and abs(stated.get("gamma", GAMMA) - GAMMA) > GAMMA / 10:
+        return True
     return bool(profile) and not any("sRGB".encode(code) in profile for code in ("ascii", "utf-16-be"))
 
 

@@ -31,6 +31,7 @@ def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Pa
         raise InputError(f"{folder}: holds no {kinds}")
     _check_names_are_text(files)
     _check_names_alike(files)
+    _check_decimals(files)
     numbers = frame_numbers(files)
     if numbers is None:
         return files
@@ -113,6 +114,21 @@ def _check_names_alike(files: list[Path]) -> None:
         f"{files[odd]}: numbers in this name: {counts[odd]}; in the names of {frequency} of the {len(files)} files"
         f" here, {files[counts.index(usual)].name} for one: {usual}; {ALLOWED_NAMES}"
     )
+
+
+def _check_decimals(files: list[Path]) -> None:
+    """Refuse decimal numbers of unlike lengths: as whole numbers, the digits of 1.5 stand before those of 1.25.
+
+    A point is that of a decimal where the number before it varies too, or where the name is nothing else.
+    """
+    for column in zip(*(re.findall(r"(\d+)\.(\d+)", file.stem) for file in files)):
+        other = next((i for i, (_, part) in enumerate(column) if len(part) != len(column[0][1])), 0)
+        alone = all(re.fullmatch(r"\d+\.\d+", file.stem) for file in files)
+        if other and (alone or len({whole for whole, _ in column}) > 1):
+            raise InputError(
+                f"{files[other]}: another number of decimals than in {files[0].name}, so that the"
+                " order is not certain; allowed: decimals of one length, such as 1.50 and 1.25"
+            )
 
 
 def _digit_columns(files: list[Path]) -> list[list[int]]:

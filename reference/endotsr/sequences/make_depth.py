@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.sequences.checks.depth import LITTLE, depth_facts, mark_finding
 from endotsr.sequences.common import list_contents, open_common
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, list_pictures
@@ -24,6 +25,7 @@ from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, Sequen
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.untrusted.writing import replace_text, replacing_folder
 
+EXCHANGED = 3.0  # times as many matches with left and right exchanged
 OnFrame = Callable[[int, int], None]
 
 
@@ -50,6 +52,9 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
         if pair.right is None:
             raise InputError(f"{recording.where}: no right pictures (images_right/); allowed: a stereo sequence")
         found = stereo_depth(pair.left, pair.right, lens, baseline, settings).depth
+        if i == 0 and (found > 0).mean() < LITTLE:
+            exchanged = stereo_depth(pair.right, pair.left, lens, baseline, settings).depth
+            _refuse_exchanged(float((found > 0).mean()), float((exchanged > 0).mean()), recording.where)
         if not settings.temporal:
             yield found
             continue
@@ -59,6 +64,15 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
             yield _consistent(depths, pairs, middle)
     if settings.temporal:
         yield _consistent(depths[-2:], pairs[-2:], len(depths[-2:]) - 1)
+
+
+def _refuse_exchanged(coverage: float, exchanged: float, where: Path) -> None:
+    """Refuse left and right pictures that match the other way round; the fractions of pixels with depth of both ways."""
+    if exchanged > max(LITTLE, EXCHANGED * coverage):
+        raise InputError(
+            f"{where}: {coverage:.1%} of the pixels of the first frame match the right picture, and {exchanged:.1%}"
+            " with left and right exchanged; allowed: left pictures in images/ and right ones in images_right/"
+        )
 
 
 def _consistent(depths: list[NDArray[np.float32]], pairs: list[PicturePair], middle: int) -> NDArray[np.float32]:
@@ -78,8 +92,18 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDept
     check_pairing(contents.images, files)
     lens = contents.file.camera.lens(folder)
     baseline = contents.file.camera.baseline * contents.file.to_scene(contents.file.unit)
-    frames = (depth_of_values(read_plane(file), kind, scale, lens, baseline, file) for file in files)
+    frames = (
+        _without_mark(depth_of_values(read_plane(file), kind, scale, lens, baseline, file), kind, file)
+        for file in files
+    )
     return MadeDepth(frames, f"{kind} from {source.name}", "")
+
+
+def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:
+    """The depth. Raises InputError for lengths among which one number seems to mark missing depth."""
+    for found in mark_finding([depth_facts(file.name, depth, depth, None)], str(file)) if kind == "depth" else []:
+        raise InputError(f"{file}: {found.what}: {found.why}; {found.remedy}")
+    return depth
 
 
 def from_relative(folder: Path, source: Path, align: Align, farthest: float, trusted: bool, replace: bool) -> MadeDepth:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.opencv import write_png
 from endotsr.opencv.pictures import write_jpeg
+from endotsr.sequences.checks.cameras import lens_findings
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts, frame_findings
 from endotsr.sequences.checks.guard import notes_of
 from endotsr.sequences.depth_files import CLIPPED
@@ -195,7 +196,7 @@ def _write_frames(
             write_levels(_depth_file(folder, k), np.zeros((straight.lens.height, straight.lens.width), np.float32), 1.0)
         on_frame(k + 1, len(chosen))
     assert straight is not None
-    notes += notes_of(frame_findings(facts, str(recording.where)))
+    notes += notes_of(frame_findings(facts, str(recording.where)) + lens_findings(straight.lens, str(recording.where)))
     if without_depth:
         notes.append(f"frames without any depth: {shortened([str(i) for i in without_depth])}")
     if saturated:

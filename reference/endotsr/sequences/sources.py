@@ -84,8 +84,9 @@ def mask_reader(
 ) -> Callable[[int], NDArray[np.bool_] | None]:
     """Tissue masks from files, one a frame; None where a frame has none.
 
-    A mask of another size is resized to the nearest pixel if its proportions are those of the picture. Zero is black,
-    and any other value white. The polarity says which of the two is excluded.
+    A mask of another size is resized to the nearest pixel if its proportions are those of the picture. Values above
+    half of the largest are white, so that 0 and 1 are a mask, and the grey seams of a JPEG belong to their nearer side.
+    The polarity says which of the two is excluded.
 
     Raises:  InputError for a picture of other proportions, or one that is no mask.
     """
@@ -98,7 +99,8 @@ def mask_reader(
         values = np.unique(plane)
         if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT:
             raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
-        tissue = plane == 0 if excluded_value == "white" else plane > 0
+        white = plane > values[-1] / 2
+        tissue = ~white if excluded_value == "white" else white
         return nearest_pixels(tissue, width, height, path)
 
     return mask

@@ -21,6 +21,7 @@ from endotsr.sequences.checks.depth import (
     depth_facts,
     light_correlation,
     light_finding,
+    mark_finding,
     unit_finding,
 )
 from endotsr.sequences.checks.findings import Finding
@@ -83,9 +84,12 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
     _refuse_flipped(shading_finding(shading, where), stated.path)
     if not planes:
         return ""
+    facts = [depth_facts("", plane, plane / stated.step, None) for plane in planes]
+    if marked := mark_finding(facts, where):
+        raise InputError(f"{stated.path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
     if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
         return full
-    usual = float(np.median([depth_facts("", plane, plane, None).median for plane in planes]))
+    usual = float(np.median([fact.median for fact in facts]))
     unit = [] if recording.unit == ARBITRARY else unit_finding(usual, where)
     if unit:
         return f"{unit[0].what}; another unit is stated with --depth-unit and --depth-scale"

@@ -28,7 +28,9 @@ STARTS = {
 }
 VIDEO_ENDINGS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".wmv")
 HIDDEN = ("vp8",)  # codecs with packets that hold no picture of their own: their pictures are counted by decoding
-WIDE_RANGE = {16: "PQ", 18: "HLG"}  # transfer functions of high dynamic range
+# Transfer functions that are not those of a display.
+WIDE_RANGE = {8: "linear light", 9: "logarithm", 10: "logarithm", 16: "PQ", 18: "HLG"}
+BT2020 = 9  # of the primaries
 UNSTATED, HIGH_DEFINITION = 2, 576  # matrix of colour that a file does not state; rows, above which players take BT.709
 PROBED = 3  # pictures that are decoded to learn what the header does not say
 
@@ -91,6 +93,8 @@ def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
         found.append("its transparency is left out")
     if int(frame.colorspace) == UNSTATED and not frame.format.is_rgb and frame.height > HIGH_DEFINITION:
         found.append("states no matrix of colour: that of BT.601 is taken, players take BT.709 at this size")
+    if int(frame.color_primaries or 0) == BT2020:
+        found.append("states the colours of BT.2020: its numbers are read as sRGB")
     return tuple(found)
 
 
@@ -99,7 +103,7 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
     kind = WIDE_RANGE.get(int(frame.color_trc or 0))
     if kind:
         raise InputError(
-            f"{path}: pictures of high dynamic range ({kind}); allowed: display RGB, for example after a tone mapping"
+            f"{path}: pictures of high dynamic range ({kind}) are not display RGB; allowed: display RGB, for example after a tone mapping"
             " by the program that exported the video"
         )
 
@@ -203,6 +207,11 @@ def _decoded(items: Iterator[Any], path: Path) -> Iterator[Any]:
         raise InputError(f"{path}: cannot be decoded at picture {position}: {plain_line(str(error))}") from None
 
 
+def _metadata_ignored(version: str) -> dict[str, str]:
+    """The option by which PyAV below 19 reads a file whose metadata are not UTF-8; from 19 on it does so by itself."""
+    return {} if int(version.split(".")[0]) >= 19 else {"metadata_errors": "ignore"}
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """The container and its best video stream; the decoder opens no other file. Raises InputError."""
@@ -216,7 +225,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
         file.seek(0)
         try:
-            container = av.open(file, "r", metadata_errors="ignore")
+            container = av.open(file, "r", **_metadata_ignored(av.__version__))
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None
         with container:

@@ -40,10 +40,11 @@ def pixels_only(data: bytes, name: object) -> bytes:
     name     for messages
 
     Raises: InputError if the header is not allowed, if the picture has more than 2^26 pixels, if a chunk that the
-            pixels need is missing, repeated or unknown, or if the compressed pixels are not those of the header.
+            pixels need is missing, repeated or unknown, if the file holds several pictures (APNG), or if the compressed pixels are not those of the header.
     """
     chunks = _chunks(data)
     header = _header(chunks, name)
+    _refuse_moving(chunks, name)
     kept = [chunks[0]]
     palette = _palette(chunks, header, name)
     kept += palette
@@ -85,6 +86,13 @@ def _header(chunks: list[tuple[bytes, bytes]], name: object) -> PngHeader:
     if not 0 < width * height <= MOST_PIXELS:
         raise InputError(f"{name}: {width}x{height} pixels; allowed: 1 to {MOST_PIXELS} pixels")
     return PngHeader(width, height, bits, colour, interlace == 1)
+
+
+def _refuse_moving(chunks: list[tuple[bytes, bytes]], name: object) -> None:
+    """Refuse a moving PNG, of which a decoder shows the first picture."""
+    frames = next((int.from_bytes(content[:4], "big") for kind, content in chunks if kind == b"acTL"), 1)
+    if frames > 1:
+        raise InputError(f"{name}: holds {frames} pictures; allowed: one picture a file")
 
 
 def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object) -> list[tuple[bytes, bytes]]:

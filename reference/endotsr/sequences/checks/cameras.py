@@ -4,12 +4,14 @@ import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.recording import Lens
 from endotsr.sequences.world import FAR_FROM_ORIGIN
 from endotsr.splatting.camera import Camera, camera_centre, degrees_between
 
 JUMP = 20.0  # times the median step
 TURN = 20.0  # degrees between neighbouring frames
 STILL = 1e-4  # of the depth: a whole way shorter than this is most likely in metres beside millimetres
+FARTHEST_STEP = 2.0  # of the depth: neighbouring frames would not overlap
 WIDEST, NARROWEST = 150.0, 5.0  # degrees, horizontal field of view
 OFF_CENTRE = 0.25  # of the picture
 
@@ -17,10 +19,13 @@ OFF_CENTRE = 0.25  # of the picture
 def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Finding]:
     """Findings on the cameras of a sequence; `depth` is its median depth, 0 if unknown."""
     centres = np.array([camera_centre(camera) for camera in cameras])
-    found = _lens_findings(cameras[0], where) + _step_findings(cameras, centres, where)
+    found = lens_findings(cameras[0], where) + _step_findings(cameras, centres, where)
     way, distance = float(np.ptp(centres, axis=0).max()), float(np.abs(centres).max())
     if depth and 0 < way < STILL * depth:
         found.append(finding("pose-unit", where, f"the camera moves {way:.3g} in all, the depth is {depth:.4g}"))
+    step = float(np.median(np.linalg.norm(np.diff(centres, axis=0), axis=1))) if len(centres) > 1 else 0.0
+    if depth and step > FARTHEST_STEP * depth:
+        found.append(finding("pose-unit", where, f"the camera moves {step:.4g} a frame, the depth is {depth:.4g}"))
     if depth and distance > FAR_FROM_ORIGIN * depth:
         found.append(finding("far-from-origin", where, f"the cameras stand {distance:.3g} from the origin"))
     return found
@@ -41,7 +46,7 @@ def _step_findings(cameras: list[Camera], centres: FloatArray, where: str) -> li
     return found
 
 
-def _lens_findings(camera: Camera, where: str) -> list[Finding]:
+def lens_findings(camera: Camera | Lens, where: str) -> list[Finding]:
     """Field of view, principal point, shape of the pixels."""
     found = []
     angle = float(np.degrees(2 * np.arctan(camera.width / (2 * camera.fx))))

@@ -16,6 +16,7 @@ FEW_LEVELS = 6  # whole millimetres, as published clips have them, give a dozen 
 LITTLE = 0.2  # of the tissue
 FAR_OFF = 4.0
 FULL_SCALE = (255.0, 65535.0)
+MARK, MARKED = 8.0, 0.005  # times the median, of the pixels with depth: a largest number that marks missing depth
 AGAINST_LIGHT = 0.4  # rank correlation of brightness with depth; measured clips have -0.55 to -0.84
 LIT, FEWEST = (20, 250), 300  # grey levels that are neither black nor overexposed; pixels of a correlation
 
@@ -31,6 +32,7 @@ class DepthFacts(NamedTuple):
     tissue_coverage: float  # fraction of the tissue that has depth
     stored_highest: float  # largest stored number
     integers: bool  # the file holds whole numbers
+    at_highest: float = 0.0  # fraction of the pixels with depth that hold the largest one
 
 
 def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: NDArray[np.bool_] | None) -> DepthFacts:
@@ -47,6 +49,7 @@ def depth_facts(name: str, depth: NDArray[np.float32], stored: NDArray, tissue: 
         float(inside.mean()) if inside.size else 1.0,
         float(np.nanmax(stored)) if stored.size else 0.0,
         stored.dtype.kind in "iu",
+        float((values == values.max()).mean()) if values.size else 0.0,
     )
 
 
@@ -96,12 +99,25 @@ def _numbers(facts: list[DepthFacts], where: str) -> list[Finding]:
         return [finding("metres-cut", where, f"the stored numbers are at most {max(highest):g}")]
     if all(fact.lowest == fact.highest for fact in facts):
         return [finding("constant-depth", where, "every frame has one and the same depth everywhere")]
+    if marked := mark_finding(facts, where):
+        return marked
     if len(facts) > 2 and len(highest) == 1 and highest & set(FULL_SCALE) and integers:
         return [finding("normalised-depth", where, f"the largest number of every frame is {max(highest):g}")]
     levels = int(np.median([fact.levels for fact in facts]))
     if levels < FEW_LEVELS:
         return [finding("coarse-depth", where, f"a frame holds {levels} different depths")]
     return []
+
+
+def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
+    """A warning where most frames hold one far too large number at many pixels, such as 65535 or 1e6."""
+    found = [fact for fact in facts if fact.at_highest > MARKED and fact.highest > MARK * fact.median]
+    if not found or len(found) <= len(facts) / 2:
+        return []
+    share = float(np.mean([fact.at_highest for fact in found]))
+    times = float(np.mean([fact.highest / fact.median for fact in found]))
+    stored = f"{share:.1%} of the pixels hold {found[0].stored_highest:g}"
+    return [finding("marked-depth", where, f"{stored}, {times:.3g} times the median depth")]
 
 
 def unit_finding(usual: float, where: str) -> list[Finding]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.opencv.pictures import other_profile
 from endotsr.sequences.checks.findings import Finding, finding
-from endotsr.sequences.checks.scenes import cut_findings, halves_finding
+from endotsr.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.sequences.files import frame_numbers, shortened
 
 SMALL = 8  # pixels between the sampled rows and columns
@@ -24,6 +24,7 @@ LEAST_ROWS = 16
 JUMP = 2.0  # ratio of the mean brightness of neighbouring frames; published clips stay within 1.15
 FLAT = 4  # grey levels between the darkest and the brightest pixel of a channel: a frame of one colour
 NOTHING = 0.5  # of the frames: a clip of more black, white or one-coloured frames shows nothing
+BLUE = 20.0  # grey levels of blue above red; in two public clips red is 30 and 47 above blue
 CLIPPED = 0.3  # of the pixels of a frame at 255 in all channels
 
 
@@ -68,6 +69,7 @@ def frame_findings(facts: list[FrameFacts], where: str) -> list[Finding]:
     found += _of_clip(facts, means, where)
     grey = [fact.small.mean(axis=2) for fact in facts]
     found += cut_findings(grey, [fact.name for fact in facts], readable, where) + halves_finding(grey, where)
+    found += alternating_finding(grey, where) + _blue_finding(facts, where)
     comb = float(np.median([fact.comb for fact in facts])) if facts else 0.0
     if comb > WOVEN:
         what = f"neighbouring rows differ {comb:.2f} times as much as rows two apart"
@@ -92,6 +94,14 @@ def _of_clip(facts: list[FrameFacts], means: NDArray[np.floating], where: str) -
     if repeated and all(np.abs(frame - frames[0]).mean() < FROZEN for frame in frames):
         return [finding("constant-clip", where, f"all {len(facts)} frames are one picture: {shortened(names)}", 0)]
     return []
+
+
+def _blue_finding(facts: list[FrameFacts], where: str) -> list[Finding]:
+    """A warning on a clip whose pictures are blue where tissue is red."""
+    blueness = float(np.median([fact.small[:, :, 2].mean() - fact.small[:, :, 0].mean() for fact in facts] or [0.0]))
+    if blueness < BLUE:
+        return []
+    return [finding("blue-pictures", where, f"blue is {blueness:.0f} grey levels above red on average")]
 
 
 def _of_frame(fact: FrameFacts, mean: float, where: str, i: int) -> list[Finding]:

@@ -55,6 +55,10 @@ KINDS: dict[str, Kind] = {
                           "cut the clip there: endotsr prepare --frames; or train it with --windows auto"),
     "two-views": Kind("warning", "a stereo pair in one picture is no scene",
                       "name it: endotsr prepare --stereo side_by_side or stacked"),
+    "alternating-views": Kind("warning", "two cameras or two kinds of light in turn are no scene",
+                              "prepare each alone: --frames ::2, and --frames 1::2"),
+    "blue-pictures": Kind("warning", "tissue is red: red and blue may be exchanged, as OpenCV stores them",
+                          "export the pictures again as RGB; none needed for blue light"),
     "colour-profile": Kind("note", "its numbers are read as sRGB, so that colours differ from what a viewer shows",
                            "convert the pictures to sRGB where colours matter"),
     "grey-pictures": Kind("note", "polarity cannot be checked by colour", "none needed"),
@@ -86,6 +90,8 @@ KINDS: dict[str, Kind] = {
                           "write all frames with one scale"),
     "metres-cut": Kind("refusal", "metres were cut to whole numbers",
                        "store millimetres, or a smaller step with its scale"),
+    "marked-depth": Kind("warning", "the number seems to mark pixels without depth, and is read as a distance",
+                         "store 0 where there is no depth"),
     "constant-depth": Kind("refusal", "the scene would be a flat board", "supply measured depth"),
     "normalised-depth": Kind("warning", "each frame looks stretched to the full range: such a picture of depth is no"
                              " depth", "store lengths with one scale for all frames"),
@@ -108,7 +114,7 @@ KINDS: dict[str, Kind] = {
     "pose-jump": Kind("warning", "one wrong pose blurs the whole scene", f"check this pose, or {LEAVE_OUT}"),
     "pose-turn": Kind("warning", "between neighbouring frames this is most likely a wrong pose",
                       "check axes and direction of the trajectory"),
-    "pose-unit": Kind("warning", "the poses may be in metres beside a depth in millimetres",
+    "pose-unit": Kind("warning", "poses and depth may be in different units, such as metres and millimetres",
                       "state the unit: prepare --trajectory-unit"),
     "far-from-origin": Kind("note", "float32 is too coarse there", "none needed: the world is moved"),
     # cost

@@ -11,6 +11,7 @@ from endotsr.sequences.checks.findings import Finding, finding
 
 ALIKE = 0.6  # correlation of the halves of the pictures: two views; published clips of one view stay within 0.3
 OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # of neighbouring frames: below the one, where the others are above the other
+ALTERNATING = 0.2  # by which pictures two apart are more alike than neighbours; motion makes it negative
 FARTHEST = 6  # parts of the width of a half: one of them is the largest shift between two views
 
 
@@ -31,6 +32,20 @@ def cut_findings(grey: list[FloatArray], names: list[str], readable: BoolArray, 
             what = f"{names[i]} does not resemble {names[i - 1]} (correlation {value:.2f}, usually {usual:.2f})"
             found.append(finding("another-scene", where, what, i))
     return found
+
+
+def alternating_finding(grey: list[FloatArray], where: str) -> list[Finding]:
+    """Pictures of two cameras, or of two kinds of light, in turn.
+
+    grey   (h, w) of every frame, reduced
+    """
+    if len(grey) < 6 or len({picture.shape for picture in grey}) != 1:
+        return []
+    one, two = (float(np.median([_correlation(a, b) for a, b in zip(grey, grey[k:])])) for k in (1, 2))
+    if two < SAME_SCENE or two - one < ALTERNATING:
+        return []
+    what = f"every picture resembles the next but one (correlation {two:.2f}) more than the next ({one:.2f})"
+    return [finding("alternating-views", where, what)]
 
 
 def halves_finding(grey: list[FloatArray], where: str) -> list[Finding]:

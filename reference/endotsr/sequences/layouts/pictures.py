@@ -10,7 +10,7 @@ from pathlib import Path
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.checks.frames import profile_findings
+from endotsr.sequences.checks.frames import gap_findings, profile_findings
 from endotsr.sequences.files import check_pairing, frame_numbers
 from endotsr.sequences.layouts import STATEMENTS, Layout
 from endotsr.sequences.recording import CameraPose, Recording, colour_picture
@@ -83,7 +83,7 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
     width, height = halves(stored.shape[1], stored.shape[0], stereo)
     lens, rig = stated_camera(options, width, height, path)
     poses: list[CameraPose | None] | None = None
-    notes = [found.line for found in profile_findings(left[0])]
+    notes = [found.line for found in profile_findings(left[0]) + gap_findings(left)]
     if options.trajectory is not None:
         unit = options.trajectory_unit or "m"
         trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
