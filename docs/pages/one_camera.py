@@ -162,7 +162,7 @@ def table(result: dict[str, Any]) -> str:
         f"Simulated scenes of 25 frames of 240x192, trained with `{' '.join(TRAINING)}`, one seed. Error of the depth:"
         f" median over tissue, after one scale for the clip where nothing is metric. The true depth and the points are"
         " rounded, to whole millimetres and to hundredths, the relative depth to 16 bits. Held-out frames are seen from"
-        " the cameras of the clip, from which a wrong shape costs little. {result['date']}."
+        f" the cameras of the clip, from which a wrong shape costs little. {result['date']}."
     )
     return markdown(headings, rows) + "\n\n" + about
 

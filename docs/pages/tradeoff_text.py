@@ -16,7 +16,7 @@ def advice(result: dict[str, Any]) -> list[str]:
     paper = by_name[result["presets"]["paper"]]
     chosen = eight_bit_setting(result)
     sentences = [
-        f"For pictures and for training take `paper`: it errs by {levels(paper['error']['rms'])} on average and by "
+        f"For pictures and for training use `paper`: its error is {levels(paper['error']['rms'])} on average and "
         f"{levels(paper['error']['max'])} at the worst pixel{_against_noise(paper, result)}."
     ]
     if chosen is not None:

@@ -23,13 +23,13 @@ def summary(result: dict[str, Any]) -> list[str]:
     if "float64" in ends:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
-            "Chance: each training has one seed. `float64` differs from `base` by rounding alone, and ends "
+            "Noise: each training has one seed. `float64` differs from `base` only by rounding and ends "
             f"{chance:.2f} dB from it. Smaller differences are noise."
         )
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
         if better:
-            lines.append(f"*{name}* is slower, and worse by more than chance, than: {', '.join(better)}.")
+            lines.append(f"*{name}* is slower than the following, and worse beyond noise: {', '.join(better)}.")
     return lines
 
 
