@@ -14,20 +14,19 @@
 # # 0. Why: light, motion and detail
 #
 # A surgeon moves an endoscope over tissue that breathes, beats and is pulled by instruments. The clip shows one view at
-# each time. The task is to recover the scene: its colour, depth and motion at every time of the clip, also where an
-# instrument hides the tissue, and also between two frames.
+# each time. The task is to recover the colour, depth and motion of the scene at every time of the clip, even where an
+# instrument hides the tissue and between two frames.
 #
 # The task is ambiguous. A pixel becomes brighter when the light grows stronger, and also when a brighter piece of
-# tissue moves there. One picture cannot tell the two apart. The paper therefore gives each cause a component of its
-# own:
+# tissue moves there. A single picture cannot distinguish these causes. The paper therefore uses separate components:
 #
 # - **A**, appearance: a bounded change of colour over time ({doc}`02_colour_residual`).
 # - **S**, spectral motion: a translation over time with a smoothness prior ({doc}`04_motion_and_prior`).
 # - **L**, Laplacian detail: a loss on fine structure that ignores instruments ({doc}`09_laplacian_pyramid`).
 #
 # This chapter trains two clips with one cause each. The first has changing light and no motion; the second has motion
-# and steady light. Each is trained without A, S and L, with each alone, and with all three. The truth is known,
-# because the clips are simulated. The objective is {eq}`eq-6` of {doc}`/specification/06_objective`.
+# and constant light. Each is trained without A, S and L, with each alone, and with all three. The ground truth is
+# known, because the clips are simulated. The objective is {eq}`eq-6` of {doc}`/specification/06_objective`.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect
@@ -117,8 +116,8 @@ print(inspect.getsource(definition.view_gradients))
 # ## Two clips with one cause each
 #
 # Both clips have 24 frames; every eighth is held out. In the first, the exposure drifts by 15 % and a patch of tissue
-# brightens. In the second, the tissue breathes four times, so that one breath takes six frames. A third clip breathes
-# once. Noise is the only effect that they share.
+# brightens. In the second, the tissue breathes four times, so one breath takes six frames. In a third clip it breathes
+# once. The only effect common to all is noise.
 
 # %%
 FRAMES, ITERATIONS = 24, 500
@@ -167,7 +166,7 @@ runs = {
 # ## The numbers
 #
 # *Training* and *held out* are the mean PSNR over tissue. *Trajectory error* is the distance between the motion of the
-# model and the true motion, in pixels; a model at rest has the error in the last column.
+# model and the true motion, in pixels; a static model has the error in the last column.
 
 # %%
 scores = {}
@@ -192,8 +191,8 @@ def gain(name, variant):
 # %% [markdown]
 # ## The pictures
 #
-# One held-out frame of each clip. The lower row of each pair shows the absolute error over tissue, from 0 (black) to
-# 0.1 (white).
+# The figure shows one held-out frame of each clip. The lower row of each pair is the absolute error over tissue, from 0
+# (black) to 0.1 (white).
 
 
 # %% tags=["hide-input"]
@@ -228,9 +227,9 @@ show("motion")
 # **Light alone.** A explains the change of light and gains on training and held-out frames. The other components have
 # no term for light. No variant moves the tissue by more than a small fraction of a pixel.
 #
-# **Motion alone.** No variant of this short run follows the motion: the trajectory error is that of a model at rest.
+# **Motion alone.** No variant of this short run follows the motion: the trajectory error equals that of a static model.
 # S cannot help, because its learning rate is a tenth of the rate of the deformation. A nevertheless gains on the
-# training frames. It cannot move a Gaussian, so training changes the colours of resting Gaussians until each training
+# training frames. It cannot move a Gaussian, so training changes the colours of static Gaussians until each training
 # frame looks right. The true colour change is zero.
 
 # %%
@@ -244,8 +243,8 @@ assert all(scores["motion", variant][2] > 0.8 * rest for variant in VARIANTS)
 # %% [markdown]
 # ## When A harms
 #
-# Colour that imitates motion is right at the training times only. The figure shows one pixel over the whole clip. The
-# simulator also provides the true course between the frames.
+# Colour that imitates motion is right only at the training times. The figure shows one pixel over the whole clip. The
+# simulator also provides its true colour between the frames.
 
 # %% tags=["hide-input"]
 DENSE = 4  # true pictures for each frame
@@ -285,29 +284,29 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 # %% [markdown]
 # With one breath in the clip, two neighbouring frames are nearly equal, and the painted colour is right between them as
 # well: A gains on held-out frames. With four breaths, a held-out frame is a sixth of a breath away from its neighbours.
-# The painted colour has no reason to be right there, and A loses several decibels. A gain on training frames occurs in
-# both cases, so it does not tell them apart.
+# Nothing makes the painted colour right there, and A loses several decibels. A gain on training frames occurs in both
+# cases and does not distinguish them.
 #
 # The two rates were chosen because they differ most. A short sweep with one seed, noted by hand, gave A +0.7 dB held
-# out for one breath, +0.1 for two, -3.5 for four and -0.5 for six. The loss does not simply grow with the rate.
+# out for one breath, +0.1 for two, -3.5 for four and -0.5 for six. The loss does not grow monotonically with the rate.
 #
-# The other pages of the book report the numbers below; the reasons beside them are our reading and were not tested:
+# Other pages of the book report the following numbers; the explanations are our interpretation and were not tested:
 #
 # - On the **simulated clip of the demonstration**, with the preset `paper`, A loses 0.28 dB on held-out frames
 #   ({doc}`/claims`) and gains almost 2 dB on training frames. That clip has a beat with five cycles in 24 frames.
-# - On the **real clip**, A gains 0.26 dB beside S ({doc}`/claims`). Most of its held-out frames lie between two
+# - On the **real clip**, adding A to S gains 0.26 dB ({doc}`/claims`). Most of its held-out frames lie between two
 #   training frames that differ little, as in the slow clip.
 # - After **721 iterations** on the real clip, a model without residuals is 2.05 dB worse ({doc}`/tradeoff`); after 6000
-#   iterations the difference is some tenths of a decibel ({doc}`/claims`). The deformation may have hardly begun to
-#   follow the motion after 721 iterations, so that A paints what the deformation leaves.
+#   iterations the difference is a few tenths of a decibel ({doc}`/claims`). After 721 iterations the deformation may
+#   have hardly begun to follow the motion, so A paints the rest.
 # - On a **simulated clip at full size**, `paper` shows every vessel twice where the tissue moves by three pixels between
 #   two training frames ({doc}`/full_size`): it fades one frame into the next.
-# - With **light alone**, false motion is the same with and without A ({doc}`/effects`). The gain of A is a better
-#   picture; the geometry was not wrong before.
+# - With **light alone**, false motion is the same with and without A ({doc}`/effects`). A improves only the picture;
+#   the geometry was already right.
 #
-# Two rules follow. A gain on training frames proves nothing about A: only frames that are not used in training do. And
-# motion needs a component that moves. The preset `sharp` lets the Gaussians start with tracked motion {eq}`eq-b15`, and
-# {doc}`/effects` shows that the colour residual becomes smaller then.
+# Two rules follow. First, a gain on training frames proves nothing about A; only held-out frames do. Second, motion
+# needs a component that moves. In the preset `sharp` the Gaussians start with tracked motion {eq}`eq-b15`, and
+# {doc}`/effects` shows that the colour residual is then smaller.
 #
 # ## Exercise
 #
@@ -315,10 +314,10 @@ assert gain("motion", "A")[1] < -1 < gain("slow motion", "A")[1] - 1, "only a sl
 #    without false motion? Which number would show that a model paints?
 # 2. Come back after chapter 10. Write the objective {eq}`eq-6` of one view with its gradients, and let the golden cases
 #    judge it: `--only objective` ({doc}`index`). The case `components_off` has neither A, S nor L.
-# 3. The cell below answers this one. Render the model of the motion clip that was trained with A, but leave A out of
-#    the picture (`run.render(..., without=("appearance",))`). Is the result on held-out frames better than the render
-#    with A? Is it as good as the model that was trained without A? What does this say about the colours that the
-#    Gaussians have learned?
+# 3. The cell below answers this one. Render the model of the motion clip that was trained with A, but without A in the
+#    picture (`run.render(..., without=("appearance",))`). Is the result on held-out frames better than the render with
+#    A? Is it as good as the model that was trained without A? What does this say about the colours that the Gaussians
+#    have learned?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Leaving A out repairs most of the damage: the painted colours are gone, and the

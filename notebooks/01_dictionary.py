@@ -13,15 +13,15 @@
 # %% [markdown]
 # # 1. Time: the Fourier dictionary and its normalised atoms
 #
-# In a clip the light drifts, and breath and heartbeat move the tissue. Both residuals of Endo-TSR describe such changes
-# by the same $2F$ sinusoids of time. This notebook builds them, centres and scales them over the training stamps, and
-# shows the one case in which scaling would be wrong: an atom that is zero at every stamp.
+# During a clip the light drifts, and breathing and heartbeat move the tissue. Both residuals of Endo-TSR describe such
+# changes by the same $2F$ sinusoids of time. This notebook builds them, centres and scales them over the training
+# stamps, and shows the one case in which scaling would be wrong: an atom that is zero at every stamp.
 #
 # The equations are {eq}`eq-1` and {eq}`eq-1b` of {doc}`/specification/01_dictionary`. In the book such references are
 # links.
 #
-# In these notebooks each equation is printed as in the specification. Its **definition** in plain NumPy follows, and is
-# compared with the compiled function by an `assert`. If one sign is changed in either, the notebook stops.
+# In these notebooks each equation is printed as in the specification. Its **definition** in plain NumPy follows and is
+# compared with the compiled function by an `assert`. If a sign is changed in either, the notebook stops.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect

@@ -15,7 +15,7 @@
 #
 # The light changes during a clip: exposure drifts, and tissue becomes pale under pressure. Component A lets the colour
 # of each Gaussian follow such a change, by at most $\beta$ in display units for all values of its coefficients. The
-# bound limits how large the residual is, not what it represents.
+# bound limits the size of the residual, not what it represents.
 #
 # The equation is {eq}`eq-2` of {doc}`/specification/02_appearance`; {doc}`01_dictionary` introduces the atoms.
 
@@ -76,9 +76,9 @@ zero = np.zeros_like(A)
 assert not np.any(appearance_forward(zero, phi_bar, beta)[0])
 
 # %% [markdown]
-# **What the bound does not do.** Each Gaussian has coefficients of its own, so neighbours may change in opposite
-# directions. A texture that moves over resting Gaussians, with a contrast of 0.2, lies within the bound of 0.3, and the
-# residual reproduces it exactly. Only the data can tell such a texture from light.
+# **The limit of the bound.** Each Gaussian has separate coefficients, so neighbours may change in opposite directions.
+# A texture that moves over static Gaussians with a contrast of 0.2 is within the bound of 0.3, and the residual
+# reproduces it exactly. Only the data can distinguish such a texture from light.
 
 # %%
 place = np.linspace(0, 1, N)
@@ -215,7 +215,7 @@ assert np.abs(start).max() > 0
 # %% [markdown]
 # ## The gradient check
 #
-# Each atom is a block of its own, so that the other fifteen cannot mask a mistake in a single atom.
+# Each atom is a separate block, so the other fifteen cannot mask a mistake in a single atom.
 
 # %%
 with one_thread():

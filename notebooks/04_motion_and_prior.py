@@ -126,10 +126,10 @@ text, _ = definition_of_prior.matern_penalty_forward(C, rho)
 np.testing.assert_allclose(penalty, text, rtol=1e-13)
 
 # %% [markdown]
-# **What does not follow.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are no uniform
-# grid of frequencies. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
-# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is no Matérn covariance: its correlation at $\ell$ is 0.02 and not 0.52,
-# and it does not decay. The penalty only says which of two frequencies costs more, and by how much.
+# **The implied covariance differs.** The weights are those of a Matérn spectrum, but eight log-spaced frequencies are
+# not a uniform grid. Independent coefficients with variances $\propto 1/\rho_f$ give a path with the covariance
+# $\sum_f\rho_f^{-1}\cos 2\pi\omega_f\tau$. It is not a Matérn covariance: its correlation at $\ell$ is 0.02 instead of
+# 0.52, and it does not decay. The penalty only defines the relative cost of the frequencies.
 
 # %%
 implied = lambda tau: np.sum(np.cos(2 * np.pi * omega * tau) / rho) / np.sum(1 / rho)
@@ -276,7 +276,7 @@ text = definition_of_prior.matern_penalty_reverse(0.7, (C, rho))
 np.testing.assert_allclose(matern_penalty_reverse(0.7, saved_penalty), text, rtol=1e-13)
 
 # %% [markdown]
-# ## Play: correlation length and penalty
+# ## Interactive figure: correlation length and penalty
 #
 # A trajectory is fitted to noisy frames by least squares with the penalty of {eq}`eq-4`. A small penalty fits the
 # noise; a large one removes the beat. A longer correlation length moves weight to the high frequencies.

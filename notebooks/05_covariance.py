@@ -13,9 +13,9 @@
 # %% [markdown]
 # # 5. Quaternions, scales and the covariance
 #
-# A few flat or long Gaussians cover a wall or a vessel better than many round ones. The shape of a Gaussian is three
-# semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form in which every
-# number is allowed: the quaternion may have any length, and the axes are logarithms.
+# A few flat or long Gaussians cover a wall or a vessel better than many round ones. The shape of a Gaussian is given by
+# three semi-axes and a rotation. A gradient step may lead to any real number, so both are stored in a form that allows
+# every number: the quaternion may have any length, and the axes are stored as logarithms.
 #
 # The equation is {eq}`eq-b2` of {doc}`/specification/b02_covariance`.
 
@@ -136,9 +136,9 @@ assert np.array_equal(covariance_forward(0 * q, s)[0].rotation[:, :, 0], np.eye(
 # **(5.6) The unit quaternion.** Collecting $\mathrm dw$ and $\mathrm d\mathbf v$ gives $g_w=2w\tau+2\,\mathbf s\cdot\mathbf v$ and
 # $g_{\mathbf v}=-2\tau\,\mathbf v+2(G+G^\top)\mathbf v+2w\,\mathbf s$.
 #
-# **(5.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ in place of
-# $\|q\|^2$. It lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. That vector points along $q$, and the next
-# line removes it. Both forms therefore give the same $g_{\tilde q}$.
+# **(5.7) Two forms.** The display below differentiates the printed matrix, whose diagonal has $1$ instead of $\|q\|^2$.
+# It lacks the gradient of $(\|q\|^2-1)\,\tau$, which is $2\tau q$. That vector points along $q$, and the next line
+# removes it. Both forms therefore give the same $g_{\tilde q}$.
 #
 # **(5.8) The length.** $q=\tilde q/\|\tilde q\|$ gives
 # $\mathrm dq=(I-qq^\top)\,\mathrm d\tilde q/\|\tilde q\|$. A step of $\tilde q$ along itself does not change the rotation, so
@@ -289,8 +289,8 @@ assert all(report.passed for report in reports)
 # 1. The three semi-axes are equal. What is $g_{\tilde q}$ for any symmetric $g_\Sigma$? Use (5.2) and (5.6).
 # 2. Write `covariance_reverse` from (5.3), (5.6) and (5.8) and let the golden cases judge it: `--only covariance`
 #    ({doc}`index`). Which case fails if the division by the length is left out?
-# 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ in place
-#    of $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one
+# 3. The cell below answers this one. Change the order of the axes of a Gaussian: log-scales $(s_2,s_3,s_1)$ instead of
+#    $(s_1,s_2,s_3)$. Which quaternion gives the same $\Sigma$ as before? How many parameter sets describe one
 #    ellipsoid?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]

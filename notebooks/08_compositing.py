@@ -254,7 +254,7 @@ plt.show()
 # \end{aligned}
 # $$
 #
-# **(8.8) Once a Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
+# **(8.8) Once per Gaussian**, after the sum over pixels. With $m=b/c$, $r=1/c$, $A=c/(ac-b^2)$:
 # $\partial A/\partial a=-A^2$, $\partial A/\partial b=2A^2m$, $\partial A/\partial c=-A^2m^2$;
 # $\partial m/\partial b=r$, $\partial m/\partial c=-mr$; $\partial r/\partial c=-r^2$.
 #
@@ -264,7 +264,7 @@ plt.show()
 
 #
 # The definition goes from $q$ to the covariance in one step, $\partial(-q/2)/\partial\Sigma=\tfrac12Q\,dd^{\mathsf T}Q$
-# with $Q=\Sigma^{-1}$, in place of (8.8). The sums are the same.
+# with $Q=\Sigma^{-1}$, instead of (8.8). The sums are the same.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.composite_reverse))
@@ -302,7 +302,7 @@ for settings in (PAPER, EXACT):
         np.testing.assert_allclose(found[name], text, rtol=1e-9, atol=1e-11, err_msg=name)
 
 # %% [markdown]
-# The released program adds a small number to $\det^2$ in this last step, so that its $g_a,g_b,g_c$ are multiplied by
+# The released program adds a small number to $\det^2$ in this last step, which multiplies its $g_a,g_b,g_c$ by
 # $\det^2/(\det^2+10^{-7})$. The preset `legacy` reproduces this under the name `conic_epsilon`. The next cell uses a
 # number that is large enough to be visible.
 
@@ -316,7 +316,7 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
-# ## Play: three opacities
+# ## Interactive figure: three opacities
 #
 # Drag the orange handles. The grey box is the light that reaches a Gaussian, and the coloured part is the light that it
 # absorbs. The loss is half the squared distance to the target colour. Set one opacity to 1 and compare with (8.3).

@@ -14,7 +14,7 @@
 # # 9. The mask-propagating Laplacian pyramid (component L)
 #
 # In a mean over pixels, a blurred vessel counts no more than a wall that is slightly too dark. Component L therefore
-# compares fine detail by itself, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
+# compares fine detail separately, in the bands of a pyramid. The difficulty is the instrument: a filter that reads one
 # of its pixels gives a wrong value. L counts a band value only if **no excluded pixel has any weight in it**.
 #
 # The equation is {eq}`eq-5` of {doc}`/specification/05_laplacian`.
@@ -59,8 +59,8 @@ rng = np.random.default_rng(9)
 # \end{aligned}
 # $$
 #
-# Both are linear and act on each axis separately, so each is a small matrix per axis. The definition writes these
-# matrices down. The compiled functions never form them.
+# Both are linear and act on each axis separately, so each is a small matrix per axis. The definition forms these
+# matrices; the compiled functions do not.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.reduce_matrix))
@@ -93,7 +93,7 @@ for shape in ((3, 37, 46), (3, 16, 9), (3, 1, 5)):
         np.testing.assert_allclose(rebuilt, image, atol=1e-14)  # nothing is lost
 
 # %% [markdown]
-# A unit ramp tells the two rules apart: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with
+# A unit ramp distinguishes the two rules: in the interior the bands are 0 with `co_sited`, and $\tfrac12,1,2$ with
 # `half_pixel`.
 
 # %%
@@ -236,10 +236,11 @@ for rule in ("co_sited", "half_pixel"):
     assert not np.any(found[:, ~mask])
 
 # %% [markdown]
-# ## Play: paint an instrument
+# ## Interactive figure: paint an instrument
 #
-# Paint excluded pixels in the first panel. The other panels show the values of each band that no excluded pixel enters.
-# One excluded pixel removes a neighbourhood of values, whose width in pixels about doubles from band to band.
+# Paint excluded pixels in the first panel. The other panels show the values of each band that do not depend on an
+# excluded pixel. One excluded pixel removes a neighbourhood of values, whose width in pixels about doubles from band to
+# band.
 #
 # <div class="widget" data-widget="masks">The figure is live in the built book.</div>
 
@@ -264,7 +265,7 @@ assert all(report.passed for report in reports)
 #    model, and which other loss, corrects such an error?
 # 2. Write the pair of {eq}`eq-5` and let the golden cases judge it: `--only laplacian` ({doc}`index`). The case
 #    `not_finite_under_mask` refuses a pyramid that reads the instrument and multiplies afterwards.
-# 3. The cell below answers this one. One single pixel in the middle of a large image is excluded. How many values of
+# 3. The cell below answers this one. A single pixel in the middle of a large image is excluded. How many values of
 #    each band become invalid (`co_sited`)? Does the number depend on whether the coordinates of the pixel are even or
 #    odd?
 

@@ -15,8 +15,8 @@
 #
 # A render can have wrong colours, a wrong structure or a wrong depth, and under the instrument there is nothing to
 # compare it with. The base model has a loss for each: the colour of each pixel (L1), the structure of the colours
-# (SSIM), the depth against the prior depth, and smoothness. The colour terms read no value under the instrument. The
-# depth term reads two maxima there, and smoothness the render.
+# (SSIM), the depth against the prior depth, and smoothness. The colour terms read no value under the instrument. There
+# the depth term reads only its two maxima, and smoothness only the render.
 #
 # The equations are {eq}`eq-b6` of {doc}`/specification/b06_masked_l1`, {eq}`eq-b7` of
 # {doc}`/specification/b07_masked_ssim`, {eq}`eq-b8` of {doc}`/specification/b08_depth` and {eq}`eq-b9` of
@@ -184,7 +184,7 @@ smooth_text, smooth_text_saved = smoothness_definition.smoothness_forward(
 np.testing.assert_allclose(L_smooth, smooth_text, rtol=1e-12)
 
 # %% [markdown]
-# ## Figure: why SSIM is used beside L1
+# ## Figure: why SSIM is used in addition to L1
 #
 # The three renders have **equal** masked L1, but the first looks much better. L1 does not distinguish them; SSIM does.
 # (The maps show $1-s$, averaged over channels.)

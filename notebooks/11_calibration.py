@@ -133,11 +133,11 @@ np.testing.assert_allclose(
 # ## Figure: two gradients of the same image
 #
 # Left and middle: the absolute gradients of the two losses. The gradient of L1 has the same size everywhere and changes
-# only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Beside the
+# only its sign; SSIM adds a part that varies. The gradient of the Laplacian loss varies from pixel to pixel. Near the
 # instrument, where no band value is valid, it is 0. (Its colour scale is a quarter of the other one.) Right:
-# $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these stand-ins for
-# a base render give 1.3 to 1.5 and not the published 0.83. They give 0.83 at a weight below 0.05. The dependence on $w$
-# and on the state of the render is why the preset takes the published number and does not calibrate.
+# $\lambda_{\mathrm{lap}}$ for other weights $w$ of SSIM. At the weight 0.1 of the preset `paper`, these substitutes for
+# a base render give 1.3 to 1.5 instead of the published 0.83, which they give at a weight below 0.05. Because the
+# result depends on $w$ and on the state of the render, the preset uses the published number and does not calibrate.
 
 # %% tags=["hide-input"]
 weights = np.array([0.0, 0.05, 0.1, 0.2, 0.4])
@@ -187,7 +187,7 @@ print(table(reports))
 assert all(report.passed for report in reports)
 
 # %% [markdown]
-# ## When it cannot work
+# ## When calibration fails
 #
 # If (11.6) leaves no view, or if the median is 0, an error with the table of all views is raised. The weight is never
 # infinite.
@@ -208,12 +208,12 @@ for hopeless in ([("perfect", 0.0, 0.0)], [("flat", 1.0, 0.0)]):
 # %% [markdown]
 # ## Exercise
 #
-# 1. One of the 16 views is black and its render is exact, so that both gradients are 0. What happens to the median if
-#    the view counts with the ratio 0, and what if it is left out?
+# 1. One of the 16 views is black and its render is exact, so both gradients are 0. What happens to the median if the
+#    view counts with the ratio 0, and if it is omitted?
 # 2. Write `calibrate` and let the golden cases judge it: `--only calibration` ({doc}`index`). The cases hold an even
 #    and an odd number of valid views.
 # 3. The cell below answers this one. Make every error of the render half as large. Does the calibrated weight change
-#    for $w=0$? Consider what the gradient of a mean of absolute values depends on.
+#    for $w=0$? Consider on what the gradient of a mean of absolute values depends.
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. Not at all. The gradient of a mean of absolute values depends on the signs of the

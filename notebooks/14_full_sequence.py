@@ -13,12 +13,12 @@
 # %% [markdown]
 # # 14. From one frame to a full sequence
 #
-# The previous notebooks explain all stages. This notebook fits one frame and then a whole clip, evaluates frames that
-# were not used in training, and removes the components of the paper one by one.
+# The previous notebooks explain all stages. This notebook fits one frame and then a whole clip, evaluates held-out
+# frames, and removes the components of the paper one by one.
 #
 # The settings are those of the preset `paper` with a shorter schedule and three changes that suit a few small frames:
 # wider time bases, fewer initial points, and views between the frames. They are not the published method, and the
-# numbers below say nothing about it.
+# numbers below are not results for it.
 #
 # The equations are {eq}`eq-6` of {doc}`/specification/06_objective`, and {eq}`eq-m1` and {eq}`eq-m2` of
 # {doc}`/specification/metrics`.
@@ -163,7 +163,7 @@ def score(state, constants, frames, **components):
 # %% [markdown]
 # ## One frame
 #
-# This run uses the first training frame alone. Nothing moves, so every component of motion is off.
+# This run uses only the first training frame. Nothing moves, so every component of motion is off.
 
 # %%
 first = int(sequence.train_index[0])
@@ -312,10 +312,10 @@ for k in sequence.test_index:
 # %% [markdown]
 # ## Held-out frames: the pictures
 #
-# Held-out frames are used in no part of training: not in the losses, not for the initial points, not in the statistics
-# of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each residual on the
-# image. The effect of S is small here, because its rate is a tenth of that of the deformation and a short run has few
-# steps.
+# Held-out frames are not used in any part of training: neither in the losses, nor for the initial points, nor in the
+# statistics of the atoms. The figure shows the truth, the render, the error over tissue, and the effect of each
+# residual on the image. The effect of S is small here, because its rate is a tenth of the rate of the deformation and a
+# short run has few steps.
 
 # %% tags=["hide-input"]
 shown = sequence.test_index[[0, -1]]
@@ -389,17 +389,18 @@ SimpleNamespace(_repr_html_=lambda: picture)
 #
 # With every eighth frame held out, the preset `quick` is 2.2 dB above the blend of the two neighbours there, and
 # `paper` is 0.6 dB above it. On a recorded clip with little noise, the preset `paper` is 1.5 dB below that blend, and
-# `sharp` is 0.8 dB above it. The blend adds its own noise, and it smears what moves: it is strong where a clip has
-# little of both. The worst frame of `paper` shows the same fault as the blend. Every vessel appears twice, because the
-# model fades one training frame into the next and does not move the vessel between them:
+# `sharp` is 0.8 dB above it. The blend adds its own noise, and smears moving tissue, so it is strong on a clip with
+# little noise and motion. The worst frame of `paper` shows the same fault as the blend. Every vessel appears twice,
+# because the model fades one training frame into the next and does not move the vessel between them:
 #
 # ![The worst held-out frame of paper: truth, model, copy, blend and flow](/results/full_size/paper_eighth_worst.webp)
 #
 # ## Ablation
 #
 # Each component is removed in turn, with the same seed and the same schedule. The table also lists the baselines, which
-# need no model. Small differences are not significant: they come from one seed of a short run. On a slow clip the blend
-# of two neighbouring frames is a strong baseline. A reconstruction also gives depth, and any other time and view.
+# need no model. Differences are from one seed of a short run, so small ones are not significant. On a slow clip the
+# blend of two neighbouring frames is a strong baseline. Unlike a baseline, a reconstruction also gives depth and other
+# views.
 
 # %% tags=["hide-input"]
 variants = {
@@ -476,7 +477,7 @@ np.testing.assert_array_equal(opened.render(time=0.37).colour, view.colour)
 #
 # ## The gradient check
 #
-# The whole chain is checked as one function of ten groups of raw parameters with one number as its value. Here each
+# The whole chain is checked as one scalar function of ten groups of raw parameters. Here each
 # group is one block; `endotsr gradcheck` probes the same pair in finer blocks.
 
 # %%

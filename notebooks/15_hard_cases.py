@@ -13,7 +13,7 @@
 # %% [markdown]
 # # 15. Hard cases
 #
-# A program that is correct on random input can still be wrong. Each section below has input that breaks plausible code,
+# Code that is correct on random input can still be wrong. Each section below has input that breaks plausible code,
 # names the mistake, and states the required result. The last section asks whether the gradient check can fail.
 # {doc}`/hard_cases` has the full list with a bound and a test for each case, and the naive formulas evaluated in both
 # precisions.
@@ -350,8 +350,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass: a check that can fail
 #
-# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by one
-# part in a thousand, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
+# The checker receives one correct reverse pass and four wrong ones: a flipped sign, a gradient that is too large by 0.1
+# %, a zero gradient, and one missing Gaussian. It must refuse all four and report where the error is.
 
 # %%
 pair = all_pairs()["matern_penalty"]

@@ -224,10 +224,10 @@ axis.set(
 plt.show()
 
 # %% [markdown]
-# ## Play: cutoff and stop
+# ## Interactive figure: cutoff and stop
 #
 # 160 Gaussians are blended from front to back. Move the cutoff below 1e-5: the error vanishes while the visits grow.
-# Move the stop above 1e-2: the picture loses what lies behind.
+# Move the stop above 1e-2: the picture loses the Gaussians at the back.
 #
 # <div class="widget" data-widget="cutoff">The figure is live in the built book.</div>
 

@@ -13,12 +13,12 @@
 # %% [markdown]
 # # 17. What a scene calls for
 #
-# A scene at rest needs no time bases, and steady light needs no colour residual. `endotsr inspect` tests the training
-# frames of a clip for each effect, and plans the components that answer what it finds. This notebook repeats four of
-# the tests by hand, on clips in which every effect is known.
+# A static scene needs no time bases, and constant light needs no colour residual. `endotsr inspect` tests the training
+# frames of a clip for each effect and plans the components that model it. This notebook repeats four of the tests by
+# hand, on clips in which every effect is known.
 #
-# The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must carry. The
-# page {doc}`/effects` says how often the tests are right, and what a plan saves.
+# The equation is {eq}`eq-1` of {doc}`/specification/01_dictionary`: the dictionary that the time stamps must resolve.
+# The page {doc}`/effects` shows how often the tests are right and how much a plan saves.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import os
@@ -53,9 +53,9 @@ found = {name: inspect_sequence(clip.sequence) for name, clip in made.items()}
 # %% [markdown]
 # ## Noise first
 #
-# Every test measures in units of the noise. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes all slow
-# change. Independent noise of deviation $\sigma$ gives it the deviation $\sqrt{1+4+1}\,\sigma$. The median of the
-# absolute values is $0.6745$ deviations for a normal distribution, and a few moving edges hardly change it.
+# Every test uses the noise as its unit. The second difference over time, $x_{t-1}-2x_t+x_{t+1}$, removes slow changes.
+# Independent noise of deviation $\sigma$ gives it the deviation $\sqrt{1+4+1}\,\sigma$. The median of the absolute
+# values is $0.6745$ deviations for a normal distribution, and a few moving edges hardly change it.
 
 
 # %% tags=["transcription"]
@@ -85,11 +85,11 @@ print(f"true {255 * sigma:.2f} grey levels, found {255 * found['still'].noise.le
 assert abs(found["still"].noise.level / sigma - 1) < 0.15
 
 # %% [markdown]
-# ## Motion, in units of what noise would show
+# ## Motion, in units of the flow from noise
 #
-# Even between two frames of a scene at rest the optical flow is not 0. The test therefore also measures the flow
-# between the reference frame and copies of it with fresh noise. A tile moves if its flow exceeds twice that, and a
-# twentieth of a pixel.
+# Even in a static scene the optical flow between two frames is not 0. The test therefore also measures the flow between
+# the reference frame and copies of it with new noise. A tile counts as moving if its flow exceeds twice this value and
+# 0.05 px.
 
 # %% tags=["hide-input"]
 figure, axes = plt.subplots(2, 3, figsize=(12, 6), layout="constrained")
@@ -123,12 +123,12 @@ assert (
 )
 
 # %% [markdown]
-# ## A camera that moves before a scene at rest
+# ## A moving camera and a static scene
 #
 # The whole picture then flows. In a rigid scene one number per tile explains the flow to all frames: its inverse depth
-# $\rho$. With the pose $(R_k,\mathbf t_k)$ from the reference camera to camera $k$, a point at the place $\mathbf x$ of
-# the reference is seen at the projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and
-# what is left is motion of the tissue. Depth is not needed.
+# $\rho$. With the pose $(R_k,\mathbf t_k)$ from the reference camera to camera $k$, a point at $\mathbf x$ in the
+# reference is seen at the projection of $R_k\mathbf x+\rho\,\mathbf t_k$. The test fits $\rho$ to the flow, and the
+# residual is motion of the tissue. Depth is not needed.
 
 
 # %% tags=["transcription"]
@@ -161,7 +161,7 @@ for k, camera in enumerate(clip.cameras):
 print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / rho:.3f} mm")
 
 # %% [markdown]
-# ## What the time stamps carry
+# ## The limit of the time stamps
 #
 # The Fourier components have the atoms
 #
@@ -169,12 +169,12 @@ print(f"flow up to {np.abs(flow).max():.2f} px; depth from flow and poses {1 / r
 # \phi_f(t) = \sin(2\pi\omega_f t),\qquad \phi_{F+f}(t) = \cos(2\pi\omega_f t),\qquad f=1,\dots,F .
 # $$
 #
-# A clip of $n$ frames carries at most $n/2$ cycles: at equal steps, every faster sinusoid agrees with a slower one. The
+# A clip of $n$ frames resolves at most $n/2$ cycles: at equal steps, every faster sinusoid equals a slower one. The
 # rank of the dictionary over the stamps, centred and scaled to RMS 1, need not show this: the slower sinusoid is seldom
-# one of the eight, so that the rank is full for 20 frames and 16 cycles. The plan therefore limits three things: the
-# highest frequency, the rank, and the condition, which is the largest singular value over the smallest. It bounds how
-# much the fit amplifies noise of the frames in the coefficients. It is large for the shortest clips, and varies little
-# from 33 frames on.
+# one of the eight, so the rank is full for 20 frames and 16 cycles. The plan therefore limits three quantities: the
+# highest frequency, the rank, and the condition number, which is the ratio of the largest to the smallest singular
+# value. The condition number bounds the amplification of frame noise in the coefficients. It is large for the shortest
+# clips and varies little from 33 frames on.
 
 
 # %% tags=["transcription"]
@@ -228,7 +228,7 @@ axis.set(xlabel="frames of the clip", ylabel="condition", title="8 frequencies u
 plt.show()
 
 # %% [markdown]
-# ## The plan, and what it saves
+# ## The plan and its savings
 #
 # A Gaussian always stores 11 base parameters. There are also three harmonic coefficients for each of the $(d+1)^2$
 # functions up to degree $d$, ten channels of $B$ bases with three numbers each, and $2\cdot3F$ numbers for each Fourier
@@ -263,9 +263,9 @@ for name, inspection in found.items():
 #    breathes?
 # 2. Write `frequencies` and the statistics of the atoms {eq}`eq-1b` and let the golden cases judge them:
 #    `--only frequencies` and `--only atoms` ({doc}`index`).
-# 3. The cell below answers this one. A clip has 63 frames at 15 frames a second. The heart beats 72 times a minute, and
-#    the patient breathes 15 times. How many cycles of both does the clip hold, and which of them can the test of rates
-#    and the dictionary find?
+# 3. The cell below answers this one. A clip has 63 frames at 15 frames per second. The heart beats 72 times per minute,
+#    and the patient breathes 15 times per minute. How many cycles of each does the clip contain, and which of them can
+#    the test of rates and the dictionary resolve?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. The clip lasts 4.2 s: 5.04 beats and 1.05 breaths. Both lie within the 1 to 16 cycles

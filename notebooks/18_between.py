@@ -15,11 +15,10 @@
 #
 # Every loss so far compares a render with a training frame. No loss reads a render between two training frames. In
 # {doc}`00_why` a clip breathes four times: the colour residual is right at the training times and several decibels
-# wrong between them. The preset `sharp` therefore renders moments between the frames too, and compares them with
-# targets that are made of both frames, moved along their optical flow.
+# wrong between them. The preset `sharp` therefore also renders moments between the frames and compares them with
+# targets made from both frames, moved along their optical flow.
 #
-# The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is an optional part that the paper does not
-# have.
+# The equation is {eq}`eq-b14` of {doc}`/specification/b14_between`. It is optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect
@@ -107,14 +106,14 @@ assert mean[both, "at held-out frames"] > mean[alone, "at held-out frames"] + 3
 assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 0.5
 
 # %% [markdown]
-# Trained on frames alone, the render is best at each training time and falls off on both sides of it, most around a
-# held-out frame, where the gap is twice as wide. With targets the course is smooth: the training frames lose a decibel,
+# If the model is trained only on frames, its PSNR peaks at each training time and falls on both sides, most around a
+# held-out frame, where the gap is twice as wide. With targets the curve is smooth: the training frames lose a decibel,
 # and the held-out frames gain several.
 #
 # ## The equation
 #
-# $I_0$ and $I_1$ are two training frames that follow one another, with the flow $f$ from the first to the second and
-# $g$ back. $a\in(0,1)$ is the moment. $G_2$ is a Gaussian window of 2 px.
+# $I_0$ and $I_1$ are two successive training frames, with the flow $f$ from the first to the second and $g$ from the
+# second to the first. $a\in(0,1)$ is the moment. $G_2$ is a Gaussian window of 2 px.
 #
 # $$
 # \begin{aligned}
@@ -130,11 +129,11 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 #
 # ## Step by step
 #
-# A flow says where the points of a *frame* go. A target needs to know which point is at a pixel at a *moment*, when no
-# frame was taken.
+# A flow gives the motion of the points of a *frame*. A target needs the point that is at a pixel at a *moment* without
+# a frame.
 #
-# **(18.1) The path of a point.** Between two frames a point moves on a straight line at constant speed, by $v$ in all.
-# If it is at $x$ at the moment $a$, it was at $x-av$ in $I_0$ and will be at $x+(1-a)v$ in $I_1$.
+# **(18.1) The path of a point.** Between two frames a point moves along a straight line at constant speed, by $v$ in
+# total. If it is at $x$ at the moment $a$, it was at $x-av$ in $I_0$ and will be at $x+(1-a)v$ in $I_1$.
 #
 # **(18.2) The forward flow** at the place in $I_0$ is the whole displacement: $v=f(x-av)$. The unknown is on both
 # sides, because the place at which to read the flow depends on the flow.
@@ -154,18 +153,18 @@ assert mean[both, "between two of them"] > mean[alone, "between two of them"] + 
 # of light. Their blend has less noise than a frame: its variance is $\bigl((1-a)^2+a^2\bigr)\sigma^2$, half of that of
 # a frame at $a=\frac12$.
 #
-# **(18.7) Two pairs, one pixel.** Flow can be wrong: at a highlight, at an occlusion, or for a motion that is too fast
-# for it. Then the pair that stayed may be better. Let the blends of the two pairs have independent errors of variance
-# $e_{\mathrm m}$ and $e_{\mathrm s}$. Their mix $(1-q)B_{\mathrm m}+qB_{\mathrm s}$ has the variance
+# **(18.7) Two pairs, one pixel.** Flow can be wrong at a highlight, at an occlusion, or for a fast motion. Then the
+# static pair may be better. Let the blends of the two pairs have independent errors of variance $e_{\mathrm m}$ and
+# $e_{\mathrm s}$. Their mix $(1-q)B_{\mathrm m}+qB_{\mathrm s}$ has the variance
 # $(1-q)^2e_{\mathrm m}+q^2e_{\mathrm s}$. Its derivative with respect to $q$ is 0 where
 # $(1-q)e_{\mathrm m}=qe_{\mathrm s}$, so $q=e_{\mathrm m}/(e_{\mathrm m}+e_{\mathrm s})$.
 #
 # **(18.8) The variances** are not known. The two pictures of a pair disagree where the pair is wrong, so their squared
-# difference stands for the variance. The window $G_2$ averages it over the noise. The smallest difference of 8-bit
+# difference is used as the variance. The window $G_2$ averages it over the noise. The smallest difference of 8-bit
 # pictures, $1/255$, is added, so that two equal pairs have $q=\frac12$ and not $0/0$.
 #
-# **(18.9) Excluded pixels.** A pixel of an instrument is no picture of tissue. Where only one of $J_0,J_1$ is tissue,
-# the target is that one. Where one of the four pictures is excluded, the pair that stayed is no evidence, and $q=0$.
+# **(18.9) Excluded pixels.** A pixel of an instrument does not show tissue. Where only one of $J_0,J_1$ is tissue, the
+# target is that one. Where one of the four pictures is excluded, the static pair is not evidence, and $q=0$.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.motion_between))
@@ -195,8 +194,8 @@ for s in (0.1, 0.3, 0.6):
             print(f"s = {s}: relative error {error.max():.4f}, bound {bound:.4f}")
 
 # %% [markdown]
-# Step (18.5): the frames exchanged, and $1-a$ in place of $a$, on two frames of the clip. Step (18.6): a clip without
-# motion: two frames with noise of variance $\sigma^2$, and the variance of their blends.
+# The next cell checks step (18.5) by exchanging two frames of the clip and replacing $a$ by $1-a$. It checks step
+# (18.6) on a clip without motion: two frames with noise of variance $\sigma^2$, and the variance of their blends.
 
 # %%
 first, second = (int(k) for k in clip.sequence.train_index[4:6])
@@ -214,8 +213,8 @@ for a in (0.25, 0.5):
     np.testing.assert_allclose(of_blend / of_frame, (1 - a) ** 2 + a**2, rtol=0.05)
 
 # %% [markdown]
-# Step (18.7): two independent errors, mixed with every $q$. The measured variance of the mix is smallest at the $q$ of
-# the equation.
+# For step (18.7), two independent errors are mixed with every $q$. The measured variance of the mix is smallest at the
+# $q$ of the equation.
 
 # %%
 rng = np.random.default_rng(18)
@@ -226,8 +225,8 @@ variance = [np.var((1 - q) * errors[0] + q * errors[1]) for q in tried]
 assert abs(tried[np.argmin(variance)] - e_m / (e_m + e_s)) < 0.02
 
 # %% [markdown]
-# Step (18.8): the upper half of a picture moves by 8 px and the lower half rests, but the flow says 8 px everywhere.
-# Above, the moved pair wins; below, the pair that stayed.
+# For step (18.8), the upper half of a picture moves by 8 px and the lower half is static, but the flow is 8 px
+# everywhere. The moved pair has the larger weight above, and the static pair below.
 
 # %%
 rows, columns = np.mgrid[0:96, 0:128]
@@ -250,10 +249,10 @@ assert q[8:40, 16:-16].mean() < 0.02 and q[56:-8, 16:-16].mean() > 0.98
 # %% [markdown]
 # ## Figure: one moment between two frames
 #
-# A clip with breathing, a beat, a pulled spot, highlights and a grasper, here with 16 frames. One frame is left out and
-# made of its neighbours, two frames away on either side. Below each picture is its error, from 0 (black) to 0.15
+# A clip with breathing, a beat, a pulled spot, highlights and a grasper, here with 16 frames. One frame is omitted and
+# predicted from its neighbours, two frames away on either side. Below each picture is its error, from 0 (black) to 0.15
 # (white). The last panel shows $q$. It is about one half where nothing moves and both pairs agree. It is small where
-# the frames as they are disagree, most of all at the highlights.
+# the static frames disagree, most of all at the highlights.
 
 # %% tags=["hide-input"]
 scene = replace(named_scene("pulling"), width=160, height=128, frames=16)
@@ -292,10 +291,10 @@ print({name: round(value, 2) for name, value in found.items()})
 assert found["the target"] > found["both frames as they are"] + 2
 
 # %% [markdown]
-# ## What the targets do not teach
+# ## The limit of the targets
 #
-# A target is a picture. It says what is seen at a moment and not which Gaussian should be seen there. The clip of the
-# problem shows the difference: the pictures between the frames are right, and the Gaussians still do not move.
+# A target is a picture. It determines the colour at a moment, but not which Gaussian should have it. The clip above
+# shows the difference: the pictures between the frames are right, but the Gaussians still do not move.
 
 # %%
 for name, run in runs.items():
@@ -307,16 +306,16 @@ for name, run in runs.items():
 # The colour residual now imitates the motion at the moments as well, and sixteen atoms cannot follow every moment. The
 # motion itself is the subject of {doc}`19_tracked_motion`.
 #
-# On the real clip the target comes nearer to the held-out frames than the frames as they are for every gap, and than
-# the frames moved for blocks of 4 frames and more. The table is on the page of {eq}`eq-b14`. What the targets bring to
-# a training is measured in {doc}`/results/README`.
+# On the real clip the target is closer to the held-out frames than the static pair for every gap, and than the moved
+# pair for blocks of 4 frames and more. The table is on the page of {eq}`eq-b14`. {doc}`/results/README` gives the
+# effect of the targets on a training.
 #
 # ## The reverse pass
 #
-# There is none. A target is made of training frames and of flow, which no parameter of the model changes: it is held
-# fixed, as a frame is. The losses of {doc}`10_base_losses` differentiate the render at the moment. Time enters the
-# model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, whose values at the moment are as good as those at
-# a frame. The pair to check is the loss that reads the target.
+# There is none. A target is made from training frames and flow, which do not depend on any parameter of the model, so
+# it is held fixed like a frame. The losses of {doc}`10_base_losses` differentiate the render at the moment. Time enters
+# the model only through the atoms {eq}`eq-1` and the bases {eq}`eq-b1`, which are valid at any time. The pair to check
+# is the loss that reads the target.
 
 # %%
 with one_thread():
@@ -330,10 +329,10 @@ assert report.passed
 # 1. The tissue moves by 6 px between two frames and the flow says 7. Use (18.1) to find where $J_0$ and $J_1$ are read
 #    at $a=\frac12$, and how far apart the two pictures of the point are. Is their blend sharper or softer than a frame?
 # 2. Write `motion_between` from (18.2) to (18.5) and let the cells of this chapter judge it: assign your function to
-#    the name `motion_between` and run the cells below *The steps in numbers* again. No golden case holds a flow,
-#    because a port may take any. The loss that reads the target has cases: `--only masked_l1` ({doc}`index`).
-# 3. The cell below answers this one. Leave out the constant $255^{-2}$ of (18.8). What is $q$ for two equal frames and
-#    a flow of 0? Which pixels of a real clip would that concern?
+#    the name `motion_between` and run the cells below *The steps in numbers* again. No golden case contains a flow,
+#    because a port may use any. The loss that reads the target has cases: `--only masked_l1` ({doc}`index`).
+# 3. The cell below answers this one. Omit the constant $255^{-2}$ of (18.8). What is $q$ for two equal frames and a
+#    flow of 0? Which pixels of a real clip would this affect?
 
 # %% jupyter={"source_hidden": true} tags=["hide-cell"]
 # Answer. 0 / 0: both pairs agree exactly. A saturated highlight and a black border are the same

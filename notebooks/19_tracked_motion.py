@@ -14,12 +14,11 @@
 # # 19. Gaussians that start with the motion of the tissue
 #
 # A model can show a moving clip without moving: it changes colours ({doc}`00_why`), or it fades one Gaussian out and
-# another one in. Gradient descent finds these ways first, because they lower the loss at once. Motion lowers the loss
-# only if many Gaussians move together. The preset `sharp` therefore measures the motion before the training, by optical
-# flow and the prior depth, and the Gaussians start with it.
+# another one in. Gradient descent finds these solutions first, because they lower the loss at once. Motion lowers the
+# loss only if many Gaussians move together. The preset `sharp` therefore measures the motion before the training from
+# optical flow and the prior depth, and the Gaussians start with it.
 #
-# The equation is {eq}`eq-b15` of {doc}`/specification/b15_tracked_motion`. It is an optional part that the paper does
-# not have.
+# The equation is {eq}`eq-b15` of {doc}`/specification/b15_tracked_motion`. It is optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect
@@ -54,9 +53,9 @@ rho = matern_weights(omega, length)
 # %% [markdown]
 # ## The problem
 #
-# A clip that breathes twice in 24 frames. Three trainings of 500 iterations: as in the paper, with tracked motion, and
-# with tracked motion and the targets of {doc}`18_between`. *Trajectory error* is the distance between the motion of the
-# model and the true motion. A model at rest has the error in the last column.
+# A clip breathes twice in 24 frames. It is trained three times for 500 iterations: as in the paper, with tracked
+# motion, and with tracked motion and the targets of {doc}`18_between`. *Trajectory error* is the distance between the
+# motion of the model and the true motion. A static model has the error in the last column.
 
 # %%
 settings = with_effects(SimulatorSettings(width=96, height=76, frames=24), "breathing", "noise")
@@ -115,8 +114,8 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 #
 # **(19.2) Do the flows agree?** Exact flows lead back to the start: $f(x)+g(x')=0$. A flow has an error that grows with
 # the motion and an error of some fraction of a pixel that does not. The point stays followed if
-# $\lVert f(x)+g(x')\rVert^2\le0.02\,\lVert f(x)\rVert^2+0.5$ px². At an occlusion the way back ends on another piece of
-# tissue, and the test fails.
+# $\lVert f(x)+g(x')\rVert^2\le0.02\,\lVert f(x)\rVert^2+0.5$ px². At an occlusion the backward flow ends on another
+# piece of tissue, and the test fails.
 #
 # **(19.3) Is it the same surface?** $x'$ and its four neighbours must be tissue with a prior depth, and the depth may
 # change by at most 20 %. An instrument in front of the tissue fails the first test, and a fold the second.
@@ -125,8 +124,8 @@ assert tracked[1] > paper[1] + 1 and both[1] > tracked[1] + 0.3
 # weighted by their inverse distance. Its $a_{pi}$ is 0.1.
 #
 # **(19.5) Found again.** A lost point is followed again at the first frame that shows tissue at its pixel with a depth
-# within 2.5 % of its own. This limit is narrower than the one of (19.3), because nothing but the depth says that it is
-# the same piece.
+# within 2.5 % of its own. This limit is narrower than in (19.3), because the depth is the only evidence that it is the
+# same piece.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition_of_tracks._step))
@@ -235,12 +234,12 @@ assert error[~carried].mean() < 0.35 * moved.mean()
 # conditions are rows of $\bigl(\sum_ia_{pi}\,d_id_i^{\mathsf T}+\operatorname{diag}(0,w)\bigr)u_p^{\mathsf T}
 # =\sum_ia_{pi}\,d_iX_p(t_i)^{\mathsf T}$. The matrix has $1+2F=17$ rows and is the same for the three directions.
 #
-# **(19.8) The position has no weight**, so a point that stays where it is has $C_p=0$ and $\mu_p=X_p$: both conditions
-# hold with $r_i=0$. The weight is there because the atoms alone fit everything: 21 times for 17 unknowns.
+# **(19.8) The position has no weight**, so a static point has $C_p=0$ and $\mu_p=X_p$: both conditions hold with
+# $r_i=0$. The weight is needed because the atoms alone fit almost anything: there are 21 times for 17 unknowns.
 #
-# **(19.9) What the weight costs.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
+# **(19.9) The cost of the weight.** Over $n$ evenly spaced times an atom has $\sum_i\phi_k^2\approx n/2$. A motion that
 # is one atom of amplitude $A$ is fitted with the amplitude $A\,\frac{n/2}{n/2+w_k}$. The weight $0.1$ costs 1 % at 20
-# times; $30\rho$ removes the fastest atoms. This is where the penalty {eq}`eq-4` enters before the training.
+# times; $30\rho$ removes the fastest atoms. In this way the penalty {eq}`eq-4` acts before the training.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.with_tracked_motion))
@@ -259,7 +258,7 @@ print(f"{np.abs(of_position).max():.1e}, {np.abs(of_coefficients).max():.1e}")
 assert np.abs(of_position).max() < 1e-9 and np.abs(of_coefficients).max() < 1e-9
 
 # %% [markdown]
-# Steps (19.8) and (19.9): a point at rest, and points that move like one sine each.
+# The next cell checks steps (19.8) and (19.9) on a static point and on points that each move like one sine.
 
 # %%
 n = 64
@@ -286,19 +285,19 @@ np.testing.assert_allclose(kept[[0, -1]], expected[[0, -1]], atol=0.02)
 assert expected[0] > 0.99 and expected[-1] < 0.2
 
 # %% [markdown]
-# Between the ends of the list the share that is kept is smaller than expected: neighbouring atoms are not orthogonal
-# over one clip, and slower ones, which cost less, take a part of the motion.
+# Between the ends of the list the remaining fraction is smaller than expected: neighbouring atoms are not orthogonal
+# over one clip, and slower atoms, which cost less, represent a part of the motion.
 #
 # ## Why not the deformation
 #
-# The deformation {eq}`eq-b1` could hold a motion as well. It starts at 0 all the same. Its centres and widths are
-# learned, and with large weights one step of a centre moves a Gaussian by a pixel. The atoms are fixed functions of
-# time, so a step of $C$ changes a path by no more than the step.
+# The deformation {eq}`eq-b1` could also represent the motion, but it starts at 0. Its centres and widths are learned,
+# and with large weights one step of a centre moves a Gaussian by a pixel. The atoms are fixed functions of time, so a
+# step of $C$ changes a path by no more than the step.
 #
 # ## Figure: the motion that the model has learned
 #
-# The clip of the problem, from rest to the time of the largest displacement: brightness is the length of the
-# displacement, up to the largest true one. Then a held-out frame with its error.
+# The figure shows the clip above from rest to the time of the largest displacement; brightness is the length of the
+# displacement, up to the largest true one. It also shows a held-out frame with its error.
 
 # %% tags=["hide-input"]
 films = clip.sequence
@@ -337,8 +336,8 @@ plt.show()
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: tracks and coefficients are made before the training, and neither is differentiated. From the
-# first iteration on the training moves $\mu$ and $C$ by the reverse pass of {eq}`eq-3`, which is the pair to check.
+# There is none: tracks and coefficients are computed before the training and are not differentiated. From the first
+# iteration on, training changes $\mu$ and $C$ through the reverse pass of {eq}`eq-3`, which is the pair to check.
 # (19.6) is the same reverse pass with a quadratic loss at every training time, set to 0.
 
 # %%

@@ -14,12 +14,12 @@
 # # 20. A first look: fewer pixels and a known number of Gaussians
 #
 # The time of an iteration grows with the number of pixels and with the number of Gaussians. Early in a training both
-# are wasted: the render is far from the frame, so its finest pixels say little, and a threshold adds as many Gaussians
-# as happen to exceed it. The preset `quick` starts on frames of half size and grows to a number of Gaussians that is
-# stated in advance.
+# are wasted: the render is far from the frame, so its finest detail carries little information, and the number of
+# Gaussians above a threshold is arbitrary. The preset `quick` starts on frames of half size and grows to a given number
+# of Gaussians.
 #
 # The equation of the coarse start is {eq}`eq-b17` of {doc}`/specification/b17_coarse_start`; the growth to a budget is
-# a rule of {doc}`/specification/b11_density`. Both are optional parts that the paper does not have.
+# a rule of {doc}`/specification/b11_density`. Both are optional and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect
@@ -52,11 +52,11 @@ rng = np.random.default_rng(20)
 #
 # The published rule clones or splits every Gaussian whose mean screen gradient exceeds a threshold ({eq}`eq-b11`,
 # derived in {doc}`12_optimiser_and_density`). The number of new Gaussians therefore depends on everything that scales a
-# gradient: the weights of the losses, the size of the frames, the exposure. A budget fixes the number and leaves only
-# the choice to the gradients.
+# gradient: the weights of the losses, the size of the frames, the exposure. A budget fixes the number; the gradients
+# determine only the choice.
 #
-# **(20.1) An equal share.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. This
-# one adds $\lceil\max(0,M-N)/r\rceil$, at the largest gradients.
+# **(20.1) Equal steps.** $N$ Gaussians are left after pruning, $M$ is the budget, and $r$ densifications remain. The
+# current one adds $\lceil\max(0,M-N)/r\rceil$, at the largest gradients.
 #
 # **(20.2) The budget is reached.** After a step without rounding, $M-N-(M-N)/r=(M-N)\frac{r-1}r$ are missing, and
 # $r-1$ densifications remain. If nothing is pruned in between, the next step is $(M-N)/r$ again, so the steps are equal.
@@ -70,9 +70,9 @@ rng = np.random.default_rng(20)
 print(inspect.getsource(definition_of_density.densify))
 
 # %% [markdown]
-# Ten densifications of 1000 Gaussians with gradients of one distribution, under both rules. All gradients are then
-# multiplied by 3, as by larger weights of the losses. At every call a twentieth of the Gaussians has faded and is
-# pruned.
+# The next cell makes ten densifications of 1000 Gaussians with gradients from one distribution, under both rules. All
+# gradients are then multiplied by 3, as larger weights of the losses would do. At every call 5 % of the Gaussians have
+# faded and are pruned.
 
 
 # %%
@@ -125,22 +125,22 @@ np.testing.assert_allclose(np.diff(steps), 50 / np.arange(9, 0, -1), rtol=1e-9)
 # d=\operatorname*{mean}_{k\in K}\ \operatorname*{mean}_{c,\,p:S_1(p)}\bigl|P_1(I_k)\bigr|
 # $$
 #
-# ## Step by step: when half the size is enough
+# ## Step by step: when half size is enough
 #
-# **(20.4) What the half lacks.** A frame is its finest band $P_1$ plus a frame of half size, enlarged ({eq}`eq-5`). A
-# perfect fit to the frames of half size still misses the full frame by $P_1$, in the mean by $d$.
+# **(20.4) Detail missing at half size.** A frame is its finest band $P_1$ plus a frame of half size, enlarged
+# ({eq}`eq-5`). A perfect fit to the frames of half size still misses the full frame by $P_1$, in the mean by $d$.
 #
 # **(20.5) The test.** While the fit misses the frames of half size by more than that, $e>d$, the missing band is the
-# smaller of the two errors. Half the size costs a quarter of the pixels. From $e<d$ on the finest band is the larger
-# error, and the full frames are needed.
+# smaller of the two errors. Half size has a quarter of the pixels. Once $e<d$, the finest band is the larger error, and
+# the full frames are needed.
 #
 # **(20.6) The camera.** The edges of the picture stay where they are, so $u'=u/2$ for every point. With the centre of
 # the first pixel at $(0.5,0.5)$ this needs no shift.
 #
 # **(20.7) The smoothness.** Its loss sums squared steps of depth on tissue and absolute steps, the total variation,
 # under the instrument ({eq}`eq-b9`), each as a mean over pixels. At half size neighbouring pixels are twice as far
-# apart. On a slope an absolute step is twice as large and a squared one four times. The weight is halved, which keeps
-# the total variation of a slope and nothing else.
+# apart. On a slope an absolute step is twice as large and a squared one four times. The weight is halved, which
+# preserves only the total variation of a slope.
 
 # %% tags=["transcription"]
 print(inspect.getsource(definition.coarse_ends))
@@ -191,7 +191,7 @@ np.testing.assert_allclose(ratios, [2.0, 0.5, 1.0], rtol=0.1)
 #
 # The scene of the demonstration at 128x96 pixels is trained twice for 400 iterations with the preset `paper`,
 # shortened: with a coarse start and without one. The work of a training is the number of pixels that it compares with a
-# frame. The course of $e$ in the figure is that of a third training, which stays at half size to the end.
+# frame. The curve of $e$ in the figure is from a third training, which stays at half size to the end.
 
 # %% tags=["hide-input"]
 T = 400

@@ -13,10 +13,10 @@
 # %% [markdown]
 # # 21. One seam
 #
-# A recording of minutes is trained in windows that overlap, each a run of its own. Two windows that were trained apart
-# do not show the same picture where they overlap. This chapter follows one seam: how two windows are shown as one
-# scene, {eq}`eq-b18b`, and how a window starts from its neighbour, {eq}`eq-b18c`. Both are on the page
-# {doc}`/specification/b18_windows`; the paper does not have them.
+# A recording of several minutes is trained in overlapping windows, each a separate run. Two windows that were trained
+# separately do not give the same picture in their overlap. This chapter follows one seam: how two windows are shown as
+# one scene, {eq}`eq-b18b`, and how a window starts from its neighbour, {eq}`eq-b18c`. Both are on the page
+# {doc}`/specification/b18_windows` and not in the paper.
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Imports", "code_prompt_hide": "Hide the imports"}
 import inspect
@@ -86,11 +86,11 @@ print([(window.first, window.end) for window in plan.windows])
 # \hat I(g)=\bigl(1-w(g)\bigr)\,\hat I(g)+w(g)\,\hat I'(g),\qquad w(g)=\frac{g-b}{e-b},\quad b\le g\le e
 # $$
 #
-# **(21.1) The ends.** $w(b)=0$ and $w(e)=1$: where the overlap begins the scene is still window $k$ alone, and where it
-# ends it is window $k+1$ alone. Both windows are continuous in time, and so is $w$, so the scene has no jump.
+# **(21.1) The ends.** $w(b)=0$ and $w(e)=1$: at the beginning of the overlap the scene is window $k$ alone, and at its
+# end window $k+1$ alone. Both windows are continuous in time, and so is $w$, so the scene has no jump.
 #
-# **(21.2) The largest step.** Let the windows differ by $\delta$ at a pixel, nearly constant over the overlap. A change
-# of window between two frames is a step of $\delta$ at once. The blend adds $\delta/(e-b)$ to each frame of the overlap.
+# **(21.2) The largest step.** Let the windows differ by $\delta$ at a pixel, nearly constant over the overlap. A switch
+# of windows between two frames is one step of $\delta$. The blend adds $\delta/(e-b)$ to each frame of the overlap.
 #
 # **(21.3) The error.** Let the windows have errors $\epsilon,\epsilon'$ of equal variance $\sigma^2$ with the
 # correlation $c$. The blend has $\bigl[(1-w)^2+w^2+2w(1-w)c\bigr]\sigma^2$, which is never above $\sigma^2$, and
@@ -115,8 +115,8 @@ for g in (begin, begin + 2.5, end):
     print(f"g = {g}: w = {w:.3f}, windows {[part.window for part in two]}")
 
 # %% [markdown]
-# Steps (21.2) and (21.3), measured: the steps from one frame to the next with the blend and with a change of window in
-# the middle, and the PSNR of either window and of the blend in the middle of the overlap.
+# The next cell measures steps (21.2) and (21.3): the change from one frame to the next with the blend and with a switch
+# in the middle, and the PSNR of either window and of the blend in the middle of the overlap.
 
 # %%
 middle = (begin + end) // 2
@@ -140,7 +140,7 @@ assert steps["blend"].max() < steps["change of window"].max()
 assert values[2] > max(values[:2])
 
 # %% [markdown]
-# ## Play: the length of the overlap
+# ## Interactive figure: the length of the overlap
 #
 # Two windows differ by 6 levels, and their errors are of equal size. Lengthen the overlap: the largest step becomes
 # smaller (21.2), and the recording needs more windows. Raise the correlation of the errors: the gain in the middle goes
@@ -159,8 +159,8 @@ assert values[2] > max(values[:2])
 # h_0=h_{0,n}+\tfrac{\beta}{Y_{00}}\tanh\bigl(A_n\bar\phi_n(t^*)\bigr)
 # $$
 #
-# **(21.4) Time is not carried.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour. What
-# they say about $t^*$ is put into the canonical Gaussian, and they start from 0.
+# **(21.4) Time is not inherited.** The bases of the FDM and the atoms of $A$ belong to the time of the neighbour. Their
+# values at $t^*$ become part of the canonical Gaussian, and they start from 0.
 #
 # **(21.5) The motion** $C$ is fitted to tracks of the new frames, as in {doc}`19_tracked_motion`. The subtraction of
 # $C\,\phi(u^*)$ leaves the Gaussian in its place at the join, whatever $C$ is: $\mu+C\,\phi(u^*)=\mu_n(t^*)$.
@@ -180,7 +180,7 @@ print(f"{state.gaussians.count} Gaussians, coefficients C up to {largest:.2f}")
 assert not state.gaussians.fdm_weight.any() and state.gaussians.motion_coefficients.any()
 
 # %% [markdown]
-# ## Figure: the seam, and what the warm start saves
+# ## Figure: the seam, and the saving of the warm start
 #
 # Left: the step from one frame to the next across the overlap (grey). Right: the loss of the second window from a cold
 # and from a warm start, each smoothed over 20 iterations.
@@ -217,7 +217,7 @@ assert losses["warm"].size == 0.4 * losses["cold"].size
 # %% [markdown]
 # ## The reverse pass
 #
-# There is none: the blend is part of no loss, and the carried state is held fixed in the training that it starts.
+# There is none: the blend is not part of any loss, and the inherited state is only the start of a training.
 # The pair to check is the motion {eq}`eq-3` whose coefficients (21.5) fits.
 
 # %%

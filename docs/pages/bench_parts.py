@@ -1,4 +1,4 @@
-"""Generated parts of docs/bench.md, one function a part, as Markdown; the input is the JSON of `bench.py measure`."""
+"""Generated parts of docs/bench.md, one function per part, as Markdown; the input is the JSON of `bench.py measure`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -94,7 +94,7 @@ def stages(found: Result) -> str:
     dense = case["densification"]
     after = (
         f"A densification, once in a hundred iterations, takes {dense['median_ms']:.0f} ms: "
-        f"{dense['per_iteration_ms']:.2f} ms an iteration."
+        f"{dense['per_iteration_ms']:.2f} ms per iteration."
     )
     head = ["stage", "median, ms", "quartiles, ms", "fraction", "limit, ms", "of the limit", "bound by"]
     picture = "![Stacked bars: time of each stage of one training iteration](results/bench_stages.png)"
@@ -174,13 +174,13 @@ def scaling(found: Result) -> str:
 def _memory(slopes: Result, largest: Result) -> str:
     count, state = largest["size"][-1], largest["state_bytes"][-1]
     each = slopes["bytes_per_gaussian"]
-    peak = f"{each / 1e3:.1f} kB a Gaussian at the peak" if each else "a peak that the system does not tell"
+    peak = f"{each / 1e3:.1f} kB per Gaussian at the peak" if each else "a peak that the system does not report"
     text = f"Memory: {peak}, of which parameters and their two moments are {state / count / 1e3:.1f} kB"
     frame = slopes["bytes_per_frame"]
-    text += f"; {frame / 1e6:.1f} MB a frame for the picture and its targets." if frame else "."
+    text += f"; {frame / 1e6:.1f} MB per frame for the picture and its targets." if frame else "."
     seconds = largest["median_ms"]["iteration"][-1] / 1e3
     return (
-        f"{text} {count:,.0f} Gaussians train at {seconds:.2f} s an iteration with all losses, "
+        f"{text} {count:,.0f} Gaussians train at {seconds:.2f} s per iteration with all losses, "
         f"in {memory(largest['peak_memory_bytes'][-1])}."
     )
 

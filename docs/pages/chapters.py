@@ -97,7 +97,7 @@ def table(found: dict[str, Chapter], times: dict[str, Any]) -> str:
     for name, chapter in found.items():
         spent = times["chapters"].get(name, {}).get("processor_seconds")
         steps = f"{chapter.steps} steps" if chapter.steps else "reverse pass" if chapter.derived else "measures only"
-        figures = f"{chapter.figures}" + (f", {chapter.plays} to play with" if chapter.plays else "")
+        figures = f"{chapter.figures}" + (f", {chapter.plays} interactive" if chapter.plays else "")
         exercises = f"{chapter.exercises}, {chapter.judged} judged"
         cells = [steps, figures, exercises, "not measured" if spent is None else f"{spent:.0f} s"]
         rows.append([f"{{doc}}`{name}`", chapter.motive, *cells])

@@ -7,7 +7,7 @@
     python docs/pages/effects.py real FOLDER ...             verdicts on EndoNeRF folders and on `sinus_endoscopy`
     python docs/pages/effects.py                             write the page from docs/results
 
-An interrupted `detect`, `train` or `truth` goes on where it stopped when it is started again with the same words.
+An interrupted `detect`, `train` or `truth` continues when it is started again with the same arguments.
 `python docs/pages/bench.py measure effects` measures the time of the parts.
 """
 
@@ -169,7 +169,7 @@ def _read_endonerf(folder: Path, scale: float = 1.0) -> Any:
 def fragments(found: dict[str, dict[str, Any]]) -> dict[str, str]:
     """Every generated part of the page by name; a part without its measurement says so."""
     makers = {
-        "answer": (effects_parts.answer, "train"),
+        "answer": (lambda result: effects_parts.answer(result, found.get("real")), "train"),
         "costs": (effects_parts.costs, "bench"),
         "detections": (effects_parts.detections, "detect"),
         "amplitudes": (effects_parts.amplitudes, "detect"),

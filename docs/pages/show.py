@@ -85,7 +85,7 @@ def table(result: dict[str, Any]) -> str:
     note = (
         f"A run of {result['gaussians']} Gaussians on {result['frames']} frames of {size}, whose checkpoint has "
         f"{result['checkpoint_mb']:.0f} MB; the slim model is {slim:.0%} of it. A headless browser that draws with the "
-        f"processor needs {page['milliseconds']:.0f} ms a picture of the page, and its picture has {page['psnr']:.1f} "
+        f"processor needs {page['milliseconds']:.0f} ms per picture of the page, with a PSNR of {page['psnr']:.1f} "
         f"dB against the reference renderer ({machine(result)})."
     )
     return f"{markdown(('Written', 'Time', 'Size'), rows)}\n\n{note}"

@@ -27,14 +27,14 @@ EXPONENTIALS = (3, 5, 7)  # degrees beside the built-in 11
 TILES = (8, 16, 32)
 
 OMITTED = {
-    "low-pass of 0.3 px^2, near plane": "they change the model, not the arithmetic: there is no error to speak of",
+    "low-pass of 0.3 px^2, near plane": "they change the model, not the arithmetic, so there is no error",
     "off-axis clamp of the Jacobian": "part of the presets; it acts on Gaussians outside the picture only",
     "culling": "exact in every setting: a Gaussian that reaches no pixel is never visited",
     "reuse of the depth order between frames": "not offered: the order is exact in every frame",
     "T stored or replayed in the reverse pass": "fixed by the compositor: `definition` keeps T, `blocks` replays it",
-    "tile size of the fast path": "64x16 pixels, a constant that its vector code is compiled for; "
-    "the dial turns the tiles of `definition`",
-    "fast-math": "not offered: sums keep their order, so that results repeat bit for bit",
+    "tile size of the fast path": "64x16 pixels, a constant of the compiled vector code; "
+    "the dial varies the tiles of `definition`",
+    "fast-math": "not offered: sums keep their order, so that results are reproducible bit for bit",
 }
 
 

@@ -142,7 +142,7 @@ def _verdict(scene: dict[str, Any], paper: dict[str, Any], here: dict[str, Any])
     """Whether the first two sentences of advice hold on a scene, and if not, what to do there."""
     wrong = []
     if paper["error"]["rms"] > scene["lines"]["eight_bit"]:
-        wrong.append("`paper` errs by more than half a step of 8 bit on average")
+        wrong.append("the average error of `paper` exceeds half a step of 8 bit")
     if here["error"]["max"] > scene["lines"]["eight_bit"]:
         better = eight_bit_setting(scene)
         instead = f"take {better['name']}" if better else "no float32 setting keeps it"

@@ -24,7 +24,7 @@ def advice(result: dict[str, Any]) -> list[str]:
     paper = by_name[result["presets"]["paper"]]
     chosen = eight_bit_setting(result)
     sentences = [
-        f"For pictures and for training take `paper`: it errs by {levels(paper['error']['rms'])} on average and by "
+        f"For pictures and for training use `paper`: its error is {levels(paper['error']['rms'])} on average and "
         f"{levels(paper['error']['max'])} at the worst pixel{_against_noise(paper, result)}."
     ]
     if chosen is not None:
@@ -133,13 +133,13 @@ def summary(result: dict[str, Any]) -> list[str]:
     if "float64" in ends:
         chance = abs(ends["float64"][1] - ends["base"][1])
         lines.append(
-            "Chance: each training has one seed. `float64` differs from `base` by rounding alone, and ends "
+            "Noise: each training has one seed. `float64` differs from `base` only by rounding and ends "
             f"{chance:.2f} dB from it. Smaller differences are noise."
         )
     for name, (seconds, psnr) in ends.items():
         better = [other for other, (time, best) in ends.items() if time < seconds and best > psnr + chance]
         if better:
-            lines.append(f"*{name}* is slower, and worse by more than chance, than: {', '.join(better)}.")
+            lines.append(f"*{name}* is slower than the following, and worse beyond noise: {', '.join(better)}.")
     return lines
 
 
