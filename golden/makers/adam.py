@@ -5,7 +5,6 @@ gradients, and that a second moment of 0 moves nothing.
 """
 
 from makers.making import Made, Seeds, Spec, changed
-from makers.wrong import edit, port
 
 OPERATIONS = ("adam",)
 
@@ -43,73 +42,3 @@ def _zero_moment() -> Spec:
 def cases() -> list[Spec]:
     """Three steps, and gradients of 0."""
     return [_three_steps(), _zero_moment()]
-
-
-# ---- mistakes ----
-
-SOURCE = "fitting.adam"
-
-WRONG_PORTS = [
-    port(
-        "adam_without_bias_correction",
-        "Adam without bias correction",
-        "m / sqrt(v); right: corrected",
-        "adam",
-        edit(
-            SOURCE,
-            "return learning_rate / (1.0 - beta1**step), 1.0 / (1.0 - beta2**step) ** 0.5",
-            "return learning_rate, 1.0",
-        ),
-    ),
-    port(
-        "adam_second_moment_uncorrected",
-        "Bias correction of the first moment alone",
-        "v; right: v / (1 - beta2^k)",
-        "adam",
-        edit(SOURCE, "(1.0 - beta1**step), 1.0 / (1.0 - beta2**step) ** 0.5", "(1.0 - beta1**step), 1.0"),
-    ),
-    port(
-        "adam_epsilon_in_root",
-        "Epsilon inside the root",
-        "sqrt(v + eps); right: sqrt(v) + eps",
-        "adam",
-        edit(SOURCE, "(np.sqrt(v) * root + epsilon)", "np.sqrt(v * root * root + epsilon)"),
-    ),
-    port(
-        "adam_epsilon_1e-8",
-        "Adam's usual epsilon",
-        "1e-8; right: 1e-15",
-        "adam",
-        edit(SOURCE, "real(rate), real(root), real(epsilon)", "real(rate), real(root), real(1e-8)"),
-    ),
-    port(
-        "adam_first_step_zero",
-        "First gradient not stepped on",
-        "one step late; right: k counts from 1",
-        "adam",
-        edit(
-            SOURCE,
-            "        state.step[name] += 1\n        for part",
-            '        if not state.step.setdefault(f"{name} began", 0):\n            state.step[f"{name} began"] = 1\n'
-            "            continue\n        state.step[name] += 1\n        for part",
-        ),
-    ),
-    port(
-        "adam_zero_over_zero",
-        "Step of a zero gradient",
-        "0 / 0; right: 0 over epsilon",
-        "adam",
-        edit(SOURCE, "(np.sqrt(v) * root + epsilon)", "(np.sqrt(v) * root)"),
-    ),
-    port(
-        "adam_epsilon_before_correction",
-        "Epsilon added before the bias correction",
-        "(sqrt(v) + eps) / sqrt(1 - beta2^k); right: eps added afterwards",
-        "adam",
-        edit(
-            SOURCE,
-            "rate, root, float(beta1), float(beta2), float(epsilon))",
-            "rate, root, float(beta1), float(beta2), float(epsilon) * root)",
-        ),
-    ),
-]

@@ -5,7 +5,6 @@ bound, show that zero coefficients still have a gradient, and saturate the tanh.
 """
 
 from makers.making import Seeds, Spec
-from makers.wrong import edit, port
 
 OPERATIONS = ("appearance",)
 
@@ -27,43 +26,3 @@ def cases() -> list[Spec]:
         }
         out.append(Spec("appearance", case, "appearance", title, flags, {"beta": 0.3}, inputs))
     return out
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.appearance"
-
-WRONG_PORTS = [
-    port(
-        "missing_y00",
-        "1 / Y00 missing in the colour residual",
-        "beta tanh; right: beta tanh / Y00",
-        "appearance scene",
-        edit(SOURCE, "type(beta / Y00)", "type(beta)"),
-    ),
-    port(
-        "tanh_missing",
-        "Colour residual not bounded",
-        "beta A phi_bar; right: beta tanh(A phi_bar)",
-        "appearance scene",
-        edit(SOURCE, "v, d = _tanh_and_slope_kernel(x[k])", "v, d = x[k], type(x[k])(1)"),
-    ),
-    port(
-        "tanh_gradient_missing",
-        "Derivative of tanh left out",
-        "1; right: 1 - tanh^2",
-        "appearance",
-        edit(SOURCE, "derivative[k] = scale * d", "derivative[k] = scale"),
-    ),
-    port(
-        "zero_coefficients_zero_gradient",
-        "No gradient to zero coefficients",
-        "component skipped while it is 0; right: its gradient starts it",
-        "appearance",
-        edit(
-            SOURCE,
-            "    d_argument = argument_gradient(d_residual, saved)\n",
-            "    d_argument = argument_gradient(d_residual, saved) * saved.appearance_coefficients.any()\n",
-        ),
-    ),
-]

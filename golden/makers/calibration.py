@@ -7,7 +7,6 @@ have an odd and an even number of views, a view without photometric gradient, an
 import numpy as np
 
 from makers.making import Seeds, Spec, changed
-from makers.wrong import edit, port
 
 OPERATIONS = ("calibration",)
 
@@ -41,68 +40,3 @@ def cases() -> list[Spec]:
         settings = {"gradient_ratio": 0.25}
         out.append(Spec("calibration", case, "calibration", title, flags, settings, inputs, own=own))
     return out
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.calibration"
-RATIOS, MEDIAN = "ratios.append(view.laplacian / view.photometric)", "float(np.median(ratios))"
-BOTH = "calibration training"
-
-WRONG_PORTS = [
-    port(
-        "calibration_mean",
-        "Mean over the views",
-        "mean; right: median",
-        BOTH,
-        edit(SOURCE, MEDIAN, "float(np.mean(ratios))"),
-    ),
-    port(
-        "calibration_lower_median",
-        "Lower of the middle two",
-        "no interpolation; right: their mean",
-        BOTH,
-        edit(SOURCE, MEDIAN, "sorted(ratios)[(len(ratios) - 1) // 2]"),
-    ),
-    port(
-        "calibration_inverted",
-        "Ratio of the gradients inverted",
-        "g_rgb / g_lap; right: g_lap / g_rgb",
-        BOTH,
-        edit(SOURCE, RATIOS, "ratios.append(view.photometric / max(view.laplacian, 1e-300))"),
-    ),
-    port(
-        "calibration_over_tissue",
-        "RMS over tissue pixels",
-        "over pixels with a gradient; right: over all",
-        BOTH,
-        edit(
-            SOURCE,
-            "    return math.sqrt(float(np.mean(flat * flat)))",
-            "    flat = flat[flat != 0]\n    return math.sqrt(float(np.mean(flat * flat)))",
-        ),
-    ),
-    port(
-        "calibration_keeps_dead_view",
-        "View without photometric gradient kept",
-        "an infinite ratio moves the median; right: dropped",
-        "calibration",
-        edit(SOURCE, 'return "no photometric gradient"', 'return ""'),
-        edit(
-            SOURCE,
-            "for view in (ViewRms(*v) for v in views)",
-            "for view in (ViewRms(n, np.float64(a), np.float64(b)) for n, a, b in views)",
-        ),
-    ),
-    port(
-        "calibration_of_nothing",
-        "Calibration without a valid view answered",
-        "not a number; right: refused",
-        "calibration",
-        edit(
-            SOURCE,
-            "    if not ratios:\n",
-            "    if not ratios:\n        return Calibration(math.nan, np.zeros(0), table)\n    if not ratios:\n",
-        ),
-    ),
-]

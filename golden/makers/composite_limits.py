@@ -8,11 +8,9 @@ the other, image and gradient have to take the same decision.
 import math
 
 from endotsr.splatting.settings import LEGACY, PAPER
-from makers.copies import Edit
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.screens import flat_covariance, raster_settings, screen_inputs
 from makers.views import logit_of
-from makers.wrong import edit, port, with_raster
 
 OPERATIONS = ("composite",)
 CUTOFF = 1 / 255
@@ -88,123 +86,3 @@ def _one_on_the_cutoff() -> Spec:
 def cases() -> list[Spec]:
     """Values around each threshold, then on the cutoff."""
     return [*_around_thresholds(), _on_the_cutoff(), _one_on_the_cutoff()]
-
-
-# ---- mistakes ----
-
-SOURCE = "splatting.compositing"
-BOTH = "composite render objective"
-STOP = "                    if behind < stop:\n                        break\n"
-AFTER = "                    {0} = behind\n"
-
-
-def _deviation(name: str, value: bool) -> Edit:
-    return with_raster(f"deviations=found.deviations._replace({name}={value})")
-
-
-WRONG_PORTS = [
-    port(
-        "clamped_alpha_gradient",
-        "Gradient passes the clamp of alpha",
-        "passed; right: 0 where clamped",
-        BOTH,
-        _deviation("pass_clamped_alpha", True),
-    ),
-    port(
-        "cutoff_missing",
-        "No alpha cutoff",
-        "every alpha; right: from 1/255 on",
-        BOTH,
-        with_raster("alpha_cutoff=1e-9 if found.alpha_cutoff > 0 else 0.0"),
-    ),
-    port(
-        "cutoff_1_over_256",
-        "Alpha cutoff of 1/256",
-        "1/256; right: 1/255",
-        BOTH,
-        with_raster("alpha_cutoff=1 / 256 if found.alpha_cutoff > 0 else 0.0"),
-    ),
-    port(
-        "cutoff_decided_twice",
-        "Cutoff decided anew in the reverse pass",
-        "in the image, but without gradient; right: one decision",
-        "composite",
-        edit(
-            "splatting.binning", "math.log(settings.alpha_cutoff) if", "math.log(settings.alpha_cutoff * (1 - 1e-4)) if"
-        ),
-        edit(
-            SOURCE,
-            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff:",
-            "                    alpha = min(value, alpha_max)\n                    if alpha < cutoff * decided:",
-            2,
-        ),
-        edit(
-            SOURCE,
-            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = depth.shape\n",
-            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 - 1e-5\n "
-            "   height, width = depth.shape\n",
-        ),
-        edit(
-            SOURCE,
-            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    height, width = d_depth.shape\n",
-            "    cutoff, stop, alpha_max = limits[0], limits[1], limits[2]\n    decided = 1 + 1e-5\n "
-            "   height, width = d_depth.shape\n",
-        ),
-    ),
-    port(
-        "cutoff_added",
-        "Alpha cutoff in preset exact",
-        "1/255; right: none",
-        BOTH,
-        with_raster("alpha_cutoff=found.alpha_cutoff or 1 / 255"),
-    ),
-    port(
-        "alpha_clamp_999",
-        "Alpha clamped at 0.999",
-        "0.999; right: 0.99",
-        BOTH,
-        with_raster("alpha_max=0.999 if found.alpha_max < 1 else 1.0"),
-    ),
-    port("alpha_clamp_missing", "Alpha not clamped", "up to 1; right: 0.99", BOTH, with_raster("alpha_max=1.0")),
-    port(
-        "stop_missing",
-        "No stop at small transmittance",
-        "all Gaussians; right: stop before T < 1e-4",
-        BOTH,
-        with_raster("transmittance_stop=0.0"),
-    ),
-    port(
-        "stop_at_1e-3",
-        "Stop at a transmittance of 1e-3",
-        "1e-3; right: 1e-4",
-        BOTH,
-        with_raster("transmittance_stop=10 * found.transmittance_stop"),
-    ),
-    port(
-        "stop_after",
-        "Stop after T fell below 1e-4",
-        "one Gaussian too many; right: stop before",
-        "composite render",
-        edit(SOURCE, STOP, "", 2),
-        edit(
-            SOURCE,
-            "                    t = behind\n",
-            "                    t = behind\n                    if t < stop:\n                        break\n",
-            2,
-        ),
-    ),
-    port(
-        "stop_skips",
-        "The Gaussian that stops a pixel skipped",
-        "goes on behind it; right: the pixel ends",
-        "composite render",
-        edit(SOURCE, STOP, STOP.replace("break", "continue"), 2),
-    ),
-    port(
-        "clamp_blocks_legacy",
-        "Clamp of alpha blocks the gradient in preset legacy",
-        "0; right: passed",
-        BOTH,
-        _deviation("pass_clamped_alpha", False),
-    ),
-]

@@ -7,7 +7,6 @@ width matters to its gradient only, and the floor of a squared width.
 import numpy as np
 
 from makers.making import Seeds, Spec, changed, given, scalar
-from makers.wrong import edit, port
 
 OPERATIONS = ("deformation",)
 
@@ -42,51 +41,3 @@ def cases() -> list[Spec]:
     out.append(Spec("deformation", "width_zero", "deformation", "A width of 0 is finite: its square has a floor",
                     ("width_without_floor",), {"basis": "quartic"}, inputs))  # fmt: skip
     return out
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.deformation"
-BOTH = "deformation scene"
-
-WRONG_PORTS = [
-    port(
-        "basis_swapped",
-        "The other time basis",
-        "Gaussian for quartic or back",
-        BOTH,
-        edit(SOURCE, 'basis == "quartic"', 'basis != "quartic"', 2),
-    ),
-    port(
-        "basis_gaussian_without_half",
-        "Gaussian basis without its 1/2",
-        "exp(-x^2 / S); right: exp(-x^2 / (2 S))",
-        BOTH,
-        edit(
-            SOURCE,
-            "return real(-0.5 * LOG2_E), real(0), real(1), real(2 * LARGEST_U), real(1)",
-            "return real(-LOG2_E), real(0), real(1), real(LARGEST_U), real(2)",
-        ),
-    ),
-    port(
-        "width_without_floor",
-        "Squared width without its floor",
-        "s^2; right: s^2 + 1e-4",
-        BOTH,
-        edit(SOURCE, "WIDTH_FLOOR = 1e-4", "WIDTH_FLOOR = 0.0"),
-    ),
-    port(
-        "width_gradient_of_size",
-        "Gradient by the size of the width",
-        "sign lost; right: that of the width",
-        "deformation",
-        edit(SOURCE, "common * u * (width[i] * inverse)", "common * u * (abs(width[i]) * inverse)"),
-    ),
-    port(
-        "time_gradient_sign",
-        "Gradient by time with the sign of the centre",
-        "+; right: minus the sum",
-        "deformation",
-        edit(SOURCE, "-float(row_sums.sum())", "float(row_sums.sum())"),
-    ),
-]

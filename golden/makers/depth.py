@@ -9,7 +9,6 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, spoiled, tool_mask
 from makers.making import Made, Seeds, Spec, changed, given, scalar
-from makers.wrong import edit, port
 
 OPERATIONS = ("normalised_depth",)
 
@@ -71,99 +70,3 @@ def cases() -> list[Spec]:
         _spec("ten_priors", "Ten priors are enough", ("ten_priors_ignored",), ten),
         _spec("nothing_rendered", "Nothing rendered: 0, no division by the largest depth", ("depth_over_zero",), empty),
     ]  # fmt: skip
-
-
-# ---- mistakes ----
-
-SOURCE = "losses.depth"
-LARGEST_PRIOR = "largest = np.max(prior_depth, where=known, initial=0)"
-
-WRONG_PORTS = [
-    port(
-        "depth_holes_count",
-        "Pixels without prior take part",
-        "prior 0 as depth; right: excluded",
-        "normalised_depth",
-        edit(SOURCE, "valid = known & mask", "valid = mask.copy()"),
-    ),
-    port(
-        "depth_maximum_constant",
-        "Largest depth taken as constant",
-        "no gradient to it; right: it has one",
-        "normalised_depth",
-        edit(SOURCE, "-step * saved.signed_sum / saved.largest", "0.0"),
-    ),
-    port(
-        "depth_maximum_of_tissue",
-        "Largest depth over tissue",
-        "over tissue; right: over the whole image",
-        "normalised_depth",
-        edit(SOURCE, "where=known, initial=0)\n    normalised", "where=known & mask, initial=0)\n    normalised"),
-        edit(SOURCE, "    count: int  # valid pixels\n", "    count: int  # valid pixels\n    tissue: object = None\n"),
-        edit(SOURCE, "int(np.count_nonzero(valid)))", "int(np.count_nonzero(valid)), mask)"),
-        edit(
-            SOURCE,
-            "_largest_finite(rendered_depth) if",
-            "_largest_finite(np.where(target.tissue, rendered_depth, 0)) if",
-        ),
-    ),
-    port(
-        "depth_not_normalised",
-        "Depths compared in scene units",
-        "no division; right: each over its largest",
-        "normalised_depth",
-        edit(SOURCE, LARGEST_PRIOR, "largest = 1.0"),
-        edit(SOURCE, "_largest_finite(rendered_depth) if", "1.0 if"),
-        edit(SOURCE, "real(d_largest / ties)", "real(0.0)"),
-    ),
-    port(
-        "depth_first_maximum",
-        "First of equal maxima takes the gradient",
-        "first; right: split evenly",
-        "normalised_depth",
-        edit(
-            SOURCE,
-            "        _residual_reverse_kernel(depth, normalised, target.valid, peak, real(step), "
-            "real(d_largest / ties), d_depth)\n",
-            "        _residual_reverse_kernel(depth, normalised, target.valid, peak, real(step), real(0), d_depth)\n"
-            "        d_depth.reshape(-1)[np.argmax(depth == peak)] += d_largest\n",
-        ),
-    ),
-    port(
-        "depth_every_maximum",
-        "Each of equal maxima takes the whole gradient",
-        "all of it; right: split evenly",
-        "normalised_depth",
-        edit(SOURCE, "real(d_largest / ties)", "real(d_largest)"),
-    ),
-    port(
-        "depth_few_priors",
-        "Depth loss of fewer than ten pixels",
-        "evaluated; right: 0",
-        "normalised_depth",
-        edit(SOURCE, "FEWEST_VALID = 10", "FEWEST_VALID = 1"),
-    ),
-    port(
-        "infinite_prior_counts",
-        "Infinite prior taken as a depth",
-        "D > 0; right: D > 0 and finite",
-        "normalised_depth",
-        edit(SOURCE, "np.isfinite(prior_depth) & (prior_depth > 0)", "prior_depth > 0"),
-    ),
-    port(
-        "ten_priors_ignored",
-        "Depth loss of ten pixels left out",
-        "n <= 10; right: n < 10",
-        "normalised_depth",
-        edit(SOURCE, "FEWEST_VALID = 10", "FEWEST_VALID = 11"),
-    ),
-    port(
-        "depth_over_zero",
-        "Division by a largest depth of 0",
-        "not a number; right: 0",
-        "normalised_depth",
-        edit(SOURCE, "    if largest <= 0:", "    if target.count < FEWEST_VALID:"),
-        edit(SOURCE, "    if saved.largest > 0:", "    if target.count >= FEWEST_VALID:"),
-        edit(SOURCE, "step = float(d_loss) /", "step = np.float64(d_loss) /"),
-    ),
-]

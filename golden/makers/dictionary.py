@@ -8,7 +8,6 @@ import numpy as np
 
 from makers.clock import omegas, stamps, train_index
 from makers.making import Made, Seeds, Spec, given, scalar
-from makers.wrong import edit, port
 
 OPERATIONS = ("frequencies", "dictionary", "atoms")
 
@@ -65,88 +64,3 @@ def cases() -> list[Spec]:
                given([2.0**-13, 0.5, 4.0], "2^-13, 1/2, 4", "cycles per sequence"),
                "A sine with an RMS of 2e-4 is alive, the cosine beside it is dead", ()),
     ]  # fmt: skip
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.dictionary"
-MOVING = "dictionary atoms scene objective"
-PAIRED = "np.stack([sine, cosine], axis=-1).reshape(*sine.shape[:-1], -1)"
-
-WRONG_PORTS = [
-    port(
-        "frequencies_linear",
-        "Frequencies spaced linearly",
-        "linspace; right: geomspace",
-        "frequencies scene objective",
-        edit(SOURCE, "np.geomspace(low, high, count)", "np.linspace(low, high, count)"),
-    ),
-    port(
-        "atoms_interleaved",
-        "Sines and cosines interleaved",
-        "[sin, cos, sin, ...]; right: all sines first",
-        MOVING,
-        edit(SOURCE, "np.concatenate([sine, cosine])", PAIRED),
-        edit(SOURCE, "np.concatenate([sine, cosine], axis=1)", PAIRED),
-        edit(SOURCE, "d_phi[:count] * saved.cosine - d_phi[count:]", "d_phi[::2] * saved.cosine - d_phi[1::2]"),
-    ),
-    port(
-        "frequency_without_two_pi",
-        "Frequency taken as angular",
-        "sin(w t); right: sin(2 pi w t)",
-        MOVING,
-        edit(SOURCE, "turn = phase - np.rint(phase)", "turn = phase / (2 * np.pi)"),
-        edit(SOURCE, "d_phase = 2.0 * np.pi * (", "d_phase = ("),
-    ),
-    port(
-        "dictionary_gradient_sign",
-        "Derivative of the cosine without its sign",
-        "+sin; right: -sin",
-        "dictionary",
-        edit(SOURCE, "saved.cosine - d_phi", "saved.cosine + d_phi"),
-    ),
-    port(
-        "statistics_over_all_frames",
-        "Atom statistics over test frames too",
-        "mean and RMS over all stamps; right: over the training stamps",
-        "atoms scene objective training",
-        edit("stages.requests", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]'),
-        edit("stages.spectral", 'inputs["times"][inputs["train_index"]]', 'inputs["times"]'),
-        edit("fitting.state", "sequence.times[sequence.train_index]", "sequence.times", 2),
-    ),
-    port(
-        "rms_not_centred",
-        "RMS of the atom itself",
-        "sqrt(mean phi^2); right: of phi - mean",
-        "atoms scene objective",
-        edit(SOURCE, "(column - m) ** 2", "column**2"),
-    ),
-    port(
-        "atoms_not_normalised",
-        "Atoms centred but not divided by their RMS",
-        "phi - mean; right: over RMS",
-        "atoms scene objective",
-        edit(SOURCE, "    phi_bar = (phi.astype", "    gain = np.ones_like(gain)\n    phi_bar = (phi.astype"),
-    ),
-    port(
-        "atoms_not_centred",
-        "Atoms divided by their RMS but not centred",
-        "phi / RMS; right: (phi - mean) / RMS",
-        "atoms scene objective",
-        edit(SOURCE, "(phi.astype(np.float64) - statistics.mean)", "phi.astype(np.float64)"),
-    ),
-    port(
-        "dead_atom_amplified",
-        "Dead atom divided by rounding noise",
-        "1 / rms; right: 0",
-        "atoms",
-        edit(SOURCE, "rms, rms < DEAD_RMS)", "rms, rms < 0)"),
-    ),
-    port(
-        "repeated_stamps_counted",
-        "Repeated stamps counted more than once",
-        "list; right: set of stamps",
-        "atoms",
-        edit(SOURCE, "np.unique(np.asarray(times, np.float64))", "np.asarray(times, np.float64)"),
-    ),
-]

@@ -5,7 +5,6 @@ case has exposed colours below 0 and the other has them above 1, so that a clamp
 """
 
 from makers.making import Seeds, Spec
-from makers.wrong import edit, port
 
 OPERATIONS = ("exposure",)
 
@@ -38,50 +37,3 @@ def _generic() -> Spec:
     flags = ("gain_not_exponential", "bias_before_gain", "exposure_clamped", "log_gain_gradient_by_gain")
     title = "exp(log_gain) colour + bias, not clamped"
     return Spec("exposure", "generic", "exposure", title, flags, {}, inputs)
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.exposure"
-GAIN, BIAS = "gain = np.exp(log_gain.astype(np.float64))", "    exposed += bias.astype(colour.dtype)[:, None, None]\n"
-
-WRONG_PORTS = [
-    port(
-        "gain_not_exponential",
-        "Gain taken for its logarithm",
-        "1 + log_gain; right: exp(log_gain)",
-        "exposure",
-        edit(SOURCE, GAIN, "gain = 1 + log_gain.astype(np.float64)"),
-        edit(SOURCE, "(saved.gain * d_gain)", "d_gain"),
-    ),
-    port(
-        "bias_before_gain",
-        "Bias added before the gain",
-        "gain (colour + bias); right: gain colour + bias",
-        "exposure",
-        edit(SOURCE, GAIN, GAIN + "\n    colour = colour + bias.astype(colour.dtype)[:, None, None]"),
-        edit(SOURCE, BIAS, ""),
-        edit(SOURCE, "d_bias.astype(dtype)", "(saved.gain * d_bias).astype(dtype)"),
-    ),
-    port(
-        "exposure_clamped",
-        "Exposed colours clamped",
-        "limited to [0, 1]; right: no clamp",
-        "exposure",
-        edit(SOURCE, BIAS, BIAS + "    inside, exposed = (exposed >= 0) & (exposed <= 1), np.clip(exposed, 0, 1)\n"),
-        edit(SOURCE, "ExposureSaved(colour, gain)", "ExposureSaved(colour, gain, inside)"),
-        edit(SOURCE, "exp(log_gain), float64\n", "exp(log_gain), float64\n    inside: object = None\n"),
-        edit(
-            SOURCE,
-            "    dtype = saved.colour.dtype\n",
-            "    dtype = saved.colour.dtype\n    d_exposed = np.where(saved.inside, d_exposed, 0)\n",
-        ),
-    ),
-    port(
-        "log_gain_gradient_by_gain",
-        "Gradient by the gain, not by its logarithm",
-        "sum(g colour); right: times the gain",
-        "exposure",
-        edit(SOURCE, "(saved.gain * d_gain)", "d_gain"),
-    ),
-]

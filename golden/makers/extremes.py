@@ -19,7 +19,6 @@ from makers.screens import raster_settings, screen_inputs
 from makers.settings import written
 from makers.training import trajectory_inputs
 from makers.views import logit_of
-from makers.wrong import edit, port
 
 OPERATIONS = ("appearance", "pose", "composite", "deformation", "density", "training")
 
@@ -134,74 +133,3 @@ def cases() -> list[Spec]:
     """One for each end of a range."""
     return [_deep_saturation(), *_angles(), _faint(), _cut("quartic"), _cut("gaussian"), _hidden_statistics(),
             _hidden_in_training()]  # fmt: skip
-
-
-# ---- mistakes ----
-
-VIEWS = "np.round(np.linspace(0, n_train - 1, count))"
-
-WRONG_PORTS = [
-    port(
-        "tanh_slope_cancels",
-        "Derivative of tanh by subtraction",
-        "1 - tanh^2; right: 4 e / (1 + e)^2",
-        "appearance",
-        edit(
-            "equations.appearance",
-            "return math.copysign(value, x), real(4.0) * (e / one_more) / one_more",
-            "return math.copysign(value, x), real(1.0) - value * value",
-        ),
-    ),
-    port(
-        "rotation_factors_of_nothing",
-        "Closed forms of the rotation at angle 0",
-        "0 / 0; right: the series",
-        "pose",
-        edit("equations.pose", "SMALL = 1.0", "SMALL = -1.0"),
-        edit("equations.pose", "r = np.sqrt(square)\n", "square = np.float64(square)\n    r = np.sqrt(square)\n"),
-        edit("equations.pose", "2 * (np.sin(r / 2) / r) ** 2", "(1 - np.cos(r)) / square"),
-    ),
-    port(
-        "opacity_from_transmittance",
-        "Opacity as one minus the transmittance",
-        "1 - T; right: the sum of alpha T",
-        "composite",
-        edit(
-            "splatting.compositing",
-            "transmittance[row, column] = z, total, t\n",
-            "transmittance[row, column] = z, one - t, t\n",
-        ),
-    ),
-    port(
-        "basis_not_cut",
-        "Basis values below 2^-60 kept",
-        "exp; right: exactly 0",
-        "deformation training",
-        edit("equations.deformation", "SMALLEST_EXPONENT = -60.0", "SMALLEST_EXPONENT = -1000.0"),
-    ),
-    port(
-        "calibration_views_down",
-        "Views of the calibration rounded down",
-        "floor; right: to the nearest, halves to even",
-        "training",
-        edit("equations.calibration", VIEWS, "np.floor(np.linspace(0, n_train - 1, count))"),
-    ),
-    port(
-        "calibration_views_up",
-        "Views of the calibration with halves rounded up",
-        "floor(x + 1/2); right: halves to even",
-        "training",
-        edit("equations.calibration", VIEWS, "np.floor(np.linspace(0, n_train - 1, count) + 0.5)"),
-    ),
-    port(
-        "visits_with_gradient_only",
-        "Only views with a gradient counted",
-        "gradient other than 0; right: visible",
-        "density training",
-        edit(
-            "scene.density_control",
-            "    g_x, g_y = d_mean[0]",
-            "    visible = visible & (d_mean != 0).any(axis=0)\n    g_x, g_y = d_mean[0]",
-        ),
-    ),
-]

@@ -6,9 +6,7 @@ weights along the atoms.
 """
 
 from makers.clock import omegas
-from makers.copies import Edit
 from makers.making import Seeds, Spec, scalar
-from makers.wrong import edit, port
 
 OPERATIONS = ("matern",)
 
@@ -32,66 +30,3 @@ def cases() -> list[Spec]:
         }
         out.append(Spec("matern", case, "matern", title, flags, {"correlation_length": length}, inputs))
     return out
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.matern"
-
-
-def _power(power: str) -> tuple[Edit, ...]:
-    return (
-        edit(SOURCE, "(1.0 + small)) ** 3", f"(1.0 + small)) ** {power}"),
-        edit(SOURCE, "(5.0 + scaled**2)) ** 3", f"(5.0 + scaled**2)) ** {power}"),
-    )
-
-
-WRONG_PORTS = [
-    port(
-        "matern_sum_one",
-        "Matern weights scaled to sum 1",
-        "sum; right: mean 1",
-        "matern",
-        edit(SOURCE, "(math.fsum(density) / density.size)", "math.fsum(density)"),
-    ),
-    port(
-        "matern_inverted",
-        "Spectral density itself as weight",
-        "low frequencies pay; right: high ones",
-        "matern",
-        *_power("-3"),
-    ),
-    port(
-        "matern_without_two_pi",
-        "Matern weights of w in place of 2 pi w",
-        "5/l^2 + w^2; right: (2 pi w)^2",
-        "matern",
-        edit(SOURCE, "length * (2.0 * np.pi * float(wide.max()))", "length * float(wide.max())"),
-    ),
-    port(
-        "matern_wrong_power", "Power of Matern-3/2 or 5/2 in place of 3", "^(5/2); right: ^3", "matern", *_power("2.5")
-    ),
-    port(
-        "penalty_over_two",
-        "Penalty over 2 N F",
-        "sum over axes; right: 1 / (6 N F)",
-        "matern",
-        edit(SOURCE, "(6.0 * n * count)", "(2.0 * n * count)"),
-        edit(SOURCE, "(3.0 * max(count, 1) * rho.size)", "(1.0 * max(count, 1) * rho.size)"),
-    ),
-    port(
-        "penalty_gradient_without_two",
-        "Gradient of the penalty without its 2",
-        "rho C; right: 2 rho C",
-        "matern",
-        edit(SOURCE, "(3.0 * max(count, 1) * rho.size)", "(6.0 * max(count, 1) * rho.size)"),
-    ),
-    port(
-        "penalty_interleaved",
-        "Weights of interleaved atoms in the penalty",
-        "rho repeated pairwise; right: rho for the sines, then for the cosines",
-        "matern",
-        edit(SOURCE, "sums.reshape(axes, 2, count).sum(axis=(0, 1))", "sums.reshape(axes, count, 2).sum(axis=(0, 2))"),
-        edit(SOURCE, "np.tile(factor, 2)", "np.repeat(factor, 2)"),
-    ),
-]

@@ -5,7 +5,6 @@ is that sines and cosines both take part.
 """
 
 from makers.making import Seeds, Spec
-from makers.wrong import edit, port
 
 OPERATIONS = ("motion",)
 
@@ -19,26 +18,3 @@ def cases() -> list[Spec]:
         "d_translation": seeds.uniform("d_translation", -1.0, 1.0, 3, 7),
     }
     return [Spec("motion", "generic", "motion", "Translation C phi", ("motion_cosines_dropped",), {}, inputs)]
-
-
-# ---- mistakes ----
-
-WRONG_PORTS = [
-    port(
-        "motion_cosines_dropped",
-        "Cosines left out of the motion",
-        "sines only; right: both",
-        "motion scene objective training",
-        edit(
-            "equations.motion",
-            "    return combine(motion_coefficients, phi), MotionSaved",
-            "    phi = np.where(np.arange(phi.size) < phi.size // 2, phi, 0 * phi)\n"
-            "    return combine(motion_coefficients, phi), MotionSaved",
-        ),
-        edit(
-            "equations.motion",
-            "from typing import NamedTuple\n",
-            "from typing import NamedTuple\n\nimport numpy as np\n",
-        ),
-    ),
-]

@@ -35,7 +35,6 @@ OPERATIONS = (
     "frequencies", "appearance", "calibration", "adam", "projection", "composite", "render", "schedule",
     "initialisation", "scene", "objective", "training",
 )  # fmt: skip
-WRONG_PORTS: list[Any] = []
 
 RASTER = PAPER._replace(
     alpha_cutoff=0.03, transmittance_stop=0.02, alpha_max=0.8, jacobian_clamp=0.75, low_pass=0.7, near=3.6

@@ -6,9 +6,9 @@ angle at which the closed forms lose digits.
 """
 
 from makers.making import Made, Seeds, Spec
-from makers.wrong import edit, port
 
 OPERATIONS = ("pose",)
+FLAGS = ("rotation_vector_reversed", "rotation_after_pose", "offset_before_rotation", "radial_gradient_dropped")
 
 
 def cases() -> list[Spec]:
@@ -33,52 +33,3 @@ def pose_inputs(name: str, largest: float) -> dict[str, Made]:
 def _case(name: str, largest: float, title: str) -> Spec:
     shown = FLAGS if name == "wide" else FLAGS[:-1]  # the factors hardly change with a small angle
     return Spec("pose", name, "pose", title, shown, {}, pose_inputs(name, largest))
-
-
-# ---- mistakes ----
-
-SOURCE = "equations.pose"
-FLAGS = ("rotation_vector_reversed", "rotation_after_pose", "offset_before_rotation", "radial_gradient_dropped")
-SUM = "np.eye(3) + a * k + b * (k @ k)"
-MOVED = "exponential @ w, exponential @ d + offset,"
-
-WRONG_PORTS = [
-    port(
-        "rotation_vector_reversed",
-        "Rotation by the negative angle",
-        "Exp(-rotation_vector); right: Exp(rotation_vector)",
-        "pose",
-        edit(SOURCE, SUM, "np.eye(3) - a * k + b * (k @ k)"),
-        edit(SOURCE, "(a1 * k + b1 * (k @ k))", "(-a1 * k + b1 * (k @ k))"),
-        edit(SOURCE, "d_k = a * d_exponential +", "d_k = -a * d_exponential +"),
-    ),
-    port(
-        "rotation_after_pose",
-        "Rotation in world axes",
-        "rotation E; right: E rotation",
-        "pose",
-        edit(SOURCE, MOVED, "w @ exponential, exponential @ d + offset,"),
-        edit(
-            SOURCE,
-            "d_exponential = d_w @ saved.rotation.T + np.outer(d_d, saved.translation)",
-            "d_exponential = saved.rotation.T @ d_w + np.outer(d_d, saved.translation)",
-        ),
-        edit(SOURCE, "PoseGrads(saved.exponential.T @ d_w,", "PoseGrads(d_w @ saved.exponential.T,"),
-    ),
-    port(
-        "offset_before_rotation",
-        "Offset added before the rotation",
-        "E (translation + offset); right: E translation + offset",
-        "pose",
-        edit(SOURCE, MOVED, "exponential @ w, exponential @ (d + offset),"),
-        edit(SOURCE, "PoseSaved(w, d, vector, exponential)", "PoseSaved(w, d + offset, vector, exponential)"),
-        edit(SOURCE, "d_vector, d_d.copy())", "d_vector, saved.exponential.T @ d_d)"),
-    ),
-    port(
-        "radial_gradient_dropped",
-        "Gradient by the angle dropped",
-        "the factors of the exponential taken as constants; right: differentiated too",
-        "pose",
-        edit(SOURCE, "d_k, 2) + radial * v", "d_k, 2)"),
-    ),
-]

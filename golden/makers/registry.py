@@ -1,7 +1,8 @@
 """The families of golden cases with their contents, and what a port answers to every operation.
 
-A family module has three names: OPERATIONS (the operations of its cases), cases() and WRONG_PORTS. A wrong port is
-defined in the family of the rule that it breaks; if it also spoils cases of later families, it names their operations.
+A family module has two names: OPERATIONS (the operations of its cases) and cases(). Its mistakes stand in a TOML file
+beside it, see `makers.wrong.wrong_ports`. A mistake belongs to the family of the rule that it breaks; if it also spoils
+cases of later families, it names their operations.
 `JUDGED` states of every output, further output and gradient of an operation, in their order, at which level a port owes
 it, in which unit and scale it is compared, and which independent program gives its value.
 """
@@ -16,7 +17,7 @@ from endotsr.stages.laplacian import LEVELS
 from endotsr.stages.optimiser import RESIDUAL_RATES, SQUARES, STATE, TERMS
 from endotsr.stages.scene import TWICE
 from makers.making import Spec
-from makers.wrong import WrongPort
+from makers.wrong import WrongPort, wrong_ports
 
 FAMILIES = (
     "reading",
@@ -68,11 +69,10 @@ def all_specs() -> list[Spec]:
 def all_wrong_ports() -> dict[str, WrongPort]:
     """Every wrong port by its flag. Raises ValueError if two have one flag."""
     found: dict[str, WrongPort] = {}
-    for family in families():
-        for wrong_port in family.WRONG_PORTS:
-            if wrong_port.flag in found:
-                raise ValueError(f"wrong port {wrong_port.flag} is named twice")
-            found[wrong_port.flag] = wrong_port
+    for wrong_port in (port for family in FAMILIES for port in wrong_ports(family)):
+        if wrong_port.flag in found:
+            raise ValueError(f"wrong port {wrong_port.flag} is named twice")
+        found[wrong_port.flag] = wrong_port
     return found
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from endotsr.splatting.settings import EXACT, LEGACY, PAPER, RasterSettings
 from makers.making import Made, Seeds, Spec, changed, given
 from makers.views import LENS, cotangents, lens_settings, logit_of, pose, scene_inputs
-from makers.wrong import edit, port
 
 OPERATIONS = ("render",)
 
@@ -134,95 +133,3 @@ def cases() -> list[Spec]:
         _long_needles(),
         _out_of_view(),
     ]  # fmt: skip
-
-
-# ---- mistakes ----
-
-SOURCE, STAGE, FORMULAS = "splatting.render", "stages.compositing", "splatting.projection_formulas"
-DETERMINANT = "low_pass * low_pass + low_pass * spread + areas"
-CENTRE = "scene.harmonics, scene.residual, scene.position, camera_centre(camera), degree"
-
-WRONG_PORTS = [
-    port(
-        "pixel_corner_camera",
-        "Render half a pixel off",
-        "at i; right: at i + 1/2",
-        "projection render objective",
-        edit(
-            "stages.requests",
-            '**settings["camera"])',
-            '**settings["camera"] | {name: settings["camera"][name] + 0.5 for name in ("cx", "cy")})',
-        ),
-    ),
-    port(
-        "screen_gradient_in_ndc",
-        "Screen gradient per NDC unit",
-        "times half the image size; right: per px",
-        "render",
-        edit(
-            STAGE,
-            "    dtype, (d_rotation",
-            '    found["d_mean2d"] = found["d_mean2d"] * np.array(\n'
-            "        [[saved.camera.width / 2], [saved.camera.height / 2]])\n    dtype, (d_rotation",
-        ),
-    ),
-    port(
-        "optical_centre_is_translation",
-        "Translation of the pose taken for the optical centre",
-        "d; right: -W^T d",
-        "render objective",
-        edit(SOURCE, CENTRE, CENTRE.replace("camera_centre(camera)", "np.asarray(camera.translation)")),
-        edit(
-            SOURCE,
-            "projection.d_rotation - np.outer(translation, d_centre), projection.d_translation - rotation @ d_centre",
-            "projection.d_rotation, projection.d_translation + d_centre",
-        ),
-    ),
-    port(
-        "view_direction_not_to_position",
-        "Gradient of the view direction not added to the position",
-        "to the pose alone; right: to the position too",
-        "render objective",
-        edit(SOURCE, "projection.d_position + harmonics.d_position", "projection.d_position"),
-    ),
-    port(
-        "view_direction_not_to_pose",
-        "Gradient of the view direction not added to the pose",
-        "to the position alone; right: to the pose too",
-        "render",
-        edit(
-            SOURCE,
-            "projection.d_rotation - np.outer(translation, d_centre), projection.d_translation - rotation @ d_centre",
-            "projection.d_rotation, projection.d_translation",
-        ),
-    ),
-    port(
-        "determinant_cancels",
-        "Determinant as a c - b^2",
-        "loses digits; right: sum of non-negative terms",
-        "render",
-        edit(FORMULAS, DETERMINANT, "a * c - b * b"),
-        rounding=True,
-    ),
-    port(
-        "distance_cancels",
-        "Distance by the inverse matrix",
-        "loses digits; right: a sum of two squares",
-        "render",
-        edit(
-            "splatting.compositing",
-            "q = record[INVERSE_C] * dy * dy + record[PRECISION] * e * e",
-            "dx, off = x - record[U], -record[PRECISION] * record[SLOPE]\n"
-            "    q = (record[INVERSE_C] - off * record[SLOPE]) * dy * dy + (off + off) * dx * dy + "
-            "record[PRECISION] * dx * dx",
-        ),
-        rounding=True,
-    ),
-    port(
-        "visible_if_in_front",
-        "All in front of the camera counted as visible",
-        "z > near; right: with its box",
-        "render training",
-        edit(SOURCE, "projected, order, visible, saved)", "projected, order, projected.visible, saved)"),
-    ),
-]

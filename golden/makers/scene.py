@@ -6,7 +6,6 @@ atoms are normalised, the order of the ten offsets, and that offsets act before 
 
 from makers.making import Seeds, Spec
 from makers.moving import TIME, model_settings, moving_inputs
-from makers.wrong import edit, port
 
 OPERATIONS = ("scene",)
 
@@ -26,61 +25,3 @@ def cases() -> list[Spec]:
         settings = {"t": TIME, "model": model_settings(basis=basis)}
         out.append(Spec("scene", basis, "scene", title, flags, settings, inputs))
     return out
-
-
-# ---- mistakes ----
-
-SOURCE, CHANNELS = "fitting.model", "scene.gaussians"
-ALL = "scene objective training"
-
-WRONG_PORTS = [
-    port(
-        "motion_of_normalised_atoms",
-        "Motion from normalised atoms",
-        "phi_bar; right: raw phi",
-        "scene objective",
-        edit(
-            SOURCE,
-            "phi, _ = dictionary_forward(t, spectral.omega)",
-            "phi = normalised_atoms(t, spectral.omega, spectral.statistics)",
-        ),
-    ),
-    port(
-        "appearance_of_raw_atoms",
-        "Colour residual from raw atoms",
-        "phi; right: phi_bar",
-        "scene objective",
-        edit(
-            SOURCE,
-            "phi_bar = normalised_atoms(t, spectral.omega, spectral.statistics)",
-            "phi_bar, _ = dictionary_forward(t, spectral.omega)",
-        ),
-    ),
-    port(
-        "deformation_channels_shifted",
-        "Deformation channels in another order",
-        "position, log-scale, quaternion; right: position, quaternion, log-scale",
-        "scene objective",
-        edit(
-            SOURCE,
-            "quaternion + offsets[QUATERNION_CHANNELS], log_scale + offsets[LOG_SCALE_CHANNELS]",
-            "quaternion + offsets[6:10], log_scale + offsets[3:6]",
-        ),
-        edit(
-            SOURCE,
-            "[grads.d_position, grads.d_quaternion, grads.d_log_scale]",
-            "[grads.d_position, grads.d_log_scale, grads.d_quaternion]",
-        ),
-    ),
-    port(
-        "scale_offset_after_activation",
-        "Offset added to the semi-axis",
-        "exp(s) + psi; right: in the exponent",
-        "scene",
-        edit(
-            SOURCE,
-            "log_scale + offsets[LOG_SCALE_CHANNELS]",
-            "np.log(np.maximum(np.exp(log_scale) + offsets[LOG_SCALE_CHANNELS], 1e-6))",
-        ),
-    ),
-]

@@ -8,7 +8,6 @@ import numpy as np
 
 from makers.images import HEIGHT, WIDTH, nothing, tool_mask
 from makers.making import Seeds, Spec, given, scalar
-from makers.wrong import edit, port
 
 OPERATIONS = ("smoothness",)
 
@@ -37,47 +36,3 @@ def cases() -> list[Spec]:
         }
         out.append(Spec("smoothness", case, "smoothness", title, flags, {"total_variation_factor": 3.0}, inputs))
     return out
-
-
-# ---- mistakes ----
-
-SOURCE = "losses.smoothness"
-SMOOTH = 'smooth = mask & ~check_plane("edges", edges, mask.shape)'
-
-WRONG_PORTS = [
-    port(
-        "edges_ignored",
-        "Smoothing across edges",
-        "all neighbours; right: not across an edge",
-        "smoothness",
-        edit(SOURCE, SMOOTH, "smooth = mask.copy()"),
-    ),
-    port(
-        "variation_of_tissue",
-        "Total variation of the tissue",
-        "inside; right: of the excluded region",
-        "smoothness",
-        edit(SOURCE, "mask = np.ascontiguousarray(mask)", "mask = np.ascontiguousarray(~mask)"),
-    ),
-    port(
-        "smoothness_on_all_pixels",
-        "Squared steps on all pixels",
-        "mask ignored; right: tissue only",
-        "smoothness",
-        edit(SOURCE, SMOOTH, 'smooth = ~check_plane("edges", edges, mask.shape)'),
-    ),
-    port(
-        "squared_steps_over_all_pixels",
-        "Squared steps averaged over all pixels",
-        "over H W; right: smooth pixels",
-        "smoothness",
-        edit(SOURCE, "(np.count_nonzero(smooth) + FEW_PIXELS)", "smooth.size"),
-    ),
-    port(
-        "squared_steps_without_two",
-        "Gradient of a squared step without its 2",
-        "step; right: 2 step",
-        "smoothness",
-        edit(SOURCE, "type(2 * float(d_loss)", "type(float(d_loss)"),
-    ),
-]

@@ -5,7 +5,8 @@ are examined. These answers give the size and the fingerprints of the mistake. T
 and name its mistake.
 """
 
-from collections.abc import Iterable, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,23 +44,25 @@ class Question(NamedTuple):
     made_for: tuple[str, ...]  # flags
 
 
-def edit(module: str, old: str, new: str, times: int = 1) -> Edit:
-    """A change of one module, see `Edit`."""
-    return Edit(module, old, new, times)
+def wrong_ports(family: str) -> Iterator[WrongPort]:
+    """The mistakes of a family, from the file `<family>.toml` beside this one; a family may have none.
+
+    An entry has the keys `title`, `wrong` and `changes`, and may have `operations` and `rounding`. A change is
+    [module, old text, new text, number of places]. A change without a module is one of the module that the head of the
+    file names, and one without a number is made in one place. `operations` in the head stands for entries without it.
+    """
+    file = Path(__file__).with_name(f"{family}.toml")
+    table = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    module, operations = table.pop("module", ""), table.pop("operations", "")
+    for flag, entry in table.items():
+        edits = tuple(_edit(change, module) for change in entry["changes"])
+        examined = tuple(entry.get("operations", operations).split())
+        yield WrongPort(flag, entry["title"], entry["wrong"], examined, edits, entry.get("rounding", False))
 
 
-def port(flag: str, title: str, wrong: str, operations: str, *edits: Edit, rounding: bool = False) -> WrongPort:
-    """A wrong port; the operations are separated by spaces."""
-    return WrongPort(flag, title, wrong, tuple(operations.split()), edits, rounding)
-
-
-def with_raster(fields: str) -> Edit:
-    """Reads the settings `found` of the rasteriser and takes them with other fields, an expression of keywords."""
-    return edit(
-        "stages.requests",
-        "    return RasterSettings(**fields)\n",
-        f"    found = RasterSettings(**fields)\n    return found._replace({fields})\n",
-    )
+def _edit(change: Sequence[Any], module: str) -> Edit:
+    texts = [part for part in change if isinstance(part, str)]
+    return Edit(*([module] if len(texts) == 2 else []), *texts, *change[len(texts) :])
 
 
 class Wrong(NamedTuple):

@@ -12,7 +12,8 @@ import pytest
 
 from endotsr.golden.judge.store import golden_folder, read_golden
 from makers.copies import changed_text
-from makers.registry import FAMILIES, all_wrong_ports, families
+from makers.registry import FAMILIES, all_wrong_ports
+from makers.wrong import wrong_ports
 
 sys.path.insert(0, str(Path(__file__).parent))
 import inject
@@ -34,7 +35,7 @@ def test_every_mistake_fits_its_source():
 def test_the_mistakes_are_many_known_and_of_every_family():
     flags = [m.flag for of in MISTAKES.values() for m in of]
     assert len(flags) >= 80 and set(flags) <= set(KNOWN)
-    touched = {name for name, family in zip(FAMILIES, families()) for w in family.WRONG_PORTS if w.flag in flags}
+    touched = {family for family in FAMILIES for w in wrong_ports(family) if w.flag in flags}
     assert touched == set(FAMILIES) - {"other_settings"}  # cases alone
     assert sum("training" in m.operations for m in MISTAKES["reference"]) >= 10
 

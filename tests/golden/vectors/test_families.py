@@ -10,6 +10,7 @@ from makers import registry
 from makers.files import rendered_files
 from makers.generate import solve_these
 from makers.registry import FAMILIES, all_specs, all_wrong_ports, families
+from makers.wrong import wrong_ports
 
 PUBLISHED = read_struct(golden_folder() / "manifest.json", Manifest)
 
@@ -17,7 +18,7 @@ PUBLISHED = read_struct(golden_folder() / "manifest.json", Manifest)
 @pytest.mark.parametrize("family", families(), ids=FAMILIES)
 def test_a_family_has_cases_and_mistakes_of_its_own_operations(family):
     assert {spec.operation for spec in family.cases()} == set(family.OPERATIONS)
-    for wrong_port in family.WRONG_PORTS:
+    for wrong_port in wrong_ports(family.__name__.removeprefix("makers.")):
         assert set(wrong_port.operations) <= set(all_operations()), wrong_port.flag
         assert set(wrong_port.operations) & set(family.OPERATIONS), f"{wrong_port.flag} breaks no rule of this family"
 
@@ -43,12 +44,7 @@ def test_a_flag_or_case_that_is_given_twice_is_refused(monkeypatch):
 def test_what_is_published_keeps_its_place_and_what_is_new_follows():
     """Files, flags and mistakes, for a manifest that lists one of two cases of `laplacian` and two flags."""
     three = ("motion/generic", "laplacian/co_sited", "laplacian/tiny")
-    ports = [
-        port
-        for family in families()
-        for port in family.WRONG_PORTS
-        if family.OPERATIONS in (("motion",), ("laplacian",))
-    ]
+    ports = [port for family in ("motion", "laplacian") for port in wrong_ports(family)]
     solved = solve_these([spec for spec in all_specs() if spec.name in three],
                          [port for port in ports if not set(port.operations) & {"masked_l1"}])  # fmt: skip
     names = ("laplacian/tiny", "motion/generic")
