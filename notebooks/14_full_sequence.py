@@ -128,7 +128,11 @@ def objective_text(i, terms, config):
 # %%
 def train(sequence, config):
     """A training as the command runs it, without files: (state, constants, log)."""
-    constants, state, log = training_constants(sequence, config), new_training(sequence, config), []
+    constants, state, log = (
+        training_constants(sequence, config),
+        new_training(sequence, config),
+        [],
+    )
     while state.iteration < config.training.iterations:
         log.append(training_step(state, constants))
     return state, constants, log
@@ -323,7 +327,8 @@ figure, axes = plt.subplots(2, 5, figsize=(14, 4.8), layout="constrained")
 for row, k in zip(axes, shown):
     truth, full = sequence.frame(int(k)).image, render(state, constants, int(k))
     without_A, without_S = (
-        render(state, constants, int(k), **{c: False}) for c in ("appearance", "spectral_motion")
+        render(state, constants, int(k), **{c: False})
+        for c in ("appearance", "spectral_motion")
     )
     error = np.where(sequence.masks[k], np.abs(full - truth).mean(axis=0), np.nan)
     pictures = (
@@ -359,7 +364,9 @@ plt.show()
 times = np.arange(2 * sequence.count - 1) / (2 * sequence.count)
 strips = []
 for j, t in enumerate(times):
-    out = render_at(state.gaussians, constants.spectral, constants.config, sequence.cameras[0], float(t))
+    out = render_at(
+        state.gaussians, constants.spectral, constants.config, sequence.cameras[0], float(t)
+    )
     pair = [sequence.images[j // 2] / 255, np.clip(out.colour, 0, 1)]
     strip = np.concatenate(pair, axis=2).transpose(1, 2, 0)
     strip[: max(2, sequence.height // 40)] = (

@@ -90,7 +90,7 @@ def sentences(found: Record | None) -> str:
         for c in steps
     )
     return (
-        f"**Power.** {pairs} seeds distinguish a true difference from 0 with a probability of {100 * POWER:.0f} % if it is at "
-        f'least {seen}. A smaller one is most likely "not decided", whether it exists or not. The published gains '
-        f"would need this many seeds: {needed}."
+        f"**Power.** {pairs} seeds distinguish a true difference from 0 with a probability of {100 * POWER:.0f} % "
+        f'if it is at least {seen}. A smaller one is most likely "not decided", whether it exists or not. The '
+        f"published gains would need this many seeds: {needed}."
     )

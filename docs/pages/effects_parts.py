@@ -115,8 +115,8 @@ def _without_tracks(plan: dict[str, Any]) -> str:
     return (
         " The reason is that `demo` and `sharp` need the Fourier translation (`model.spectral_motion`) for the tracked "
         "motion {eq}`eq-b15`. `paper` does not track motion. As the motion of this clip has no rate, the "
-        f"[plan for `paper`](#two-real-clips) switches this component off, which should save {plan['time_saved']:.0%} of "
-        f"the time of an iteration and {plan['memory_saved']:.0%} of the memory of the Gaussians."
+        f"[plan for `paper`](#two-real-clips) switches this component off, which should save {plan['time_saved']:.0%} "
+        f"of the time of an iteration and {plan['memory_saved']:.0%} of the memory of the Gaussians."
     )
 
 
@@ -189,7 +189,8 @@ def real(result: dict[str, Any]) -> str:
         ]
         plan = "\n".join(changes) or "- nothing"
         parts.append(
-            f"**`{name}`**: {clip['training_frames']} training frames.\n\n{table}\n\nThe plan for `paper` changes:\n\n{plan}"
+            f"**`{name}`**: {clip['training_frames']} training frames.\n\n{table}\n\n"
+            f"The plan for `paper` changes:\n\n{plan}"
         )
     return "\n\n".join(parts)
 

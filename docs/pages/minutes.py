@@ -81,9 +81,8 @@ def table(result: dict[str, Any]) -> str:
          *(form.format(row[key]) for key, (_, form) in METRICS.items())]
         for name, row in ordered(result).items()
     ]  # fmt: skip
-    others = result["baselines"] | {
-        "Endo-TSR as published": row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]
-    }
+    published = [row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]]
+    others = result["baselines"] | {row["label"]: row for row in published}
     for name, row in others.items():
         rows.append([name, *["-"] * 5, *(form.format(row[key]) for key, (_, form) in METRICS.items())])
     return markdown(headings, rows)

@@ -62,7 +62,8 @@ def wrong_ports(family: str) -> Iterator[WrongPort]:
 
 def _edit(change: Sequence[Any], module: str) -> Edit:
     texts = [part for part in change if isinstance(part, str)]
-    return Edit(*([module] if len(texts) == 2 else []), *texts, *change[len(texts) :])
+    whole: Sequence[Any] = [*([module] if len(texts) == 2 else []), *texts, *change[len(texts) :]]
+    return Edit(*whole)
 
 
 class Wrong(NamedTuple):

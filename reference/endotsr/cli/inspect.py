@@ -32,7 +32,9 @@ class InspectOptions:
     """frames a second (default: those of the recording, where known); rates are then also given a minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
-    settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = PAPER
+    settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = (
+        PAPER
+    )
 
 
 def run(words: list[str]) -> int:

@@ -103,8 +103,8 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
     kind = WIDE_RANGE.get(int(frame.color_trc or 0))
     if kind:
         raise InputError(
-            f"{path}: pictures of high dynamic range ({kind}) are not display RGB; allowed: display RGB, for example after a tone mapping"
-            " by the program that exported the video"
+            f"{path}: pictures of high dynamic range ({kind}) are not display RGB; allowed: display RGB,"
+            " for example after a tone mapping by the program that exported the video"
         )
 
 
@@ -225,7 +225,8 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
         file.seek(0)
         try:
-            container = av.open(file, "r", **_metadata_ignored(av.__version__))
+            options: dict[str, Any] = _metadata_ignored(av.__version__)
+            container = av.open(file, "r", **options)
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None
         with container:

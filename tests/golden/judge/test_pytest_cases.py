@@ -1,4 +1,4 @@
-"""One pytest test a case for ports in Python: a right port, a wrong one, one that is not finished, and known failures."""
+"""One pytest test per case for ports in Python: a right one, a wrong one, an unfinished one, and known failures."""
 
 import textwrap
 

@@ -6,7 +6,7 @@ gives the length of the run gives it exactly: `config.merged`.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
@@ -22,6 +22,7 @@ from endotsr.config import (
 )
 from endotsr.errors import InputError
 from endotsr.untrusted.toml import read_toml
+
 
 @dataclass
 class Sources:
