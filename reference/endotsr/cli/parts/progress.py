@@ -69,7 +69,8 @@ class Progress:
         now = time.monotonic()
         standing = self._standing(entry)
         seen = self._pixels / 4 if standing.coarse else self._pixels
-        self._seconds.append((now - self._ended) / float(iteration_work(standing.gaussians, seen)))
+        work = iteration_work(standing.gaussians, seen, standing.iteration / self._total)
+        self._seconds.append((now - self._ended) / float(work))
         self._ended, self._done = now, self._done + 1
         if self._page is not None:
             self._page.update(entry, lambda: self._left(standing))

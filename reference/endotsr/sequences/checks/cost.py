@@ -1,10 +1,12 @@
 """What a training will need, estimated from settings and the size of the sequence before anything is read whole.
 
-    work(N, P) = 0.1 + 0.4 P / (640 512) + 0.5 N / 60 000
+    work(N, P, u) = (0.1 + 0.4 P / (640 512) + 0.5 N / 60 000) (0.65 + 0.35 min(u / 0.35, 1))
 
-is the work of an iteration with N Gaussians and P pixels. Its unit is an iteration of the common workload (60 000
-Gaussians at 640x512), whose seconds belong to the machine and to the clip: SECONDS where nothing was timed. The parts
-were measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and at 320x256 pixels.
+is the work of an iteration with N Gaussians and P pixels after the fraction u of the run. Its unit is a late iteration
+of the common workload (60 000 Gaussians at 640x512), whose seconds belong to the machine and to the clip: SECONDS where
+nothing was timed. The first factor was measured with `endotsr bench` for 10 000 to 90 000 Gaussians at 640x512 and at
+320x256 pixels, the second on logs of `sharp` and `quick`: the first iterations have small Gaussians, colours of degree
+0 and time bases that are mostly out of reach.
 """
 
 from typing import NamedTuple
@@ -21,6 +23,7 @@ BETWEEN_BYTES = 2 * 8.5  # a pixel: the two moments between neighbouring trainin
 PROGRAM_BYTES, IMAGE_BYTES, GAUSSIAN_BYTES = 0.3e9, 0.3e9, 8.7e3  # the rest: program, images of 640x512, a Gaussian
 PIXELS, GAUSSIANS = 640 * 512, 60_000  # of the common workload
 BASE, OF_PIXELS, OF_GAUSSIANS = 0.1, 0.4, 0.5  # parts of its iteration
+EARLY, LATE_FROM = 0.65, 0.35  # part of a late iteration that the first one takes; fraction of the run before late ones
 SECONDS = 0.12  # of its iteration on two cores
 # Assumed growth where `density.growth = "threshold"`, whose last number nobody knows before: a larger weight of the
 # similarity makes larger gradients. On the pulling sequence `paper` grew 1.6 times, and 2.0 times with the weight 0.2;
@@ -52,9 +55,10 @@ def at_start(config: Config) -> Standing:
     return Standing(0, points, config.training.coarse_start)
 
 
-def iteration_work(gaussians: float | NDArray, pixels: float | NDArray) -> float | NDArray:
-    """Units of work of one iteration."""
-    return BASE + OF_PIXELS * pixels / PIXELS + OF_GAUSSIANS * gaussians / GAUSSIANS
+def iteration_work(gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray) -> float | NDArray:
+    """Units of work of one iteration; `progress` is the fraction of the run before it."""
+    early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
+    return (BASE + OF_PIXELS * pixels / PIXELS + OF_GAUSSIANS * gaussians / GAUSSIANS) * early
 
 
 def gaussians_at_end(config: Config) -> int:
@@ -78,7 +82,7 @@ def work_left(config: Config, pixels: int, at: Standing) -> float:
     goal = max(gaussians_at_end(config), at.gaussians)
     counts = np.interp(later, [first, max(last, first + 1)], [at.gaussians, goal if first < last else at.gaussians])
     seen = np.where(at.coarse & (later <= last), pixels / 4, pixels)
-    return float(np.sum(iteration_work(counts, seen)))
+    return float(np.sum(iteration_work(counts, seen, later / config.training.iterations)))
 
 
 def estimated_cost(count: int, width: int, height: int, config: Config) -> Cost:
