@@ -494,16 +494,6 @@ def _refuse_contradictions(config: Config, where: str) -> None:
         )
 
 
-def by_key(settings: Any) -> dict[str, Any]:
-    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. Else {}."""
-    found: dict[str, Any] = {}
-    for name, values in settings.items() if isinstance(settings, dict) else ():
-        found |= (
-            {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
-        )
-    return found
-
-
 def config_to_toml(config: Config) -> str:
     """The resolved configuration as TOML text that `load_config` reads back to an equal Config."""
     return toml_text(msgspec.to_builtins(config))

@@ -85,7 +85,7 @@ def test_a_check_changes_nothing_and_a_better_fit_has_less_error(sequence):
     config = settings()
     state = new_training(sequence, config)
     start = coarse_start.coarse_start(sequence, config)
-    constants, frames = start.training_constants, start.frames
+    constants, frames = start.constants, start.frames
     assert len(frames) == 8 and {frames[0], frames[-1]} == {sequence.train_index[0], sequence.train_index[-1]}
     before = {name: a.copy() for name, a in arrays(state.gaussians).items()}
     generator = dict(state.rng.bit_generator.state)

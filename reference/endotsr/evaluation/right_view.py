@@ -72,6 +72,11 @@ def right_view(
     return {"baseline": baseline, "spread": spread, "unit": sequence.unit, "rows": list(rows.values())}
 
 
+def right_camera(camera: Camera, baseline: float) -> Camera:
+    """The camera moved by the baseline along its own x axis."""
+    return camera._replace(translation=camera.translation - np.array([baseline, 0.0, 0.0]))
+
+
 def stereo_baseline(sequence: Sequence, right: Callable[[int], NDArray[np.uint8]]) -> tuple[float, float] | None:
     """Median of d z / f over tissue pixels of some frames, and its relative spread; None with too few pixels.
 
@@ -129,8 +134,7 @@ def _frame(
 ) -> dict[str, tuple[float, float]]:
     """PSNR and SSIM of every row on one frame."""
     truth = right.astype(np.float32) / np.float32(255)
-    moved, left = moved_left(sequence, index, baseline), sequence.cameras[index]
-    camera = left._replace(translation=left.translation - np.array([baseline, 0.0, 0.0]))  # along its own x axis
+    moved, camera = moved_left(sequence, index, baseline), right_camera(sequence.cameras[index], baseline)
     pictures = {
         "this model": np.clip(render(index, camera).colour, 0, 1),
         "left picture moved by the prior depth": moved.picture,

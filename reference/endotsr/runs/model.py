@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from endotsr.config import Config, by_key
+from endotsr.config import Config
 from endotsr.errors import InputError
 from endotsr.runs.files import warn
 from endotsr.runs.folder import RunFolder
 from endotsr.runs.records import RunRecord
+from endotsr.untrusted.toml import by_key
 
 if TYPE_CHECKING:
     from endotsr.fitting.checkpoint import Checkpoint

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import msgspec
 
-from endotsr.config import Config, by_key, lengthened, with_settings
+from endotsr.config import Config, lengthened, with_settings
 from endotsr.errors import InputError
 from endotsr.runs.files import read_json
 from endotsr.runs.folder import RunFolder, open_run
@@ -20,6 +20,7 @@ from endotsr.runs.records import StartPart
 from endotsr.runs.sources import SIMULATED
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.sweeps.spec import Configuration, Spec, Start, split_name, split_settings
+from endotsr.untrusted.toml import by_key
 
 if TYPE_CHECKING:
     from endotsr.fitting.state import TrainingState

@@ -44,3 +44,11 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml_value(v) for v in value) + "]"
     return repr(value)
+
+
+def by_key(settings: Any) -> dict[str, Any]:
+    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. {} for anything else."""
+    found: dict[str, Any] = {}
+    for name, values in settings.items() if isinstance(settings, dict) else ():
+        found |= {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
+    return found

@@ -15,13 +15,12 @@ from endotsr.config import (
     MILESTONES,
     Config,
     Preset,
-    by_key,
     config_from_dict,
     with_iterations,
     with_settings,
 )
 from endotsr.errors import InputError
-from endotsr.untrusted.toml import read_toml
+from endotsr.untrusted.toml import by_key, read_toml
 
 
 @dataclass
