@@ -40,7 +40,8 @@ def pixels_only(data: bytes, name: object) -> bytes:
     name     for messages
 
     Raises: InputError if the header is not allowed, if the picture has more than 2^26 pixels, if a chunk that the
-            pixels need is missing, repeated or unknown, if the file holds several pictures (APNG), or if the compressed pixels are not those of the header.
+            pixels need is missing, repeated or unknown, if the file holds several pictures (APNG), or if the
+            compressed pixels are not those of the header.
     """
     chunks = _chunks(data)
     header = _header(chunks, name)
