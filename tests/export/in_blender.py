@@ -1,8 +1,8 @@
 """An animated .glb of this package in Blender: python tests/export/in_blender.py PYTHON
 
-PYTHON is an interpreter with Blender as a module (`pip install bpy`, which asks for NumPy 1 and one version of Python),
-so that it is not that of this package. The file is imported there, and its points at three times are compared with
-those of the scene. The exit code is 1 if any is off by more than a micrometre.
+PYTHON is an interpreter with Blender as a module: `pip install bpy` asks for NumPy 1 and one version of Python, so that
+it is not that of this package. The file is imported there, and its points at three times are compared with those of the
+scene. The exit code is 1 if any is off by more than a micrometre.
 """
 
 import json

@@ -12,6 +12,10 @@ from endotsr.effects.verdict import Curve, EffectVerdict, Map
 from endotsr.equations.dictionary import AtomReport
 from endotsr.report.inspection import inspection_html, inspection_text
 from report.test_report import Reader, without_pictures
+from views.browser import seen
+
+WIDTHS = """<pre id="probe"></pre><script>document.getElementById("probe").textContent = JSON.stringify(
+{"cut": [...document.querySelectorAll(".scroll")].filter(e => e.scrollWidth > e.clientWidth).length});</script>"""
 
 
 @pytest.fixture
@@ -60,3 +64,14 @@ def test_text_says_what_the_page_says(found):
     assert "rate: 5 cycles per sequence, 1500 a minute, 2 harmonics" in text
     assert "model.appearance = false (now true), saves 5% time, 7% memory: Steady light." in text
     assert "model.bases = 5 (now 17): Slow motion." in text and "model.deformation stays: It <moves>." in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [700, 820, 1000])
+def test_no_table_is_cut_at_the_side(width, found, tmp_path):
+    inspection, plan = found
+    motion = inspection.verdicts["motion"]
+    wordy = motion._replace(kind="gain + white balance + local", unit="times the threshold of a tile")
+    page = inspection_html("clip", inspection._replace(verdicts={"motion": wordy}), plan)
+    (tmp_path / "page.html").write_text(page.replace("</body>", WIDTHS + "</body>"), encoding="utf-8")
+    assert seen(tmp_path / "page.html", f"--window-size={width},900") == {"cut": 0}

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+import public_layouts
+import raw_sources
 from input_kinds import (
     Row,
     blank,
@@ -153,6 +155,33 @@ def coloured(i: int):
     return np.stack([near, 255 - near, near // 2], axis=2)
 
 
+def colmap_named(name):
+    """A model of twelve frames whose pictures have other names, by their number."""
+
+    def make(folder: Path) -> list[str]:
+        raw_sources.colmap(folder / "raw", False, frames=12)
+        listed = (folder / "raw/sparse/0/images.txt").read_text()
+        for k in reversed(range(12)):  # no name is written twice
+            (folder / f"raw/images/frame{k:04d}.png").rename(folder / "raw/images" / name(k))
+            listed = listed.replace(f"frame{k:04d}.png", name(k))
+        (folder / "raw/sparse/0/images.txt").write_text(listed)
+        return prepare("raw", camera=())(folder)
+
+    return make
+
+
+def nerfstudio_named(folder: Path) -> list[str]:
+    """Frames 8, 9, 10, ... without leading zeros."""
+    public_layouts.nerfstudio(folder / "raw")
+    listed = (folder / "raw/transforms.json").read_text()
+    for k in range(len(public_layouts.poses())):
+        (folder / f"raw/images/frame_{k:05d}.png").rename(folder / f"raw/images/frame_{k + 8}.png")
+        listed = listed.replace(f"images/frame_{k:05d}.png", f"images/frame_{k + 8}.png")
+    (folder / "raw/transforms.json").write_text(listed)
+    return prepare("raw", camera=())(folder)
+
+
+RECONSTRUCTED = [raw_sources.scene_picture(i) for i in range(12)]
 POSES = [f"{i} {0.001 * i} 0 0 0 0 0 1" for i in range(15)]
 IN_TURN = [shown for i in range(6) for shown in (picture(i), np.roll(picture(i), -20, axis=1))]
 ODD_ROWS = [
@@ -204,4 +233,12 @@ ODD_ROWS = [
     Row("trajectory that is no number", with_trajectory(*POSES[:3], "3 nan 0 0 0 0 0 1"), "refused", "line 4"),
     Row("stereo, a right picture missing", two_folders(pictures(), pictures(9)), "refused", "left holds 12 files"),
     Row("stereo, left and right exchanged", exchanged, "refused", "with left and right exchanged"),
+    Row("COLMAP, numbered without zeros", colmap_named(lambda k: f"frame{k}.png"), "right", "",
+        close(RECONSTRUCTED, 0.01)),
+    Row("COLMAP, frames that are not registered", colmap_named(lambda k: f"frame{k + 3 * (k > 5):04d}.png"), "told",
+        "frames count as evenly spaced in time", close(RECONSTRUCTED, 0.01)),
+    Row("COLMAP, names without an order", colmap_named(lambda k: "overview.png" if k == 5 else f"frame{k}.png"),
+        "refused", "numbers in this name: 0"),
+    Row("nerfstudio, numbered without zeros", nerfstudio_named, "right", "",
+        close([public_layouts.picture(i) for i in range(len(public_layouts.poses()))], 0.01)),
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from browser import seen
@@ -158,6 +159,10 @@ def test_an_mp4_is_h264_where_there_is_an_encoder_and_vp9_otherwise(tmp_path, mo
     write_film(tmp_path / "a.mp4", pictures(2), 10.0)
     has_encoder = film_file.encoder_of(tmp_path / "a.mp4") in film_file.H264
     assert video_facts(tmp_path / "a.mp4").codec == ("h264" if has_encoder else "vp9")
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        assert container.streams.video[0].codec_context.pix_fmt == "yuv420p", "PowerPoint and QuickTime read no other"
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat"), "a browser plays it while it loads"
     monkeypatch.setitem(film_file.BY_ENDING, ".mp4", film_file.VP9)
     write_film(tmp_path / "b.mp4", pictures(2), 10.0)
     assert video_facts(tmp_path / "b.mp4").codec == "vp9"

@@ -185,20 +185,21 @@ dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
 pre{overflow-x:auto;font:.82rem/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;margin:0}
 code{font:.85em ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
 footer{margin-top:3rem;border-top:1px solid var(--line);padding-top:1rem;color:var(--soft);font-size:.86rem}
+@media(max-width:1180px){.few td,.listed td{white-space:normal}}
 @media(max-width:640px){main{padding:1.3rem .9rem 3rem}.charts{grid-template-columns:1fr}
 .views{grid-auto-flow:row;grid-template-rows:none;grid-template-columns:1fr 1fr}
 .cards{grid-template-columns:1fr 1fr}th,td{padding:.45rem .65rem}tbody th{min-width:8.5rem}
 dl{grid-template-columns:minmax(0,1fr)}dd{margin-bottom:.4rem}
 .few table,.few thead,.few tbody,.few caption{display:block}
 .few tr{display:grid;grid-template-columns:var(--columns);border-bottom:1px solid var(--line)}
-.few tbody tr:last-child,.listed tbody tr:last-child{border-bottom:0}
+.few tbody tr:last-child{border-bottom:0}
 .few th:first-child{grid-column:1/-1;position:static;padding-bottom:0}
 .few th,.few td{padding:.35rem .3rem;border-bottom:0;white-space:normal;overflow-wrap:anywhere;font-size:.85rem}
 .few tr>:first-child,.few tr>:nth-child(2){padding-left:.5rem}.few tr>:last-child{padding-right:.5rem}
-.few thead th{font-size:.72rem}
-.listed thead{display:none}
+.few thead th{font-size:.72rem}}
+@media(max-width:800px){.listed thead{display:none}
 .listed table,.listed tbody,.listed caption,.listed th,.listed tr{display:block}
-.listed tr{border-bottom:1px solid var(--line);padding:.4rem .7rem}
+.listed tr{border-bottom:1px solid var(--line);padding:.4rem .7rem}.listed tbody tr:last-child{border-bottom:0}
 .listed th,.listed td,.listed td.words{padding:.15rem 0;border-bottom:0;white-space:normal;text-align:left;min-width:0}
 .listed td{display:grid;grid-template-columns:8.5rem minmax(0,1fr);gap:.6rem;overflow-wrap:anywhere}
 .listed td::before{content:attr(data-head);color:var(--soft);font-size:.82rem}}

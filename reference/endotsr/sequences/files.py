@@ -30,16 +30,20 @@ def list_pictures(folder: Path, endings: tuple[str, ...] = (".png",)) -> list[Pa
         kinds = "PNG file" if endings == (".png",) else f"PNG file, and none that ends in {', '.join(endings[1:])}"
         raise InputError(f"{folder}: holds no {kinds}")
     _check_names_are_text(files)
+    return [files[i] for i in time_order(files)]
+
+
+def time_order(files: list[Path]) -> list[int]:
+    """Places of the files in time order, by the rules and with the errors of `list_pictures`; they share a folder."""
     _check_names_alike(files)
     _check_decimals(files)
     numbers = frame_numbers(files)
     if numbers is None:
-        return files
+        return sorted(range(len(files)), key=lambda i: files[i])
     if len(set(numbers)) < len(numbers):
-        raise InputError(
-            f"{folder}: two files carry the same frame number, for example {_first_repeated(files, numbers)}"
-        )
-    return [file for _, file in sorted(zip(numbers, files), key=lambda pair: pair[0])]
+        repeated = _first_repeated(files, numbers)
+        raise InputError(f"{files[0].parent}: two files carry the same frame number, for example {repeated}")
+    return sorted(range(len(files)), key=lambda i: numbers[i])
 
 
 def frame_numbers(files: list[Path]) -> list[tuple[int, ...]] | None:

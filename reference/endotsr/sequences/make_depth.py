@@ -67,7 +67,7 @@ def stereo_frames(recording: Recording, settings: StereoSettings) -> Iterator[ND
 
 
 def _refuse_exchanged(coverage: float, exchanged: float, where: Path) -> None:
-    """Refuse left and right pictures that match the other way round; the fractions of pixels with depth both ways."""
+    """Refuse left and right pictures that match the other way round; fractions of pixels with depth, both ways."""
     if exchanged > max(LITTLE, EXCHANGED * coverage):
         raise InputError(
             f"{where}: {coverage:.1%} of the pixels of the first frame match the right picture, and {exchanged:.1%}"

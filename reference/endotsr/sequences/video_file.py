@@ -103,8 +103,8 @@ def _refuse_wide_range(frame: Any, path: Path) -> None:
     kind = WIDE_RANGE.get(int(frame.color_trc or 0))
     if kind:
         raise InputError(
-            f"{path}: pictures of high dynamic range ({kind}) are not display RGB; allowed: display RGB,"
-            " for example after a tone mapping by the program that exported the video"
+            f"{path}: pictures of high dynamic range ({kind}); allowed: display RGB, for example after a tone mapping"
+            " by the program that exported the video"
         )
 
 

@@ -1,7 +1,7 @@
 """A COLMAP model with its pictures: poses, intrinsics and points of a reconstruction of unknown scale.
 
 The model (cameras, images, points3D; .txt or .bin) lies in the folder, in sparse/0 or in sparse; the pictures in
-images/ or beside the model. Frames are the registered pictures, in the order of their names.
+images/ or beside the model. Frames are the registered pictures, in the order of the numbers in their names.
 """
 
 from pathlib import Path
@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
+from endotsr.sequences.checks.frames import gap_findings
 from endotsr.sequences.colmap_model import find_model, read_model
+from endotsr.sequences.files import time_order
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import ARBITRARY, Recording
 from endotsr.sequences.source_options import SourceOptions
@@ -34,11 +36,13 @@ def open_colmap(path: Path, options: SourceOptions) -> Recording:
     if len({model.cameras[key] for key in used}) > 1:
         raise InputError(f"{folder}: {len(used)} cameras with different intrinsics; allowed: one for all frames")
     files = [_file(path, image.name) for image in model.images]
-    lens = model.cameras[model.images[0].camera]
+    order = time_order(files)
+    files, images = [files[i] for i in order], [model.images[i] for i in order]
+    lens = model.cameras[images[0].camera]
     empty = np.zeros((0, 3))
 
     def points(i: int) -> np.ndarray:
-        seen = [model.points[key] for key in model.images[i].points.tolist() if key in model.points]
+        seen = [model.points[key] for key in images[i].points.tolist() if key in model.points]
         return np.array(seen) if seen else empty
 
     return Recording(
@@ -50,9 +54,10 @@ def open_colmap(path: Path, options: SourceOptions) -> Recording:
         points=points,
         unit=ARBITRARY,
         lens=lens,
-        poses=[image.pose for image in model.images],
+        poses=[image.pose for image in images],
         rate=options.rate,
-        notes=[f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points"],
+        notes=[f"{folder.name}: {len(files)} registered pictures, {len(model.points)} points"]
+        + [found.line for found in gap_findings(files)],
     )
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv.pictures import read_picture
+from endotsr.sequences.checks.frames import gap_findings
+from endotsr.sequences.files import time_order
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, Recording, checked_lens, colour_picture
 from endotsr.sequences.sequence_file import OPENGL, checked_rotation, inverse_pose
@@ -74,22 +76,24 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
     entries = listed(data.get("frames"), f"{file}: frames")
     if not entries or not all(isinstance(entry, dict) for entry in entries):
         raise InputError(f"{file}: frames: allowed: at least one object with file_path and transform_matrix")
-    entries.sort(key=lambda entry: str(entry.get("file_path")))
-    named = {key: [_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
-             for key in ("file_path", "mask_path", "depth_file_path")}  # fmt: skip
-    files = [name for name in named["file_path"] if name is not None]
+    files = [_named(folder, entry.get("file_path"), f"{file}: file_path") for entry in entries]
+    files = [name for name in files if name is not None]
     if len(files) < len(entries):
         raise InputError(f"{file}: a frame has no file_path")
+    order = time_order(files)
+    files, entries = [files[i] for i in order], [entries[i] for i in order]
+    masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
+                      for key in ("mask_path", "depth_file_path"))  # fmt: skip
     height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
     lenses = {read_lens(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)}
     if len(lenses) > 1:
         raise InputError(f"{file}: {len(lenses)} different cameras; allowed: one for all frames")
     masks = stated_masks(options, files, width, height)
-    if masks is None and any(named["mask_path"]):
-        masks = mask_reader(named["mask_path"], "black", width, height)
+    if masks is None and any(masked):
+        masks = mask_reader(masked, "black", width, height)
     points = _named(folder, data.get("ply_file_path"), f"{file}: ply_file_path")
     cloud = read_points(points) if points is not None and points.is_file() else None
-    depth = depth_reader(named["depth_file_path"], DEPTH_STEP) if any(named["depth_file_path"]) else None
+    depth = depth_reader(planes, DEPTH_STEP) if any(planes) else None
     return Recording(
         layout="nerfstudio",
         where=path,
@@ -103,6 +107,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
         poses=[_pose(entry, f"{file}: frame {i}: transform_matrix") for i, entry in enumerate(entries)],
         rate=options.rate,
         notes=[f"{FILE}: {len(files)} frames, unit of lengths unknown"]
+        + [found.line for found in gap_findings(files)]
         + ([] if cloud is None else [f"{len(cloud)} points: the file does not say which frame sees which"]),
     )
 

@@ -57,7 +57,8 @@ def find_pictures(path: Path) -> tuple[list[Path], list[Path]]:
 
 def _sides(path: Path) -> tuple[list[Path], list[Path]] | None:
     """The left and the right files of one folder by their names; None unless every name says its side."""
-    files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURE_ENDINGS)
+    shown = (file for file in path.iterdir() if not file.name.startswith("."))
+    files = sorted(file for file in shown if file.suffix.lower() in PICTURE_ENDINGS)
     found: dict[str, list[Path]] = {"l": [], "r": []}
     for file in files:
         side = SIDE.search(file.stem)
