@@ -6,7 +6,8 @@ PORT is c99, reference or torch; all of them by default. The port in PyTorch is 
 ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. The mistakes are those
 of `mistakes.toml`, and each is made alone. It is named rightly if the first mistake that the report names is this one.
 The right ports are judged as well: they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16
-are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes.
+are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes. In the file, the outcomes
+of a port that was not run stay as they are if they are of the same version.
 """
 
 import argparse
@@ -16,7 +17,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -179,13 +179,21 @@ def _first_two(operations: tuple[str, ...]) -> list[str]:
 PORTS: dict[str, Callable[[Golden], Iterator[Outcome]]] = {"c99": in_c, "reference": in_copies, "torch": in_torch}
 
 
+def keep(file: Path, version: str, outcomes: list[Outcome]) -> None:
+    """Write the outcomes, and those of ports that were not run."""
+    before = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    same, run = before.get("golden") == version, {outcome.port for outcome in outcomes}
+    kept = [row for row in before["outcomes"] if row["port"] not in run] if same else []
+    write_json(file, dated({"golden": version, "outcomes": [outcome._asdict() for outcome in outcomes] + kept}))
+
+
 def main(words: list[str]) -> int:
     """Run, print a line for each mistake that is not named first, and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("ports", nargs="*", metavar="PORT", choices=[*PORTS, "all"], default="all")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(words)
-    golden, outcomes, began = read_golden(golden_folder()), [], time.monotonic()
+    golden, outcomes = read_golden(golden_folder()), []
     for name in PORTS if options.ports == "all" else options.ports:
         for outcome in PORTS[name](golden):
             outcomes.append(outcome)
@@ -198,9 +206,7 @@ def main(words: list[str]) -> int:
     right = sum(outcome.right for outcome in wrong)
     print(f"{right} of {len(wrong)} single mistakes named rightly")
     if options.json:
-        rows = [outcome._asdict() for outcome in outcomes]
-        version, seconds = golden.manifest.version, time.monotonic() - began
-        write_json(options.json, dated({"golden": version, "seconds": seconds, "outcomes": rows}))
+        keep(options.json, golden.manifest.version, outcomes)
     clean = all(not outcome.refused and not outcome.named for outcome in outcomes if not outcome.flag)
     return 0 if clean and 16 * right >= 15 * len(wrong) else 1
 
