@@ -31,7 +31,7 @@ def fragments(result: dict[str, Any]) -> dict[str, str]:
     right_ports = [o for o in result["outcomes"] if not o["flag"]]
     clean = sum(not o["refused"] and not o["named"] for o in right_ports)
     note = (
-        f"Version {result['golden']}, {result['seconds']:.0f} s ({machine(result)}). Of the "
+        f"Version {result['golden']} ({machine(result)}). Of the "
         f"{len(right_ports)} right ports, {clean} pass with no mistake named."
     )
     counts = markdown(("Port", "Single mistakes", "Named rightly"), rows)

@@ -5,7 +5,6 @@ gives, and for each of these values, and the published one, a case that refuses 
 is the reference, asked with the one setting replaced. A value that no case refuses is a gap.
 """
 
-import copy
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -19,6 +18,7 @@ from endotsr.golden.judge.compare import judged
 from endotsr.golden.judge.format import Case
 from endotsr.golden.judge.store import Golden
 from endotsr.golden.reference import reference, stored
+from endotsr.golden.search.requests import with_value
 from endotsr.splatting.settings import PRESETS, RasterSettings
 
 Place = tuple[str, ...]  # keys of the settings of a case, from the outside in
@@ -100,16 +100,6 @@ def _at(settings: Mapping[str, Any], place: Place) -> Any:
     return getattr(PRESETS[settings["config"]["raster"]["preset"]], place[-1]) if value == "preset" else value
 
 
-def with_value(settings: Mapping[str, Any], place: Place, value: Any) -> dict[str, Any]:
-    """The settings with one of them replaced."""
-    out = copy.deepcopy(dict(settings))
-    inner = out
-    for key in place[:-1]:
-        inner = inner[key]
-    inner[place[-1]] = value
-    return out
-
-
 def refuses(golden: Golden, case: Case, settings: dict[str, Any], precision: str) -> bool:
     """Whether a case refuses the reference, asked with other settings."""
     with np.errstate(all="ignore"):
@@ -134,7 +124,7 @@ def row_of(golden: Golden, setting: str, published: Any, precision: str = "float
     refused = {}
     for text, value in values.items():
         others = [(case, place) for case, place in held if _at(case.settings, place) != value]
-        wrong = (c.name for c, p in others if refuses(golden, c, with_value(c.settings, p, value), precision))
+        wrong = (c.name for c, p in others if refuses(golden, c, dict(with_value(c.settings, p, value)), precision))
         refused[text] = next(wrong, "")
     return Row(setting, refused)
 

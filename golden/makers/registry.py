@@ -20,36 +20,11 @@ from makers.making import Spec
 from makers.wrong import WrongPort, wrong_ports
 
 FAMILIES = (
-    "reading",
-    "dictionary",
-    "appearance",
-    "motion",
-    "matern",
-    "laplacian",
-    "calibration",
-    "deformation",
-    "adam",
-    "masked_l1",
-    "masked_ssim",
-    "depth",
-    "smoothness",
-    "exposure",
-    "pose",
-    "covariance",
-    "projection",
-    "harmonics",
-    "composite",
-    "composite_limits",
-    "render",
-    "schedule",
-    "density",
-    "initialisation",
-    "scene",
-    "objective",
-    "training",
-    "other_settings",
-    "extremes",
-)
+    "reading", "dictionary", "appearance", "motion", "matern", "laplacian", "calibration", "deformation", "adam",
+    "masked_l1", "masked_ssim", "depth", "smoothness", "exposure", "pose", "covariance", "projection", "harmonics",
+    "composite", "composite_limits", "render", "schedule", "density", "initialisation", "scene", "objective",
+    "training", "other_settings", "extremes",
+)  # fmt: skip
 
 
 def families() -> list[ModuleType]:

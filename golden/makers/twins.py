@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.golden.judge.compare import largest
 from endotsr.golden.judge.store import Golden
 from endotsr.gradcheck.registry import one_thread, pair_stream
 from endotsr.stages.definition import definition_stages
@@ -19,7 +20,6 @@ from endotsr.stages.stage import Inputs, Settings, Stage
 from makers.registry import JUDGED, Judged
 
 SEEDS = (0, 1, 2)
-SMALL_COLUMN = 1e-3  # of the largest magnitude: the least scale of a column
 BOUND = 2e-14  # of the scale, for every output that is not in BOUNDS
 BOUNDS = {
     "objective": (1e-13, "a gradient is a sum over Gaussians and pixels in which large terms cancel"),
@@ -72,20 +72,11 @@ def made_up(stage: Stage, seeds: Iterable[int] = SEEDS) -> Iterator[TwinRequest]
 
 
 def scaled(got: NDArray, wanted: NDArray, scale: str) -> float:
-    """The largest difference in units of the largest magnitude (1 where that is 0).
-
-    scale  "last": each column [..., n] has its own unit; "exact": infinite unless every entry is equal
-    """
+    """The largest difference in units of the scale, as the judge compares; infinite where "exact" tells two apart."""
     got, wanted = np.asarray(got), np.asarray(wanted)
-    if got.shape != wanted.shape or scale == "exact":
-        return 0.0 if np.array_equal(got, wanted) else np.inf
-    size = np.abs(wanted)
-    largest = size.max(initial=0) or 1.0
-    if scale == "last" and wanted.ndim > 1:
-        largest = np.maximum(size.max(axis=tuple(range(size.ndim - 1)), initial=0), SMALL_COLUMN * largest)
-    with np.errstate(invalid="ignore"):
-        off = np.where(got == wanted, 0, np.abs(got - wanted) / largest)
-    return float(np.where(np.isfinite(off), off, np.inf).max(initial=0))
+    if np.array_equal(got, wanted):
+        return 0.0
+    return np.inf if scale == "exact" else largest(got, wanted, scale)
 
 
 def golden_requests(golden: Golden) -> Iterator[tuple[str, TwinRequest]]:

@@ -61,9 +61,8 @@ def wrong_ports(family: str) -> Iterator[WrongPort]:
 
 
 def _edit(change: Sequence[Any], module: str) -> Edit:
-    texts = [part for part in change if isinstance(part, str)]
-    whole: Sequence[Any] = [*([module] if len(texts) == 2 else []), *texts, *change[len(texts) :]]
-    return Edit(*whole)
+    *texts, times = change if isinstance(change[-1], int) else (*change, 1)
+    return Edit(texts[0] if len(texts) > 2 else module, texts[-2], texts[-1], times)
 
 
 class Wrong(NamedTuple):

@@ -30,7 +30,7 @@ class _Reported:
     """judge this family or case alone; there is then no claim, and exit code 0 means that nothing was refused"""
     all: bool = False
     """list the cases that passed, too, and leave nothing out"""
-    search: Annotated[float, Option("SECONDS")] = 8.0
+    search: Annotated[float, Option("SECONDS")] = 16.0
     """seconds of computing that the search for the cause of a refusal may take; 0 leaves it out"""
 
 

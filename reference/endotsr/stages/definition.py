@@ -253,7 +253,7 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     config = msgspec.structs.replace(config, loss=msgspec.structs.replace(config.loss, lambda_lap=float(weight)))
     state, tape, log = train.start(gaussians), Tape(inputs["frame_order"], inputs["split_noise"]), []
     counts = [gaussians.opacity_logit.size]
-    for _ in range(config.training.iterations):
+    for _ in inputs["frame_order"]:  # as many iterations as there are frames in the order
         state, seen = train.iterate(state, sequence, spectral, config, tape, raster, canny_edges)
         log.append({"loss": seen.loss, **seen.terms, **_sizes(state)})
         counts.append(state.gaussians.opacity_logit.size)

@@ -5,17 +5,9 @@ import importlib
 from endotsr.stages.stage import Stage
 
 STAGE_MODULES = (
-    "spectral",
-    "laplacian",
-    "deformation",
-    "projection",
-    "compositing",
-    "losses",
-    "exposure",
-    "pose",
-    "scene",
+    "spectral", "laplacian", "deformation", "projection", "compositing", "losses", "exposure", "pose", "scene",
     "optimiser",
-)
+)  # fmt: skip
 
 
 def all_stages() -> dict[str, Stage]:

@@ -1,12 +1,13 @@
 """Put single mistakes into ports and count how many the judge names.
 
-    python tests/golden/injected/inject.py [PORT ...] [--json docs/results/injected.json]
+    python tests/golden/injected/inject.py [PORT ...] [--only FLAG ...] [--json docs/results/injected.json]
 
 PORT is c99, reference or torch; all of them by default. The port in PyTorch is run by the interpreter that
 ENDOTSR_TORCH_PYTHON names, by default this one, and is left out where that one has no torch. The mistakes are those
 of `mistakes.toml`, and each is made alone. It is named rightly if the first mistake that the report names is this one.
 The right ports are judged as well: they must pass, and nothing may be named. The exit status is 0 if at least 15 of 16
-are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes.
+are named. The result is a table of docs/guides/port.md, which docs/pages/injected.py writes. In the file, the
+outcomes of mistakes that were not made stay as they are if they are of the same version.
 """
 
 import argparse
@@ -16,9 +17,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,12 +47,13 @@ class Mistake(NamedTuple):
     operations: tuple[str, ...]  # on which a mistake in the reference is examined
 
 
-def mistakes(port: str) -> list[Mistake]:
-    """The mistakes that `mistakes.toml` lists for a port."""
+def mistakes(port: str, only: Sequence[str] = ()) -> list[Mistake]:
+    """The mistakes that `mistakes.toml` lists for a port, or some of them."""
     table = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))[port]
     return [
         Mistake(flag, tuple(Edit(*change) for change in entry["changes"]), tuple(entry.get("operations", "").split()))
         for flag, entry in table.items()
+        if not only or flag in only
     ]
 
 
@@ -121,18 +122,18 @@ def changed(port: str, mistake: Mistake) -> str:
     return text
 
 
-def in_c(golden: Golden) -> Iterator[Outcome]:
+def in_c(golden: Golden, only: Sequence[str]) -> Iterator[Outcome]:
     """The mistakes in the port in C99, one by one, and first the right port."""
     with tempfile.TemporaryDirectory() as scratch:
         port = CPort(Path(scratch), golden)
         yield said("c99", "", port.report(None))
-        for mistake in mistakes("c99"):
+        for mistake in mistakes("c99", only):
             yield said("c99", mistake.flag, port.report(mistake))
 
 
-def in_copies(golden: Golden) -> Iterator[Outcome]:
+def in_copies(golden: Golden, only: Sequence[str]) -> Iterator[Outcome]:
     """The mistakes in the reference: a case that the mistake is not examined on is taken as passed."""
-    for mistake in mistakes("reference"):
+    for mistake in mistakes("reference", only):
         with tempfile.TemporaryDirectory() as scratch:
             folder, verdicts = Path(scratch), []
             with changed_copy(mistake.edits) as operation, np.errstate(all="ignore"):
@@ -147,13 +148,13 @@ def in_copies(golden: Golden) -> Iterator[Outcome]:
             yield said("reference", mistake.flag, conclude(golden, verdicts, "float32", 4, []))
 
 
-def in_torch(golden: Golden) -> Iterator[Outcome]:
+def in_torch(golden: Golden, only: Sequence[str]) -> Iterator[Outcome]:
     """The mistakes in the port in PyTorch, on the operations on which they are known; first the right one on all."""
     python = os.environ.get("ENDOTSR_TORCH_PYTHON", sys.executable)
     if subprocess.run([python, "-c", "import torch"], capture_output=True, check=False).returncode:
         print("torch: no PyTorch here, this port is left out")
         return
-    known, wrong = all_wrong_ports(), mistakes("torch")
+    known, wrong = all_wrong_ports(), mistakes("torch", only)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         write_requests(golden, folder / "requests", "float64", 3)
@@ -176,18 +177,31 @@ def _first_two(operations: tuple[str, ...]) -> list[str]:
     return [name for name in operations if name not in ("objective", "training")][:2]
 
 
-PORTS: dict[str, Callable[[Golden], Iterator[Outcome]]] = {"c99": in_c, "reference": in_copies, "torch": in_torch}
+PORTS: dict[str, Callable[[Golden, Sequence[str]], Iterator[Outcome]]] = {
+    "c99": in_c,
+    "reference": in_copies,
+    "torch": in_torch,
+}
+
+
+def keep(file: Path, version: str, outcomes: list[Outcome]) -> None:
+    """Write the outcomes in the place of those of the same mistakes, or in the place of all of another version."""
+    before = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    old = before["outcomes"] if before.get("golden") == version else []
+    rows = {(row["port"], row["flag"]): row for row in [*old, *(outcome._asdict() for outcome in outcomes)]}
+    write_json(file, dated({"golden": version, "outcomes": list(rows.values())}))
 
 
 def main(words: list[str]) -> int:
     """Run, print a line for each mistake that is not named first, and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("ports", nargs="*", metavar="PORT", choices=[*PORTS, "all"], default="all")
+    parser.add_argument("--only", nargs="+", metavar="FLAG", default=())
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(words)
-    golden, outcomes, began = read_golden(golden_folder()), [], time.monotonic()
+    golden, outcomes = read_golden(golden_folder()), []
     for name in PORTS if options.ports == "all" else options.ports:
-        for outcome in PORTS[name](golden):
+        for outcome in PORTS[name](golden, options.only):
             outcomes.append(outcome)
             if outcome.flag == "":
                 print(f"{name}: the right port: {outcome.refused} outputs refused, named: {outcome.named or 'none'}")
@@ -198,9 +212,7 @@ def main(words: list[str]) -> int:
     right = sum(outcome.right for outcome in wrong)
     print(f"{right} of {len(wrong)} single mistakes named rightly")
     if options.json:
-        rows = [outcome._asdict() for outcome in outcomes]
-        version, seconds = golden.manifest.version, time.monotonic() - began
-        write_json(options.json, dated({"golden": version, "seconds": seconds, "outcomes": rows}))
+        keep(options.json, golden.manifest.version, outcomes)
     clean = all(not outcome.refused and not outcome.named for outcome in outcomes if not outcome.flag)
     return 0 if clean and 16 * right >= 15 * len(wrong) else 1
 

@@ -225,10 +225,15 @@ def test_a_trajectory_says_where_it_leaves_the_path(golden, answered, tmp_path):
             value[4:] += np.linspace(0.001, 0.1, value[4:].size)
         (target / f"{name}.npy").write_bytes(npy_bytes(value))
     report = judge(golden, tmp_path, precision, level=4, only=case.name)
-    assert report.cases[0].first_wrong == "first wrong at iteration 5: term_ssim, loss"
+    where = report.cases[0].first_wrong
+    assert (
+        where == "first wrong at iteration 5: term_ssim, loss; look at the images and terms; "
+        "the detail weight leaves 0 at iteration 5"
+    )
+    assert report.diagnosis[1] == f"  training/twenty_iterations: {where}"
     (loss,) = [o for o in report.cases[0].outputs if o.name == "loss"]
     assert loss.index == (4,)
-    assert "first wrong at iteration 5: term_ssim, loss" in as_table(report)
+    assert where in as_table(report)
 
 
 COMMANDS = {  # words of a command line on Windows, and on the other systems

@@ -45,3 +45,12 @@ def test_matrices_and_factors_of_the_case_are_found():
 def test_noise_is_no_relation():
     noise = RIGHT * (1 + np.random.default_rng(0).uniform(0.1, 0.9, RIGHT.shape))
     assert first(noise, {"scale": SCALE}) == "every entry has another value"
+
+
+def test_every_second_row_or_pixel_is_told():
+    right, factor = np.arange(1.0, 43.0).reshape(6, 7), np.random.default_rng(0).uniform(2, 3, (6, 7))
+    row, column = np.indices(right.shape) % 2
+    for wrong, text in ((column == 1, "odd columns"), (row != column, "one even and one odd")):
+        found = relations(np.where(wrong, factor * right, right), right, "max", 1e-12, {})
+        assert any(one.text.startswith("only at ") and text in one.text for one in found)
+    assert not any("odd" in one.text for one in relations(factor * right, right, "max", 1e-12, {}))

@@ -18,6 +18,7 @@ PARTS = {
     "determinism": ("objective",),
 }  # fmt: skip
 """Operations that an operation is made of."""
+MOST_CASES = 4  # that are named
 
 
 def made_of(operation: str) -> set[str]:
@@ -39,16 +40,34 @@ def diagnosis(cases: Sequence[Case], reports: Sequence[Any]) -> list[str]:
     refused = [(r, o) for r in mine for o in r.outputs if o.status == "refused"]
     place = f"operation {first.operation}" + (f", equation ({first.equation})" if first.equation else "")
     lines = [f"first wrong: {place}, level {level}, {_direction(mine, refused)}"]
-    for name in dict.fromkeys(o.name for _, o in refused):
+    paths = [r for r in mine if r.first_wrong]
+    lines += _along(paths)
+    named: dict[str, list[str]] = {}
+    for name in dict.fromkeys(o.name for r, o in refused if not (paths and _follows(known[r.name], o.name))):
         forms = [o.forms for _, o in refused if o.name == name]
         shared = [form for form in forms[0] if all(form in other for other in forms)]
         text = "; ".join(shared[:2]) or "; ".join(forms[0][:1]) or "no simple relation to the expected array"
-        lines.append(f"  {name}: {text}")
+        named.setdefault(text, []).append(name)
+    lines += [f"  {', '.join(names)}: {text}" for text, names in named.items()]
     bad = list(dict.fromkeys(r.name for r, _ in refused))
     if 2 * len(bad) <= len(mine):
-        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:4]) + "; and below" * (len(bad) > 4)
+        titles = "; ".join(f"{name} ({known[name].title})" for name in bad[:MOST_CASES])
+        titles += "; and below" * (len(bad) > MOST_CASES)
         lines.append(f"  only in {len(bad)} of its {len(mine)} cases: {titles}")
     return lines
+
+
+def _along(paths: Sequence[Any]) -> list[str]:
+    """Where trajectories go wrong first, and what happens there in all of them."""
+    lines = [f"  {r.name}: {r.first_wrong}" for r in paths[:MOST_CASES]]
+    lines += [f"  and {len(paths) - MOST_CASES} more cases, see below"] if len(paths) > MOST_CASES else []
+    common = [event for event in paths[0].events if all(event in r.events for r in paths)] if len(paths) > 1 else []
+    return lines + [f"  in each of these cases {event} this iteration or the one before" for event in common]
+
+
+def _follows(case: Case, output: str) -> bool:
+    """Whether an output is of a trajectory: where it is first wrong says more than how it differs."""
+    return case.outputs[output].order == "iteration" or output.startswith("final_")
 
 
 def first_wrong(cases: Sequence[Case], reports: Sequence[Any]) -> tuple[int, Case | None]:

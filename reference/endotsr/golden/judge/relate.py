@@ -17,6 +17,7 @@ from endotsr.golden.judge.compare import scale_of
 
 FITS = 4.0  # tolerances that a relation may leave
 DIFFERS = 3.0  # times that, by which the port differs where it does; otherwise no relation can be told from rounding
+SMALLEST_BOARD = 4  # rows and columns from which every second one is told from chance
 LARGEST_PERMUTED = 16  # entries of an axis that is searched for a permutation
 KNOWN = {
     "2": 2.0, "3": 3.0, "4": 4.0, "5": 5.0, "6": 6.0, "9": 9.0, "1/2": 0.5, "1/3": 1 / 3, "1/4": 0.25, "1/5": 0.2,
@@ -83,7 +84,7 @@ def relations(
         return [Relation(kind="nan", text=f"{_part_of(broken)} not finite")]
     if not pair.telling:
         return [Relation(kind="entries", text="the difference is of the size of rounding")]
-    search = (_times, _orders, _signs, _clamps, _axes, _plus, _matrices, _arrays, _regions, _entries)
+    search = (_times, _orders, _signs, _clamps, _axes, _plus, _matrices, _arrays, _regions, _parities, _entries)
     return [relation for one in search for relation in one(pair, others)]
 
 
@@ -272,6 +273,19 @@ def _regions(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relati
         if 4 * rim < min(height, width) and not wrong[rim : height - rim, rim : width - rim].any():
             yield Relation(kind="where", text=f"only within {rim} pixels of the border", value=float(rim + 1))
             return
+
+
+def _parities(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:
+    """Wrong on every second row or column only, or on a chessboard, as where an image is sampled by twos."""
+    if pair.got.ndim < 2 or min(pair.wrong.shape[-2:]) < SMALLEST_BOARD:
+        return
+    wrong = np.asarray(pair.wrong.reshape(-1, *pair.wrong.shape[-2:]).any(axis=0))
+    row, column = np.indices(wrong.shape) % 2
+    boards = {"odd rows": row, "even rows": 1 - row, "odd columns": column, "even columns": 1 - column,
+              "pixels whose row and column are one even and one odd": row ^ column}  # fmt: skip
+    for text, board in boards.items():
+        if not wrong[board == 0].any() and 2 * wrong.sum() > board.sum():
+            yield Relation(kind="where", text=f"only at {text}, counted from 0", value=2.0)
 
 
 def _entries(pair: OutputPair, others: Mapping[str, NDArray]) -> Iterator[Relation]:

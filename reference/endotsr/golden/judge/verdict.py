@@ -18,6 +18,7 @@ from endotsr.golden.judge.npy import Refused, read_plain, read_text
 from endotsr.golden.judge.recognise import NAMED, Evidence, Suspect, Taken, evidence_of, merged, suspects_of
 from endotsr.golden.judge.relate import relations
 from endotsr.golden.judge.store import Golden
+from endotsr.golden.judge.trajectory import FirstWrong, first_wrong_iteration
 
 NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
 INSIDE = "inside"  # in that file: the port has no arrays inside its operations to show
@@ -53,14 +54,16 @@ class CaseReport(msgspec.Struct, kw_only=True):
     """empty for the comparison of two runs"""
     level: int
     status: Status
-    outputs: list[OutputReport]
-    looks_like: list[str]
+    outputs: list[OutputReport] = []
+    looks_like: list[str] = []
     """mistakes that explain the refusals of this case, best first"""
-    made_for: list[str]
+    made_for: list[str] = []
     answer: int = 0
     """which of several legal answers it was held against"""
     first_wrong: str = ""
-    """of a trajectory: the first wrong iteration, and the quantities that are wrong there"""
+    """of a trajectory: the first wrong iteration, what is wrong there, and where to look"""
+    events: list[str] = []
+    """what happens at this iteration or the one before"""
     evidence: dict[str, Evidence] = {}
     """by mistake; not part of the JSON report, whose suspects hold the sums"""
 
@@ -110,7 +113,9 @@ def judge(
     golden = only_of(golden, only)
     without, notes = declared(golden, outputs)
     reports = [
-        _left_out(case) if case.operation in without else judge_case(golden, case, outputs, precision, level)
+        CaseReport(name=case.name, title=case.title, operation=case.operation, level=case.level, status="not ported")
+        if case.operation in without
+        else judge_case(golden, case, outputs, precision, level)
         for case in golden.cases
         if case.level <= level
     ]
@@ -149,13 +154,6 @@ def left_out(outputs: Path) -> tuple[set[str], str]:
     except Refused as refusal:
         return set(), "" if str(refusal) == MISSING else str(refusal)
     return {line.split("#")[0].strip() for line in lines} - {""}, ""
-
-
-def _left_out(case: Case) -> CaseReport:
-    return CaseReport(
-        name=case.name, title=case.title, operation=case.operation, level=case.level, status="not ported", outputs=[],
-        looks_like=[], made_for=[],
-    )  # fmt: skip
 
 
 def conclude(
@@ -215,12 +213,13 @@ def judge_case(golden: Golden, case: Case, outputs: Path, precision: Precision, 
     found, seen = tries[best]
     _relate(golden, case, found, seen, precision)
     evidence = evidence_of(case, seen, precision)
+    where = _first_wrong(case, found)
     scores = {flag: one.score for flag, one in evidence.items() if one.score >= NAMED}
     return CaseReport(
         name=case.name, title=case.title, operation=case.operation, level=case.level, status=_together(found),
         outputs=found,
         looks_like=sorted(scores, key=lambda flag: (-scores[flag], -len(evidence[flag].agrees))),
-        made_for=list(case.flags), answer=best, first_wrong=_first_wrong(case, found), evidence=evidence,
+        made_for=list(case.flags), answer=best, first_wrong=where.text, events=where.events, evidence=evidence,
     )  # fmt: skip
 
 
@@ -276,14 +275,11 @@ def _held_against(
     return found, seen
 
 
-def _first_wrong(case: Case, found: list[OutputReport]) -> str:
-    """The first wrong iteration of a trajectory and what is wrong there, in the order of the outputs."""
-    wrong = {o.name: o.index[0] + 1 for o in found if o.index and case.outputs[o.name].order == "iteration"}
-    if not wrong:
-        return ""
-    first = min(wrong.values())
-    names = [name for name, iteration in wrong.items() if iteration == first]
-    return f"first wrong at iteration {first}: {', '.join(names)}"
+def _first_wrong(case: Case, found: list[OutputReport]) -> FirstWrong:
+    """Where a trajectory goes wrong first."""
+    along = [o for o in found if case.outputs[o.name].order == "iteration"]
+    wrong = {o.name: o.index[0] + 1 for o in along if o.index}
+    return first_wrong_iteration(wrong, [o.name for o in along], case.settings)
 
 
 def _together(found: list[OutputReport]) -> Status:
@@ -327,11 +323,8 @@ def _plain(value: float) -> float | None:
 
 def _not_repeated() -> CaseReport:
     """Without a second run level 5 is not complete."""
-    missing = OutputReport(name="second run", level=5, status="missing", reason="no second run: give it with --again")
-    return CaseReport(
-        name="determinism/again", title="A second run gives the same bits", level=5, status="missing",
-        outputs=[missing], looks_like=[], made_for=["sums_in_any_order"],
-    )  # fmt: skip
+    reason = "no second run: give it with --again"
+    return _again([OutputReport(name="second run", level=5, status="missing", reason=reason)])
 
 
 def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...]) -> CaseReport:
@@ -351,7 +344,11 @@ def _repeated(golden: Golden, first: Path, second: Path, without: tuple[str, ...
                 status, reason = "missing", str(refusal)
             report = OutputReport(name=f"{case.name}/{name}", level=5, status=status, reason=reason)  # type: ignore[arg-type]
             found.append(report)
+    return _again(found)
+
+
+def _again(found: list[OutputReport]) -> CaseReport:
     return CaseReport(
         name="determinism/again", title="A second run gives the same bits", level=5, status=_together(found),
-        outputs=found, looks_like=[], made_for=["sums_in_any_order"],
+        outputs=found, made_for=["sums_in_any_order"],
     )  # fmt: skip

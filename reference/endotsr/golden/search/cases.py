@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.golden.judge.about import axes_of
 from endotsr.golden.judge.compare import scale_of
 from endotsr.golden.judge.format import FLIP_BUDGET, Case
 from endotsr.golden.judge.npy import Refused, read_plain
@@ -15,23 +16,35 @@ from endotsr.golden.judge.store import Golden, in_precision
 from endotsr.golden.judge.verdict import CaseReport
 from endotsr.stages.stage import Inputs, Outputs, Settings, Stage, tidy
 
+AFTER = 2  # iterations of a trajectory that are looked at from its first wrong one on
 PIECE = 1e-6  # length of a step along which a derivative is taken, in units of the input
 DERIVATIVE = 1e-4  # part by which it may be off
 
 
 class Answered:
-    """One case: the outputs of the port, and what differences are rounding."""
+    """One case: the outputs of the port, and what differences are rounding.
+
+    A trajectory ends soon after its first wrong iteration: what is wrong later follows from it.
+    """
 
     def __init__(self, golden: Golden, case: Case, report: CaseReport, outputs: Path, precision: str) -> None:
         self.case, self.settings, self.folder = case, case.settings, outputs / case.name
         rules = [asked.compare for asked in case.outputs.values() if asked.dtype == "real"]
         self.tolerance = max((r.float64 if precision == "float64" else r.float32 for r in rules), default=0.0)
         self.inputs: Inputs = in_precision(golden.inputs(case), "float64")
+        along = [name for name, asked in case.outputs.items() if asked.order == "iteration"]
+        # the first wrong entry of each output of a trajectory, and the number of its iterations that are looked at
+        self.wrong_from = {o.name: o.index[0] for o in report.outputs if o.index and o.name in along}
+        self.length = min(self.wrong_from.values()) + AFTER if self.wrong_from else 0
+        self.inputs = {name: self._short(name, array) for name, array in self.inputs.items()}
         _lock(tuple(self.inputs.values()))
-        self.refused = {o.name for o in report.outputs if o.status == "refused"}
+        late = {name for name, first in self.wrong_from.items() if first >= self.length}
+        self.refused = {o.name for o in report.outputs if o.status == "refused"} - late
         self.got: dict[str, NDArray] = {}
         self.unit: dict[str, NDArray | float] = {}
         for name in (o.name for o in report.outputs if o.status in ("passed", "refused")):
+            if self.length and name.startswith("final_"):
+                continue  # after the last iteration
             asked, rule = case.outputs[name], case.outputs[name].compare
             expected = golden.array(case, asked.answer(report.answer))
             try:
@@ -40,7 +53,7 @@ class Answered:
                 continue
             tolerance = rule.float64 if precision == "float64" else rule.float32
             if got.shape == expected.shape and rule.kind != "identical":
-                self.got[name] = got.astype(np.float64)
+                self.got[name] = self._short(name, got.astype(np.float64))
                 finite = np.where(np.isfinite(self.got[name]), self.got[name], 0.0)
                 kind = rule.scale or "max"
                 scale = scale_of(expected, kind)
@@ -52,6 +65,10 @@ class Answered:
         self.saved: Any = None
         self.forward_names: list[str] = []
         self.gradient_names: list[str] = []
+
+    def _short(self, name: str, array: NDArray) -> NDArray:
+        """An array of which the iterations that are looked at are kept, if it has one entry for each."""
+        return array[: self.length] if self.length and axes_of(name, array.ndim) == "iteration" else array
 
     def begin(self, stage: Stage) -> None:
         """Compute the right outputs, and tell those of the forward pass from gradients."""
@@ -65,7 +82,8 @@ class Answered:
         """Outputs without gradients, and what the reverse pass needs."""
         found, saved = stage.forward(inputs, settings)
         more = {} if stage.extra is None else stage.extra(inputs, settings, saved)
-        return tidy({**found, **more}), (saved, tuple(found))
+        kept = {name: self._short(name, array) for name, array in tidy({**found, **more}).items()}
+        return kept, (saved, tuple(found))
 
     def reverse(self, stage: Stage, inputs: Inputs, saved: Any) -> Outputs:
         """Gradients, where the case asks for them."""
@@ -85,12 +103,19 @@ class Answered:
             return False
         return self._off(name, value) <= (rule.flips if rule.kind == FLIP_BUDGET else 0)
 
-    def _off(self, name: str, value: NDArray) -> int:
-        """Entries of an output that are not those of the port."""
+    def _off(self, name: str, value: NDArray, until: int | None = None) -> int:
+        """Entries of an output that are not those of the port; of a trajectory, up to an iteration."""
         got = self.got[name]
+        got, value = (got, value) if until is None else (got[:until], value[:until])
         with np.errstate(all="ignore"):
             near = (np.abs(value - got) <= self.unit[name]) | (value == got)
         return int((~(near | (np.isnan(value) & np.isnan(got)))).sum())
+
+    def spoiled(self, found: Mapping[str, NDArray]) -> int:
+        """Outputs that passed, or are right at the start of a trajectory, and are no longer so."""
+        passed = sum(not self.same(found, [name]) for name in self.got if name not in self.refused)
+        begun = ((name, self.wrong_from[name]) for name in self.refused if name in self.wrong_from)
+        return passed + sum(self._off(name, found[name], first) > 0 for name, first in begun)
 
     def wrong(self, names: Sequence[str]) -> int:
         """Entries of some outputs that a change has to explain."""

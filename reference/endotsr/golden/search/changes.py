@@ -16,7 +16,7 @@ import numpy as np
 from endotsr.golden.judge.diagnose import made_of
 from endotsr.golden.judge.store import Golden, in_precision
 from endotsr.golden.search.cases import Answered
-from endotsr.golden.search.numbers import said_number
+from endotsr.golden.search.numbers import START, said_number
 from endotsr.golden.search.places import Spot, Statement, definition_modules, executed, names_in, spots, written
 from endotsr.golden.search.requests import OtherReading, other_requests
 from endotsr.golden.search.rewrites import rewrites, with_number
@@ -26,6 +26,7 @@ from endotsr.stages.definition import definition_stages
 from endotsr.stages.stage import Outputs, Stage
 
 SECONDS = 16.0  # of computing that a search may take
+UNKNOWN = 1  # outputs that a change of an expression spoils, where that is not known
 MOST_VALUES = 64  # of an expression, that are looked at
 
 
@@ -68,14 +69,18 @@ def _inner(operation: str, golden: Golden) -> set[str]:
 
 
 def _places(trial: Trial, places: Sequence[Statement]) -> None:
-    """Changes of some places: numbers, then other texts, then other names."""
-    live = _numbers(trial, places)
+    """Changes of some places: numbers, then other texts, then other names; of a trajectory, numbers at the end."""
+    long = any(one.length for one in trial.cases)
+    live = _looked_at(trial, places) if long else _numbers(trial, places)
     trial.live += live
     for texts, rank in ((_texts, 1), (_names, 2)):
         lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
         for one in live:  # once something is found, the rest of its line is tried
             if not lines or one.spot.place.where(one.spot.node) in lines:
                 _try(trial, one, texts(one), rank)
+    for one in live if long and not trial.explains else ():
+        if not trial.over:
+            _solved(trial, one.spot, one.mode, one.values)
 
 
 def _requests(trial: Trial) -> None:
@@ -109,22 +114,46 @@ def _numbers(trial: Trial, places: Sequence[Statement]) -> list[Live]:
     return sorted(live, key=lambda one: one.late)
 
 
-def _values(trial: Trial, spot: Spot, mode: str) -> list[Any]:
-    """Values of an expression in the first case, None for one that is no array; a statement has True."""
+def _looked_at(trial: Trial, places: Sequence[Statement]) -> list[Live]:
+    """Spots that are reached, the most promising first, each after one computation: a trajectory takes long."""
+    live: list[Live] = []
+    for place in places:
+        for spot in spots(place):
+            for mode in trial.modes(place):
+                if trial.over:
+                    return live
+                late = list[int]()
+                if values := _values(trial, spot, mode, late):
+                    live.append(Live(spot, mode, values, late[0] if late else UNKNOWN))
+    return sorted(live, key=lambda one: one.late)
+
+
+def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) -> list[Any]:
+    """Values of an expression in the first case, None for one that is no array; a statement has True.
+
+    late   if given, real values are changed a little while they are read, and how much that spoils is put here
+    """
     if isinstance(spot.node, ast.stmt):
         return [True]
     found: list[Any] = []
+    changed = False
 
     def seen(value: Any) -> Any:
+        nonlocal changed
         if len(found) < MOST_VALUES:
             found.append(value if isinstance(value, bool | int | float | np.ndarray | np.generic) else None)
-        return value
+        if late is None or np.asarray(value).dtype.kind != "f":
+            return value
+        changed = True
+        return value * (1 + START)
 
     spot.place.module.__dict__["_seen"] = seen
     with contextlib.suppress(Exception):
         with written(spot, f"_seen({ast.unparse(spot.node)})"):
             install = spot.place.compiled()
-        trial.outputs(install, mode)
+        moved = trial.outputs(install, mode)
+        if late is not None and changed:
+            late.append(trial.cases[0].spoiled(moved) if trial.moves(moved) else LATEST - 1)
     return found
 
 

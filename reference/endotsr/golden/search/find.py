@@ -17,6 +17,7 @@ from endotsr.stages.definition import definition_stages
 
 START_UP = 60.0  # seconds that a process may take beside its search
 SLOWEST = 10.0  # seconds that a second of computing may take on a busy machine
+LONG = 3.0  # times the seconds that a search among trajectories takes
 MOST_LINES = 3  # of the source that are named where all explain the outputs equally
 
 
@@ -30,10 +31,15 @@ def explained(golden: Golden, outputs: Path, precision: Precision, level: int, o
     reports = judge(golden._replace(cases=cases), outputs, precision, level=min(level, 4)).cases
     answered = [Answered(golden, *pair, outputs, precision) for pair in zip(cases, reports)]
     answered = [one for one in answered if one.got]
-    answered.sort(key=lambda one: (-len(one.refused), -sum(one.got[name].size for name in one.refused)))
+    answered.sort(key=_order)
     if stage is None or not answered or not answered[0].refused:
         raise InputError(f"{operation}: nothing to explain")
-    return search(stage, answered, golden, seconds)
+    return search(stage, answered, golden, seconds * (LONG if answered[0].length else 1))
+
+
+def _order(one: Answered) -> tuple[bool, int, int, int]:
+    """Refused cases come first, short trajectories before long ones, and then those with the most to explain."""
+    return not one.refused, one.length, -len(one.refused), -sum(one.got[name].size for name in one.refused)
 
 
 def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECONDS) -> None:
@@ -44,7 +50,7 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
     if not report.first_wrong:
         return
     words = [golden.folder, outputs, report.precision, report.asked_level, report.first_wrong, seconds]
-    limit = START_UP + SLOWEST * seconds
+    limit = START_UP + SLOWEST * LONG * seconds
     with contextlib.suppress(subprocess.TimeoutExpired):
         done = subprocess.run([sys.executable, "-m", "endotsr.golden.search", *map(str, words)],
                               capture_output=True, timeout=limit, check=False)  # fmt: skip

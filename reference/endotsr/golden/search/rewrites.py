@@ -25,7 +25,8 @@ OPERATORS: dict[type, str] = {
     ast.Div: "{l}; 1 / ({r}); ({l}) * ({r}); ({r}) / ({l}); ({l}) / ({r}) ** 2; ({l}) / np.sqrt({r}); ({l}) // ({r})",
     ast.FloorDiv: "{l}; ({l}) / ({r}); -(-({l}) // ({r})); round(({l}) / ({r}))",
     ast.Mod: "{l}; ({l}) // ({r})",
-    ast.Pow: "{l}; ({l}) ** (({r}) + 1); ({l}) ** (({r}) - 1); ({l}) ** (2 * ({r})); np.abs({l}); np.sqrt({l})",
+    ast.Pow: "{l}; ({l}) ** (({r}) + 1); ({l}) ** (({r}) - 1); ({l}) ** (2 * ({r})); np.abs({l}); np.sqrt({l}); "
+    "1 + (({l}) - 1) * ({r})",
     ast.MatMult: "{l}; {r}; ({l}).T @ ({r}); ({l}) @ ({r}).T; ({r}) @ ({l}); (({l}) @ ({r})).T; ({l}).T @ ({r}).T",
     ast.BitAnd: "{l}; {r}; ({l}) | ({r})",
     ast.BitOr: "{l}; {r}; ({l}) & ({r})",
@@ -73,8 +74,18 @@ def _rewrites(node: ast.expr) -> Iterator[str]:
             yield from (f"({left}) {sign} ({right})" for sign in COMPARED.get(type(node.ops[0]), "!=").split())
         case ast.Call():
             yield from _other_calls(node)
+    yield from map(ast.unparse, _regrouped(node))
     inner = [n for n in ast.walk(node) if isinstance(n, ast.BinOp | ast.Call | ast.Name | ast.Attribute)]
     yield from dict.fromkeys(ast.unparse(n) for n in inner[1:12] if "np" not in ast.unparse(n)[:3])
+
+
+def _regrouped(node: ast.expr) -> Iterator[ast.expr]:
+    """What stands beside a function of one argument put into it, and the other way round: sqrt(a) + b, sqrt(a + b)."""
+    match node:
+        case ast.BinOp(left=ast.Call(func=function, args=[inner], keywords=[])):
+            yield ast.Call(function, [ast.BinOp(inner, node.op, node.right)], [])
+        case ast.Call(func=function, args=[ast.BinOp() as inner], keywords=[]):
+            yield ast.BinOp(ast.Call(function, [inner.left], []), inner.op, inner.right)
 
 
 def with_number(node: ast.expr | ast.stmt, values: Sequence[Any]) -> Iterator[tuple[str, float]]:
@@ -97,7 +108,7 @@ def _wrapped(values: Sequence[Any]) -> Iterator[str]:
         yield from ["np.minimum({}, 1)"] * any((a > 1).any() for a in arrays)
         yield from ["np.sqrt({})"] * all((a >= 0).all() for a in arrays)
     elif any(a.ndim == 0 and a.dtype.kind in "iu" for a in arrays):
-        yield from ("({}) + 1", "({}) - 1")
+        yield from ("({}) + 1", "({}) - 1", "0", "1")
     if any(a.ndim for a in arrays):
         yield from ("({})[::-1]", "np.mean({})")
         yield from ["({}).T", "np.swapaxes({}, 0, 1)"] * any(a.ndim > 1 for a in arrays)

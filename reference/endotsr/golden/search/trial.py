@@ -150,12 +150,16 @@ class Trial:
 
         moved = at(rest + START * (abs(rest) or 1.0))
         number = best_number(off, rest, one.distance(one.right, self.fitted)) if self.fitted else None
-        late = sum(not one.same(moved, [name]) for name in one.got if name not in one.refused)
-        changes = not all(np.array_equal(moved[name], one.right[name]) for name in one.got)
+        late = one.spoiled(moved)
         known = number is not None and abs(number - rest) > START
         numbers = plain_first(number) if number is not None and known else []
         numbers = [one for one in numbers if one[1] or self.wrong >= TELLING]
-        return numbers, late if changes else LATEST - 1
+        return numbers, late if self.moves(moved) else LATEST - 1
+
+    def moves(self, found: Outputs) -> bool:
+        """Whether these outputs of the first case are not those of the definition."""
+        one = self.cases[0]
+        return not all(np.array_equal(found[name], one.right[name]) for name in one.got)
 
     def note(self, whole: str, text: str, spot: Spot | None, *rank: int) -> None:
         """Keep a change that fits."""
