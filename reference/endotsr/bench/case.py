@@ -95,7 +95,7 @@ def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
 
     constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in constants.sequence.train_index:
-        constants.targets_of(int(index))  # a run computes them once a frame
+        constants.targets_of(int(index))  # a run computes them once per frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:

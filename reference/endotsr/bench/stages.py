@@ -14,7 +14,7 @@ Say = Callable[[str], None]
 
 
 def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
-    """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
+    """{"peaks": one per number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
 
     Raises: InputError before anything is measured, if the file of a case is not a trained scene.
     """
