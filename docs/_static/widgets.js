@@ -294,7 +294,7 @@
       line(shown, brightness, "#d08000", 4);
       line(error, below, "#d08000", 2);
       words.textContent = `Above, brightness of a pixel: window k (blue), window k + 1 (red), scene (orange). Below, size of ` +
-        `its error. Largest step beside the motion ${step.toFixed(2)} of ${DELTA} levels; error in the middle ` +
+        `its error. Largest step in addition to the motion ${step.toFixed(2)} of ${DELTA} levels; error in the middle ` +
         `${(20 * Math.log10(error[MIDDLE])).toFixed(2)} dB; ${windows} windows of ${N} frames cover ${G} frames.`;
     };
     slider(row, "overlap, frames", 0, 40, 2, overlap, (v) => v.toFixed(0), (v) => { overlap = v; draw(); });
