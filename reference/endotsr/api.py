@@ -302,7 +302,7 @@ class Run:
         count    number of pictures, evenly spaced over the clip; default: the frames
         camera   "observed", "orbit", "sway", the number of a frame, or a file of cameras
         rate     pictures per second; default: the speed of the recording, 15 if it is unknown
-        slow     in place of `rate`: how many times as long as the recording the film takes
+        slow     instead of `rate`: the film takes this many times as long as the recording
 
         Raises: InputError for a name, rate, count or camera that is not allowed.
         """

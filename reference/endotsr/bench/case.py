@@ -43,7 +43,7 @@ class BenchCase:
     frequencies: int = PAPER.model.frequencies
     frames: int = workload.FRAMES
     size: float = 1.0  # factor on the semi-axes of the Gaussians
-    scene: str | None = None  # file of a trained scene in place of the common workload; `gaussians` is then ignored
+    scene: str | None = None  # file of a trained scene instead of the common workload; `gaussians` is then ignored
     densifications: int = 2  # timed after the iterations, 0 = none
 
     def config(self) -> Config:

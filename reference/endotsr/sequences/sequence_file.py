@@ -213,7 +213,7 @@ def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
 
 
 def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
-    """As `read_poses`, with None in place of a pose that is none, and the reasons.
+    """As `read_poses`, with None instead of a pose that is none, and the reasons.
 
     Raises:  InputError for their number.
     """

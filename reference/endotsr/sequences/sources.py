@@ -179,7 +179,7 @@ def stated_depth(
 
 
 def with_stated(recording: Recording, options: SourceOptions) -> Recording:
-    """The recording with the masks of `--masks` and the depth of `--depth` in place of its own, if they are stated.
+    """The recording with the masks of `--masks` and the depth of `--depth` instead of its own, if they are stated.
 
     Raises:  InputError for files that do not belong to its frames, or depth in millimetres beside an arbitrary unit.
     """

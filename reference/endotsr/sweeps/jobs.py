@@ -30,7 +30,7 @@ STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
 
 
 class Beginning(Protocol):
-    """A state that a run begins with in place of the initialisation, made where the run takes place."""
+    """A state that a run begins with instead of the initialisation, made where the run takes place."""
 
     def about(self) -> StartPart:
         """`start` of run.json."""
