@@ -20,7 +20,7 @@ GROUPS = (
         "From a recording to the arrays that a training reads.",
         ("sequences", "simulator", "effects", "opencv", "untrusted"),
     ),
-    ("Training", "What is fitted, how, and what a run keeps.", ("scene", "fitting", "runs", "windows")),
+    ("Training", "The model, its training, and the files of a run.", ("scene", "fitting", "runs", "windows")),
     ("Results", "Numbers, pages, pictures and files of a trained scene.", ("evaluation", "report", "views", "export")),
     (
         "The method",

@@ -45,7 +45,7 @@
   // ---- chapter 8: drag the opacities; (8.1), (8.3) ----
   const compositing = (box) => {
     const colours = [[0.85, 0.3, 0.25], [0.3, 0.65, 0.3], [0.25, 0.4, 0.85]], background = [0.1, 0.1, 0.1];
-    const target = [0.5, 0.5, 0.5], alpha = [0.3, 0.6, 0.5], width = 560, height = 230, bar = 110, floor = 180;
+    const target = [0.5, 0.5, 0.5], alpha = [0.3, 0.6, 0.5], width = 560, height = 250, bar = 110, floor = 180;
     const set = (x, y, first) => {
       if (first) held = Math.floor(x / 140);
       if (held < 0 || held > 2) return;
@@ -65,7 +65,7 @@
       const g = alpha.map((_, k) => T[k] * dot(colours[k].map((v, c) => v - behind[k + 1][c]), upstream));
       box.state = {alpha: [...alpha], T, g, colour: behind[0]};
       pen.clearRect(0, 0, width, height);
-      pen.font = "13px sans-serif";
+      pen.font = "17px sans-serif";  // 11 px on a telephone of 390 px
       for (let k = 0; k < 3; k++) {
         const x = 140 * k + 10;
         pen.fillStyle = "#8883";
@@ -77,15 +77,17 @@
         pen.fillStyle = "#d08000";
         pen.fillRect(x - 4, floor - 150 * alpha[k] - 3, bar + 8, 6);
         pen.fillStyle = "#777";
-        pen.fillText(`α = ${alpha[k].toFixed(2)}   T = ${T[k].toFixed(2)}`, x, floor + 18);
-        pen.fillText(`∂L/∂α = ${g[k].toFixed(3)}`, x, floor + 36);
+        pen.fillText(`α = ${alpha[k].toFixed(2)}`, x, floor + 20);
+        pen.fillText(`T = ${T[k].toFixed(2)}`, x, floor + 41);
+        pen.fillText(`∂L/∂α = ${g[k].toFixed(3)}`, x, floor + 62);
       }
       pen.fillStyle = css(behind[0]);
       pen.fillRect(440, floor - 150, 100, 70);
       pen.fillStyle = css(target);
       pen.fillRect(440, floor - 70, 100, 70);
       pen.fillStyle = "#777";
-      pen.fillText("pixel above, target below", 412, floor + 18);
+      pen.fillText("pixel above,", 440, floor + 20);
+      pen.fillText("target below", 440, floor + 41);
       words.textContent = `Light that reaches the background: T₃ = ${T[3].toFixed(3)}. ` +
         (alpha.some((a) => a === 1) ? "Behind an opacity of 1 all gradients are 0." : "");
     };
@@ -294,7 +296,7 @@
       line(shown, brightness, "#d08000", 4);
       line(error, below, "#d08000", 2);
       words.textContent = `Above, brightness of a pixel: window k (blue), window k + 1 (red), scene (orange). Below, size of ` +
-        `its error. Largest step beside the motion ${step.toFixed(2)} of ${DELTA} levels; error in the middle ` +
+        `its error. Largest step in addition to the motion ${step.toFixed(2)} of ${DELTA} levels; error in the middle ` +
         `${(20 * Math.log10(error[MIDDLE])).toFixed(2)} dB; ${windows} windows of ${N} frames cover ${G} frames.`;
     };
     slider(row, "overlap, frames", 0, 40, 2, overlap, (v) => v.toFixed(0), (v) => { overlap = v; draw(); });

@@ -18,7 +18,7 @@ Record = dict[str, Any]
 
 @lru_cache
 def power(size: float, pairs: int) -> float:
-    """Probability that the 95 % interval of `pairs` differences leaves out 0.
+    """Probability that the 95 % interval of `pairs` differences excludes 0.
 
     size   true mean over the true standard deviation. Integrated over the variance: P(|Z + size sqrt(n)| > t s).
     """

@@ -59,7 +59,7 @@ def maps_picture(roots: dict[str, NDArray[np.float64]]) -> NDArray[np.uint8]:
 
 
 def curves_figure(runs: dict[str, Any]) -> Any:
-    """PSNR over the tissue of every held-out frame: one panel a split; the line of a model is solid.
+    """PSNR over the tissue of every held-out frame: one panel per split; the line of a model is solid.
 
     A preset has one colour in all panels, and the legend has every preset.
     """

@@ -1,4 +1,4 @@
-"""Answers of a long measurement, kept one a line as they are found, so that an interrupted one goes on.
+"""Answers of a long measurement, kept one per line as they are found, so that an interrupted one goes on.
 
 The first line says what was measured: settings, and a hash of the sources. A file of another measurement is refused.
 The file stands beside the result, whose name it has with `.part`, until the result is written.

@@ -5,7 +5,7 @@
 
 Two simulated scenes: a resting camera, where scale and shift of the relative depth are assumed, and a moving one, where
 they are taken from sparse points in every frame. The relative depth is an affine map of the true 1 / z, another one in
-every frame of the moving camera, rounded to 16 bits. The points are true depth at a few hundred pixels a frame, of
+every frame of the moving camera, rounded to 16 bits. The points are true depth at a few hundred pixels per frame, of
 which a tenth is wrong. The result is docs/results/one_camera.json; the table stands in docs/guides/prepare.md.
 """
 

@@ -1,6 +1,6 @@
 """The picture and the times of docs/guides/simulate.md.
 
-    python docs/pages/simulate.py          the named scenes, one a row
+    python docs/pages/simulate.py          the named scenes, one per row
     python docs/pages/simulate.py times    measure how long a frame of each scene takes, and write the table
 
 Time is processor time on one core, for a frame with its right picture and its truth, files included; the median of

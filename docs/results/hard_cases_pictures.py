@@ -99,7 +99,7 @@ def measured() -> dict[str, Pair]:
 
 
 def drawn(found: dict[str, Pair]) -> Any:
-    """The figure: one column a case, the usual formula above."""
+    """The figure: one column per case, the usual formula above."""
     figure = new_figure(9.0, 6.4)
     panels = figure.subplots(2, len(found))
     for column, (name, pair) in zip(panels.T, found.items(), strict=True):

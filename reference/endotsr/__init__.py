@@ -5,7 +5,7 @@ Importing this package imports nothing heavy; a name is imported when it is firs
 
 The rooms of the package follow the order of the paper:
 
-    equations              the paper, one equation a module
+    equations              the paper, one equation per module
     splatting, losses      the rasteriser and the base losses
     scene, fitting         the Gaussians, and their training
     sequences, simulator   input: folders, or simulated sequences with known truth

@@ -152,7 +152,7 @@ def train(
     on_run         called after it with the run, whose `model` and `render` are those of this iteration. Its arrays
                    change with the next one: copy what is kept, and write to none of them
     on_message     called with a line when kernels are compiled or the weight of equation (7) is calibrated
-    effects        "auto" trains only what the clip calls for, as `train --effects auto`; keys in `sections` stay
+    effects        "auto" trains only what the clip needs, as `train --effects auto`; keys in `sections` stay
 
     The number of kernel threads of the calling thread is set to `training.threads` (0 = all cores).
     A KeyboardInterrupt ends the training at once, without a run; `StopTraining` keeps it.
@@ -167,7 +167,7 @@ def train(
     if config is None:
         config = make_config(preset, file=None, iterations=iterations, **sections)
     elif preset is not None:
-        raise InputError(f"train: preset = {preset!r} beside a config is not allowed; allowed: one of the two")
+        raise InputError(f"train: preset = {preset!r} with a config is not allowed; allowed: one of the two")
     else:
         config = _changed(config, iterations, sections)
     loaded = isinstance(sequence, LoadedSequence)
@@ -205,7 +205,7 @@ def inspect(sequence: Sequence, config: Config | None = None, *, frame_rate: flo
     """What a clip shows and which components it calls for, as `endotsr inspect --json` writes it.
 
     config       settings that the plan is relative to; default: preset `paper`
-    frame_rate   frames a second; default: those of the sequence. Where known, rates are also given a minute
+    frame_rate   frames per second; default: those of the sequence. If known, rates are also given per minute
 
     returns      "noise", "verdicts" by effect (present, kind, statistic, threshold, reason, ...), "rates", and "plan"
                  with its changes, their reasons and the expected savings
@@ -301,8 +301,8 @@ class Run:
 
         count    number of pictures, evenly spaced over the clip; default: the frames
         camera   "observed", "orbit", "sway", the number of a frame, or a file of cameras
-        rate     pictures a second; default: so many that the film is as fast as the recording, 15 where that is unknown
-        slow     in place of `rate`: how many times as long as the recording the film takes
+        rate     pictures per second; default: the speed of the recording, 15 if it is unknown
+        slow     instead of `rate`: the film takes this many times as long as the recording
 
         Raises: InputError for a name, rate, count or camera that is not allowed.
         """

@@ -96,6 +96,6 @@ def test_compare_refuses_what_it_cannot_compare(finished_run, flow_pictures, tmp
     assert_refused(capsys, ["evaluate", run, run], "two methods are called 'run'")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "none.json")], "none.json: cannot be read")
     assert_refused(capsys, ["evaluate", "--compare", run, "--seed", "-1"], "--seed -1 is not allowed")
-    assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label beside several methods")
+    assert_refused(capsys, ["evaluate", run, pictures, "--label", "x"], "--label with several methods")
     (tmp_path / "m.json").write_text("{}")
     assert_refused(capsys, ["evaluate", run, str(tmp_path / "m.json")], "m.json", "that `endotsr evaluate` wrote")

@@ -29,7 +29,7 @@ def test_the_loss_of_a_on_the_simulated_clip():
 
 def test_the_gain_of_a_on_the_real_clip():
     gain = float(row(block("claims", "claims:pulling"), "A beside S", "PSNR full, dB")[2])
-    assert f"A gains {gain:.2f} dB beside S" in WORDS
+    assert f"adding A to S gains {gain:.2f} dB" in WORDS
 
 
 def test_the_gain_of_the_residuals_in_a_short_training():

@@ -25,7 +25,7 @@ def test_proc_is_refused_before_the_sequence_is_read(out, capsys, monkeypatch):
 def test_an_output_inside_the_data_is_refused(inside, folder, capsys, monkeypatch):
     monkeypatch.setattr(sources, "load_sequence", never)
     before = sorted(folder.rglob("*"))
-    assert_refused(capsys, ["train", str(folder), "--out", str(folder / inside), *SETTINGS], "lies inside the sequence")
+    assert_refused(capsys, ["train", str(folder), "--out", str(folder / inside), *SETTINGS], "is inside the sequence")
     assert sorted(folder.rglob("*")) == before
 
 
@@ -34,7 +34,7 @@ def test_pictures_inside_the_data_of_a_run_are_refused(folder, tmp_path, capsys)
     words = ["train", str(folder), "--out", str(out), *SETTINGS, "--no-evaluate", "--iterations", "1"]
     assert run_line(capsys, *words)[0] == 0
     words = ["render", str(out), "--out", str(folder / "pictures")]
-    assert_refused(capsys, words, "lies inside the sequence of the run")
+    assert_refused(capsys, words, "is inside the sequence of the run")
 
 
 def test_times_without_a_time_are_refused(run, tmp_path, capsys):

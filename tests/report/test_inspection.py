@@ -61,7 +61,7 @@ def test_page_holds_verdicts_and_plan_and_nothing_from_outside(found):
 def test_text_says_what_the_page_says(found):
     text = inspection_text(*found)
     assert "noise: 2.55 grey levels" in text
-    assert "rate: 5 cycles per sequence, 1500 a minute, 2 harmonics" in text
+    assert "rate: 5 cycles per sequence, 1500 per minute, 2 harmonics" in text
     assert "model.appearance = false (now true), saves 5% time, 7% memory: Steady light." in text
     assert "model.bases = 5 (now 17): Slow motion." in text and "model.deformation stays: It <moves>." in text
 

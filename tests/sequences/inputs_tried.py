@@ -160,7 +160,7 @@ ROWS = [
     Row("video, stereo, stacked, that is not named", video("a.mp4", [np.vstack([p, p]) for p in pictures()]), "told",
         "stacked, resemble each other"),
     Row("video, two streams", two_streams, "told", "2 streams of pictures: one is read", close(pictures())),
-    Row("video, with transparency", video("a.mov", None, codec="png", layout="rgba"), "told", "transparency is left",
+    Row("video, with transparency", video("a.mov", None, codec="png", layout="rgba"), "told", "transparency is ignored",
         close(pictures())),
     Row("video, high definition, BT.709", high_definition(tagged=True), "right", "", close(WIDE, 3)),
     Row("video, high definition, no matrix of colour", high_definition(tagged=False), "told",

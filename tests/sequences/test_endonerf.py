@@ -288,7 +288,7 @@ DAMAGES = {
     "no rotation": (_rewrite_rows(_set(1, 0, 1.1)), {}, r"frame 1: .*not perpendicular unit vectors"),
     "mirrored": (_rewrite_rows(_set(1, 0, -1.0)), {}, r"frame 1: .*mirror image"),
     "too few frames": (lambda f: None, {"frames": "0:2"}, r"frames '0:2': selects 2 of 5 .* at least 3"),
-    "range outside": (lambda f: None, {"frames": "0:9"}, r"frames '0:9': 9 lies outside the 5 frames"),
+    "range outside": (lambda f: None, {"frames": "0:9"}, r"frames '0:9': 9 is outside the 5 frames"),
     "range text": (lambda f: None, {"frames": "all"}, r"frames 'all': not a range; write start:stop"),
     "range backwards": (lambda f: None, {"frames": "::-1"}, r"frames '::-1': the step must be 1 or more"),
     "no block fits": (lambda f: None, {"split": "blocks"}, r"no held-out block of 8 frames fits into 5 frames"),

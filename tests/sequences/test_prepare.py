@@ -66,7 +66,7 @@ def test_the_rate_thins_the_frames_evenly(tmp_path):
     write_video(tmp_path / "clip.avi", [scene_picture(i) for i in range(11)])
     found, notes = prepared(tmp_path / "clip.avi", tmp_path / "out", PrepareSettings(rate=5.0), camera=CAMERA)
     assert found.frames == 3 and found.frame_rate == 5.0 and any("3 of 11 frames" in note for note in notes)
-    with pytest.raises(InputError, match="the source has 25 frames a second"):
+    with pytest.raises(InputError, match="the source has 25 frames per second"):
         prepared(tmp_path / "clip.avi", tmp_path / "b", PrepareSettings(rate=50.0), camera=CAMERA)
 
 
@@ -314,7 +314,7 @@ STEREOMIS = {
     "size": (lambda p: swap(p, "res_y = 48", "res_y = 100"), "of 64x100 pixels, the pictures have 64x48"),
     "swapped": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 4.0"), "right camera stands on the left"),
     "above": (lambda p: swap(p, "T_1 = 0.0", "T_1 = 9.0"), "above each other"),
-    "one place": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 0.0"), "stand in one place"),
+    "one place": (lambda p: swap(p, "T_0 = -4.0", "T_0 = 0.0"), "are in one place"),
     "no rotation": (lambda p: swap(p, "R_0 = 1.0", "R_0 = 3.0"), "not perpendicular unit vectors"),
 }  # fmt: skip
 

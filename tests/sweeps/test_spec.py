@@ -66,7 +66,7 @@ REFUSED = {
     "switch": ("keep_checkpoints = 1", "keep_checkpoints = 1 is not allowed; allowed: true, false"),
     "simulator": ("simulator.colour = 1", "unknown key simulator.colour"),
     "setting": ("settings.model.apearance = true", "unknown key model.apearance; allowed: appearance"),
-    "preset in settings": ("settings.preset = { a = 1 }", "settings.preset is not allowed; allowed: preset beside"),
+    "preset in settings": ("settings.preset = { a = 1 }", "settings.preset is not allowed; allowed: preset next to"),
     "long name": ('sequences = ["' + "x" * 5000 + '"]', "is not allowed; allowed: a folder, or simulated"),
     "large seed": ("seeds = [99999999999999999999]", "allowed: a list, each an integer >= 0 and <= "),
     "section": ("settings.model = 3", "model = 3 is not allowed; allowed: a section of settings"),

@@ -235,7 +235,7 @@ def test_a_plan_lists_what_is_left(whole, capsys):
     "words, said",
     [(["--out"], "--out: missing value"), ([], "missing: --out DIR"),
      (["--out", "x", "--workers", "0"], "--workers 0"),
-     (["--out", "x", "--workers", "2", "--scheduler", "tcp://a:1"], "--workers beside --scheduler")],
+     (["--out", "x", "--workers", "2", "--scheduler", "tcp://a:1"], "--workers with --scheduler")],
 )  # fmt: skip
 def test_options_that_are_wrong_are_one_line(tmp_path, capsys, words, said):
     assert main(["sweep", str(write_spec(tmp_path)), *words]) == 2

@@ -107,7 +107,7 @@ def stack(alphas, dtype, opaque_logit=800.0):
 
 
 def weight_gradient(alphas, dtype):
-    """d red / d alpha of the first splat, out of the gradient by its logit."""
+    """d red / d alpha of the first splat, from the gradient with respect to its logit."""
     scene = stack(alphas, dtype)
     out, saved = render_forward(scene, PIXEL, EXACT, degree=0)
     up = np.zeros_like(out.colour)

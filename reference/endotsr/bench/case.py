@@ -43,7 +43,7 @@ class BenchCase:
     frequencies: int = PAPER.model.frequencies
     frames: int = workload.FRAMES
     size: float = 1.0  # factor on the semi-axes of the Gaussians
-    scene: str | None = None  # file of a trained scene in place of the common workload; `gaussians` is then ignored
+    scene: str | None = None  # file of a trained scene instead of the common workload; `gaussians` is then ignored
     densifications: int = 2  # timed after the iterations, 0 = none
 
     def config(self) -> Config:
@@ -95,7 +95,7 @@ def prepare(case: BenchCase, config: Config) -> tuple[Any, Any]:
 
     constants = training_constants(workload.sequence(case.width, case.height, frames=case.frames), config)
     for index in constants.sequence.train_index:
-        constants.targets_of(int(index))  # a run computes them once a frame
+        constants.targets_of(int(index))  # a run computes them once per frame
     if case.scene:
         scene = trained_gaussians(Path(case.scene), config)
     else:

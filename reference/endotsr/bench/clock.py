@@ -3,7 +3,7 @@
 In: the stages that the training announces (`endotsr.kernels.timer`). Out: seconds by stage, one entry a repeat.
 Stages may nest: a stage is assigned its own time, not that of a stage inside it. While several threads are in stages,
 each stage is assigned an equal part of the time. The remainder (the log entry, additions between stages) is "rest".
-Cost: about 2 us a stage, some twenty stages an iteration. On a shared machine a mean would follow the largest
+Cost: about 2 us per stage, some twenty stages an iteration. On a shared machine a mean would follow the largest
 disturbance, so that repeated times are given as median and quartiles.
 """
 

@@ -14,7 +14,7 @@ Say = Callable[[str], None]
 
 
 def measure_stages(cases: Iterable[BenchCase], say: Say) -> dict[str, Any]:
-    """{"peaks": one a number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
+    """{"peaks": one per number of threads, "cases": results of `measure` with "limits" and "ns_per_pair"}.
 
     Raises: InputError before anything is measured, if the file of a case is not a trained scene.
     """
@@ -65,7 +65,7 @@ def table(result: dict[str, Any]) -> str:
     lines = [plain(("stage", "median ms", "quartiles", "fraction", "limit ms", "of limit", "bound by"), cells, (0, 6))]
     dense = result["densification"]
     if dense:
-        per = f"{dense['per_iteration_ms']:.2f} ms an iteration"
+        per = f"{dense['per_iteration_ms']:.2f} ms per iteration"
         lines.append(f"densification, once an interval: {dense['median_ms']:.2f} ms, or {per}")
     lines.append(f"first iteration, compiled code loaded or made: {result['first_iteration_s']:.1f} s")
     ns = result["ns_per_pair"]

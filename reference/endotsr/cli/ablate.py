@@ -38,21 +38,21 @@ class AblateOptions:
     scale: float = 1.0
     """image scale"""
     splits: Annotated[tuple[str, ...], Option("SPLIT")] = ("every_eighth",)
-    """held-out frames: every_eighth, every_second, "blocks N", "end N"; several are measured beside each other"""
+    """held-out frames: every_eighth, every_second, "blocks N", "end N"; several may be given"""
     configurations: Annotated[tuple[str, ...], Option("NAME")] = ()
     """only these configurations (default: all seven)"""
     fixed_count: bool = True
-    """also the refinement at a fixed number of Gaussians"""
+    """also train with a fixed number of Gaussians"""
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()
-    """measure more: depth, flicker, right_view"""
+    """additional measurements: depth, flicker, right_view"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights"""
     keep_checkpoints: bool = False
     """keep the model of every run (hundreds of megabytes each at full size)"""
     collect: bool = False
-    """train nothing: only write the results of the runs that are finished"""
+    """write the results of finished runs without training"""
     json: JsonFile = None
-    """also write the results there"""
+    """also write the results to this file"""
     workers: Annotated[int | None, Option("N")] = None
     """runs at a time (default: as many as cores and free memory allow)"""
     threads: Annotated[int | None, Option("N")] = None
@@ -60,7 +60,7 @@ class AblateOptions:
     scheduler: Annotated[str | None, Option("ADDRESS")] = None
     """send the runs to the workers of this Dask scheduler"""
     retry: bool = False
-    """also make the runs again that failed before"""
+    """also repeat the runs that failed before"""
 
 
 def run(words: list[str]) -> int:

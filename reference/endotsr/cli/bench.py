@@ -16,10 +16,10 @@ LEAST = {"gaussians": 4, "repeats": 1, "width": 16, "height": 16, "threads": 1}
 
 @dataclass
 class BenchOptions:
-    """Time every stage of a training iteration, beside its limit from the measured peaks of this machine.
+    """Time every stage of a training iteration and its limit from the measured peaks of this machine.
 
     The iteration is one of the published schedule at which everything is active, on a common workload or on trained
-    --scenes. Every combination of size, precision and threads is measured in a process of its own.
+    --scenes. Every combination of size, precision and threads is measured in a separate process.
     """
 
     gaussians: Annotated[tuple[int, ...], Option("INT ...", may_be_empty=True)] = (60_000,)
@@ -35,7 +35,7 @@ class BenchOptions:
     height: int = 512
     """rows of the picture"""
     repeats: int = 11
-    """timed iterations a case"""
+    """timed iterations per case"""
     json: JsonFile = None
     """also write the figures as JSON"""
 

@@ -23,32 +23,32 @@ class DepthOptions:
     """Make the depth of a folder that `endotsr prepare` wrote.
 
     From the stereo pairs: semi-global matching, a check of left against right, and edge-preserving smoothing. Pixels
-    without a reliable match stay without depth. With --given, the files of another program are read as they are.
+    without a reliable match stay without depth. --given reads the files of another program instead.
 
-    A clip from one camera has two ways. --kind relative reads the inverse depth of a monocular network, whose scale and
-    shift are taken from depth that the clip has already (points of a reconstruction), or else assumed. --flat needs no
-    files: a plane that faces the camera. What is assumed makes lengths and other viewpoints no measurements.
+    For a clip from one camera there are two ways. --kind relative reads the inverse depth of a monocular network, whose
+    scale and shift are fitted to existing depth (points of a reconstruction) or assumed. --flat needs no files: it
+    assumes a plane that faces the camera. With assumed values, lengths and other viewpoints are not measurements.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
     """folder with sequence.toml"""
     given: Annotated[Path | None, Option("FOLDER")] = None
-    """files of another program, one a frame: npy, pfm, tiff or png"""
+    """files of another program, one per frame: npy, pfm, tiff or png"""
     kind: Literal["disparity", "depth", "relative"] = "disparity"
-    """what these files hold: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
+    """content of these files: disparity in pixels, depth, or relative inverse depth of a network (larger = nearer)"""
     align: Literal["auto", "frame", "sequence"] = "auto"
-    """of relative: scale and shift in each frame, or once (auto: each frame where the clip has depth)"""
+    """of relative: fit scale and shift in each frame, or once (auto: each frame where the clip has depth)"""
     farthest_over_nearest: float = 3.0
-    """of relative, without depth to compare with: how many times as far the farthest tissue is assumed to be"""
+    """of relative, without reference depth: assumed ratio of the farthest to the nearest tissue"""
     trust_depth: bool = False
     """of relative: take the numbers even if they are large where the pictures are dark"""
     flat: bool = False
-    """a plane that faces the camera, for a clip of which nothing else is known"""
+    """a plane that faces the camera, for a clip without any depth"""
     unit_scale: float = 1.0
     """length (or pixels of disparity) of one step of the stored numbers, in millimetres"""
     stereo: Annotated[StereoSettings, Option(flat=True)] = STEREO
     replace: bool = False
-    """replace depth that exists"""
+    """replace existing depth"""
     json: JsonFile = None
     """also write the coverage of every frame as JSON"""
 

@@ -25,7 +25,7 @@ def run(words: list[str]) -> int:
     if len(options.methods) > 1 or options.compare:
         return _compare(options)
     if options.pictures and options.measures:
-        raise InputError("evaluate: --measures beside --pictures is not allowed: they render views of a run")
+        raise InputError("evaluate: --measures with --pictures is not allowed: they render views of a run")
     metrics = _pictures(options) if options.pictures else _run(options)
     if options.json:
         write_json(options.json, metrics)
@@ -40,7 +40,7 @@ def _compare(options: EvaluateOptions) -> int:
         raise InputError("evaluate: METHOD is missing: run folders, JSON files or folders of pictures to compare")
     for name in ("pictures", "label", "measures"):
         if getattr(options, name):
-            raise InputError(f"evaluate: --{name} beside several methods is not allowed; allowed: evaluate one first")
+            raise InputError(f"evaluate: --{name} with several methods is not allowed; allowed: evaluate one first")
     compare_methods(options)
     return 0
 
@@ -54,7 +54,7 @@ def _run(options: EvaluateOptions) -> "EvaluationRecord":
     if options.run is None:
         raise InputError("evaluate: RUN is missing: a run folder, or --pictures FOLDER with --sequence SEQUENCE")
     if options.settings != SHOWN:
-        raise InputError(f"evaluate: --sequence.* beside {options.run} is not allowed: the run has fixed its settings")
+        raise InputError(f"evaluate: --sequence.* with {options.run} is not allowed: the settings of a run are fixed")
     if is_windowed(options.run):
         from endotsr.cli.parts.windows import evaluate_windows
 

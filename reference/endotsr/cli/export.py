@@ -14,14 +14,14 @@ from endotsr.errors import InputError
 class ExportOptions:
     """Write a scene for other programs, as a page that plays it, or as a slim model that `render` and `export` read.
 
-    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows gives .ply files and a page, each of its
-    windows the rest. The ending of --out chooses what is written: `.npz` is a slim model of the whole scene, `.html` is
-    a page with the moving scene, `.glb` holds points that move, `.ply` is one time of the scene, and a name without an
-    ending is a folder with one .ply file for every time.
+    SCENE is a run folder, a slim model, or a 3DGS .ply file; a run of windows supports .ply files and a page, and each
+    of its windows all formats. The extension of --out selects the format: `.npz` is a slim model of the whole scene,
+    `.html` is a page with the moving scene, `.glb` holds moving points, `.ply` is one time of the scene, and a name
+    without an extension is a folder with one .ply file for every time.
 
     The page needs no server, no network and no other file; a browser with WebGL 2 draws it. Positions and shapes are
-    kept at key times, between which the page interpolates; the colours are those that the observed camera sees. The
-    page of a run of windows has a folder beside it, from which it loads the window that is played.
+    stored at key times, between which the page interpolates; the colours are those seen by the observed camera. The
+    page of a run of windows loads the current window from a folder next to it.
     """
 
     scene: Annotated[Path, Option("SCENE", positional=True)]
@@ -37,11 +37,11 @@ class ExportOptions:
     count: Annotated[int | None, Option("N")] = None
     """number of times, evenly spaced over [0, 1], instead of --times"""
     opacity: float = 0.1
-    """least opacity of a Gaussian whose centre becomes a point"""
+    """minimum opacity of a Gaussian whose centre becomes a point"""
     voxel: float | None = None
     """side of a voxel of a mesh, in scene units (default: 1.5 pixels at the median depth)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
-    """components to leave out"""
+    """components to omit"""
     keys: Annotated[int | None, Option("N")] = None
     """of a page: largest number of key times, default 32 (a window: 16); more are smoother and make the page larger"""
     title: str = ""
@@ -51,7 +51,7 @@ class ExportOptions:
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """of a page: current location of the sequence of the run (default: the recorded one)"""
     json: JsonFile = None
-    """also write what was written as JSON"""
+    """also write a record of the output as JSON"""
     threads: int = 0
     """threads, 0 = all cores"""
 

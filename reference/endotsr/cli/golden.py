@@ -48,11 +48,11 @@ class RunOptions(_Reported):
     """Pass all requests to a port's command, then judge its outputs."""
 
     port: str = ""
-    """the command, with {requests} and {outputs} in place of the folders; called without a shell"""
+    """the command, with {requests} and {outputs} instead of the folders; called without a shell"""
     timeout: float = 600.0
     """seconds allowed for one call"""
     keep: Annotated[Path | None, Option("DIR")] = None
-    """keep requests and outputs in this folder, in place of those of an earlier run"""
+    """keep requests and outputs in this folder, instead of those of an earlier run"""
 
 
 @dataclass

@@ -17,7 +17,7 @@ class GradcheckOptions:
     seed: int = 0
     """seed of inputs and directions"""
     definition: bool = False
-    """check the definition in plain NumPy in place of the compiled functions"""
+    """check the definition in plain NumPy instead of the compiled functions"""
     json: Annotated[Path | None, Option("FILE")] = None
     """also write the table as JSON"""
 

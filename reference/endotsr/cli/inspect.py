@@ -16,7 +16,7 @@ from endotsr.untrusted.writing import replace_text
 
 @dataclass
 class InspectOptions:
-    """Test the training frames of a sequence for every effect, and plan the components that they call for.
+    """Test the training frames of a sequence for every effect, and plan the components that the clip needs.
 
     The plan is relative to the settings given here (preset, TOML file, options), as `endotsr train` would use them.
     `endotsr train --effects auto` follows it.
@@ -29,7 +29,7 @@ class InspectOptions:
     json: JsonFile = None
     """write verdicts and plan as JSON"""
     frame_rate: Annotated[float | None, Option("FPS")] = None
-    """frames a second (default: those of the recording, where known); rates are then also given a minute"""
+    """frames per second (default: those of the recording, if known); rates are then also given per minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
     settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = (

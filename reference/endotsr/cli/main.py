@@ -136,8 +136,8 @@ def _overview() -> str:
             "options:",
             "  -h, --help   this overview; `endotsr COMMAND --help` lists the options of a command",
             "  --version    the version",
-            "  --completion {bash,zsh,fish}   a script that completes commands and options in this shell",
-            "  --cache [clear]   where compiled kernels are kept, and how large they are; `clear` removes them",
+            "  --completion {bash,zsh,fish}   a completion script for this shell",
+            "  --cache [clear]   location and size of the compiled kernels; `clear` removes them",
             "  -q, --quiet; --log-file FILE   print nothing but errors; also write what is printed (any command)",
         ]
     )

@@ -11,23 +11,23 @@ from endotsr.cli.parts.result import JsonFile, write_result
 
 @dataclass
 class MasksOptions:
-    """Propose masks of the instruments, from the grey of metal and from motion unlike the tissue's.
+    """Propose masks of the instruments from the grey of metal and from motion that differs from the tissue.
 
-    Without --out, SEQUENCE is a folder that `endotsr prepare` wrote, and the masks are entered into it. With --out,
-    SEQUENCE is any source that `prepare` reads, and FOLDER gets masks/, the overlay and the mark of a proposal. Look at
-    proposed_masks.png before a training. Exit code 1: nothing was found, and nothing was written.
+    Without --out, SEQUENCE is a folder that `endotsr prepare` wrote, and the masks are added to it. With --out,
+    SEQUENCE is any source that `prepare` reads, and masks/ and the overlay are written to FOLDER, marked as a proposal.
+    Inspect proposed_masks.png before a training. Exit code 1: nothing was found, and nothing was written.
     """
 
     sequence: Annotated[Path, Option("SEQUENCE", positional=True)]
     """folder with sequence.toml, or with --out any source"""
     out: Annotated[Path | None, Option("FOLDER")] = None
-    """folder to create, instead of entering the masks into the sequence"""
+    """folder to create, instead of adding the masks to the sequence"""
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
     replace: bool = False
-    """replace masks that exist"""
+    """replace existing masks"""
     json: JsonFile = None
-    """also write what was found as JSON"""
+    """also write the result as JSON"""
 
 
 def run(words: list[str]) -> int:

@@ -18,8 +18,8 @@ class PrepareOptions:
     """Turn a recording into a folder that `endotsr train` reads: pictures, masks, depth and sequence.toml.
 
     SOURCE is a folder of pictures, a video, a StereoMIS, COLMAP, TUM or EndoNeRF folder, or a folder in the common
-    format. What its files do not say is stated with the options. Lengths become millimetres. Nothing is guessed in
-    silence: the notes that are printed say what was done.
+    format. Options supply metadata that its files lack. Lengths are converted to millimetres. The printed notes state
+    every assumption and every change.
     """
 
     source: Annotated[Path, Option("SOURCE", positional=True)]
@@ -29,25 +29,25 @@ class PrepareOptions:
     layout: Annotated[str, Option("NAME")] = "auto"
     """layout of the source instead of the detected one"""
     stereo: Literal["auto", "none", "side_by_side", "stacked"] = "auto"
-    """how a picture holds a stereo pair: side_by_side = left half first, stacked = left on top"""
+    """layout of a stereo pair in a picture: side_by_side = left half first, stacked = left on top"""
     camera: Annotated[tuple[float, ...], Option("FX FY CX CY")] = ()
     """intrinsics in pixels; the centre of the first pixel is at (0.5, 0.5)"""
     distortion: Annotated[tuple[float, ...], Option("K ...")] = ()
-    """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; the pictures are straightened"""
+    """distortion k1 k2 p1 p2 [k3 [k4 k5 k6]], in the order of OpenCV; the pictures are undistorted"""
     calibration: Annotated[Path | None, Option("FILE")] = None
     """calibration of one camera or of a pair, which is rectified: ini, YAML of OpenCV, ROS or Kalibr, or a matrix K"""
     baseline: float | None = None
-    """distance of the cameras of a pair that is rectified already, millimetres"""
+    """distance of the cameras of an already rectified pair, millimetres"""
     trajectory: Annotated[Path | None, Option("FILE")] = None
     """poses in the TUM form: stamp tx ty tz qx qy qz qw"""
     trajectory_direction: Literal["camera_to_world", "world_to_camera"] = "camera_to_world"
-    """what the poses map"""
+    """direction of the poses"""
     trajectory_axes: Literal["opencv", "opengl"] = "opencv"
     """axes of the camera: opencv = x right, y down, z forward; opengl = x right, y up, z backward"""
     trajectory_unit: Literal["um", "mm", "cm", "m", "arbitrary"] | None = None
     """unit of the positions (TUM and StereoMIS: m)"""
     masks: Annotated[Path | None, Option("FOLDER")] = None
-    """masks of another program, one a frame, or one file for all frames"""
+    """masks of another program, one per frame, or one file for all frames"""
     excluded_value: Literal["white", "black"] = "white"
     """which value of these masks is excluded; white = above half of the largest value"""
     depth: Annotated[Path | None, Option("FOLDER")] = None
@@ -63,29 +63,30 @@ class PrepareOptions:
     frames: Annotated[str, Option("A:B[:S],...")] = ""
     """frames or seconds of the source: 0:10,12,30s:45s"""
     drop: Annotated[str, Option("N,...")] = ""
-    """frames or seconds that are left out, such as 10,11"""
+    """frames or seconds to omit, such as 10,11"""
     crop: Annotated[tuple[int, ...], Option("X Y WIDTH HEIGHT")] = ()
     """window of the pictures, pixels of the source; the intrinsics follow"""
     unite_masks: Annotated[tuple[Path, ...], Option("FOLDER ...")] = ()
-    """further masks, one a frame or one file for all frames: what any of them excludes is excluded"""
+    """further masks, one per frame or one file for all frames: a pixel that any of them excludes is excluded"""
     rate: float | None = None
-    """frames a second to keep"""
+    """frames per second to keep"""
     source_rate: float | None = None
-    """frames a second of the source, where its files do not say"""
+    """frames per second of the source, if its files do not state it"""
     orientation: Literal["turned", "stored"] | None = None
-    """of a video that states a rotation: pictures (and intrinsics, masks, depth) as players turn them, or as stored"""
+    """for a video with rotation metadata: pictures (and intrinsics, masks, depth) as players rotate them, or as
+    stored"""
     scale: float = 1.0
     """image scale, area-averaged; the intrinsics follow"""
     gaps: Literal["refuse", "drop", "fill"] = "refuse"
-    """frames without mask or pose while others have one: drop leaves them out, fill interpolates"""
+    """frames without mask or pose while others have one: drop omits them, fill interpolates"""
     pictures: Literal["png", "jpg"] = "png"
     """format of the written pictures"""
     also: tuple[Literal["nerfstudio", "colmap"], ...] = ()
-    """descriptions for other programs beside sequence.toml: transforms.json, or a COLMAP model in sparse/0"""
+    """descriptions for other programs in addition to sequence.toml: transforms.json, or a COLMAP model in sparse/0"""
     replace: bool = False
     """replace FOLDER if `prepare` wrote it; it may be the source"""
     json: JsonFile = None
-    """also write what was found and done as JSON"""
+    """also write the findings and notes as JSON"""
 
 
 def run(words: list[str]) -> int:

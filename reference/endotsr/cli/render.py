@@ -37,23 +37,23 @@ class RenderOptions:
     offset: Annotated[tuple[float, float, float], Option("RIGHT DOWN FORWARD")] = (0.0, 0.0, 0.0)
     """shift of the camera along its own axes, scene units"""
     size: Annotated[str, Option("WIDTHxHEIGHT")] = ""
-    """pixels of a picture (default: those of the camera); all that the camera saw stays in the picture"""
+    """pixels of a picture (default: those of the camera); the whole field of view stays in the picture"""
     depth: Literal["accumulated", "normalised"] = "accumulated"
     """depth as composited, or divided by the opacity"""
     panels: tuple[Literal["render", "truth", "error", "depth", "opacity"], ...] = ("render",)
     """pictures of a film, side by side; truth and error are those of frames"""
     rate: float | None = None
-    """pictures of a film in a second (default: the speed of the recording; 15 where it is unknown)"""
+    """pictures per second of a film (default: the speed of the recording; 15 if it is unknown)"""
     slow: Annotated[float | None, Option("N")] = None
     """a film that takes N times as long as the recording, instead of --rate"""
     npy: bool = False
     """also write float arrays: colour (3, H, W), depth and opacity (H, W)"""
     without: tuple[Literal["appearance", "spectral_motion"], ...] = ()
-    """components to leave out of the picture"""
+    """components to omit"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
     """current location of the sequence of the run, for truth and error (default: the recorded one)"""
     json: JsonFile = None
-    """also write what was written as JSON"""
+    """also write a record of the output as JSON"""
     threads: int = 0
     """threads, 0 = all cores"""
 

@@ -24,7 +24,7 @@ PREPARE = "next: endotsr prepare {} --out FOLDER"
 
 @dataclass
 class SimulateOptions:
-    """Simulate a scene in which every effect is known, and write it as a folder with the exact truth beside.
+    """Simulate a scene in which every effect is known, and write it with the exact ground truth.
 
     SCENE is still, breathing, pulling, cutting, smoke, moving-camera or everything; the options change its size, its
     seed and its effects. `endotsr train OUT` reads a folder in the layout endonerf; `endotsr prepare OUT` reads the
@@ -38,11 +38,11 @@ class SimulateOptions:
     effects: Annotated[str | None, Option("NAME,..")] = None
     """exactly these effects, instead of those of a scene; empty for none"""
     json: JsonFile = None
-    """also write what was simulated as JSON"""
+    """also write a record of the simulation as JSON"""
     layout: Literal["endonerf", "stereomis"] = "endonerf"
     """endonerf: pictures, depth, masks and poses; stereomis: stacked video, calibration, trajectory and masks"""
     lossless: bool = False
-    """with the layout stereomis: a video without loss, in place of a compressed one"""
+    """with the layout stereomis: a lossless video instead of a compressed one"""
     settings: Annotated[SimulatorSettings, Option(flat=True)] = STILL
 
 

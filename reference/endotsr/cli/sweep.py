@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 class SweepOptions:
     """Make every run of SPEC.toml (sequences x splits x configurations x seeds) and a table of their results in DIR.
 
-    After a kill, Ctrl-C or a full disk the same command continues: finished runs are kept, a run that was begun goes
-    on from its checkpoint. A failed run is named in the table and made again with --retry. Exit code 1: a run failed.
+    After a kill, Ctrl-C or a full disk the same command continues: finished runs are kept, and an unfinished run
+    continues from its checkpoint. A failed run is named in the table and repeated with --retry. Exit code 1: a run
+    failed.
     """
 
     spec: Annotated[Path, Option("SPEC.toml", positional=True)]
@@ -33,7 +34,7 @@ class SweepOptions:
     scheduler: Annotated[str | None, Option("ADDRESS")] = None
     """send the runs to the workers of this Dask scheduler, such as tcp://host:8786; DIR is on a disk that all see"""
     retry: bool = False
-    """also make the runs again that failed before"""
+    """also repeat the runs that failed before"""
     dry_run: bool = False
     """list the runs and end"""
 

@@ -28,7 +28,7 @@ class TradeoffOptions:
     out: Annotated[Path, Option("DIR")] = Path("tradeoff")
     """folder of the measurement"""
     run: Annotated[Path | None, Option("RUN")] = None
-    """run folder to take the scene from"""
+    """run folder with the scene"""
     splats: Annotated[Path | None, Option("FILE")] = None
     """file of trained Gaussians: .ply, or .npz with xyz, log_scale, quat_wxyz, rgb, opacity"""
     scale: float = 1.0

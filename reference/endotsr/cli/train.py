@@ -45,13 +45,13 @@ class TrainOptions:
     iterations: Annotated[int | None, Option("N")] = None
     """exact length of the run; stretches the schedule. With --resume: a larger number extends the run"""
     minutes: Annotated[float | None, Option("M")] = None
-    """length, points and Gaussians for a training of so many minutes on this machine, from preset `quick` upwards"""
+    """choose length, points and Gaussians for a training of M minutes on this machine"""
     schedule: Literal["stretched", "absolute"] = "stretched"
     """with --iterations: milestones keep their fraction of the run, or stay at their iterations"""
     effects: Literal["everything", "auto"] = "everything"
-    """train every component of the settings, or only those that the clip calls for (see `endotsr inspect`)"""
+    """train every component of the settings, or only those that the clip needs (see `endotsr inspect`)"""
     windows: Annotated[str | None, Option("auto|N")] = None
-    """cut a recording into windows of about N frames, or by its motion and cuts; each is a run in RUN/windows"""
+    """divide a recording into windows of about N frames, or by its motion and cuts; each is a run in RUN/windows"""
     overlap: int = 8
     """of windows: frames that neighbours share"""
     chain: int = 1
@@ -63,10 +63,10 @@ class TrainOptions:
     resume: bool = False
     """continue the run in --out"""
     calibrate_only: bool = False
-    """train nothing: compute the weight of equation (7) on the run in --out; --loss.ssim-weight and the other settings
+    """only compute the weight of equation (7) on the run in --out; --loss.ssim-weight and the other settings
     that it reads may differ from those of the run"""
     evaluate: bool = True
-    """measure, render and report when training is done"""
+    """evaluate, render and write the report after training"""
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights for the evaluation"""
     json: JsonFile = None
@@ -110,7 +110,7 @@ def _train_windows(options: TrainOptions, words: list[str]) -> int:
 
     assert options.out is not None
     if options.effects != "everything":
-        raise InputError("train: --effects auto beside --windows is not allowed; allowed: inspect a part, and settings")
+        raise InputError("train: --effects auto with --windows is not allowed; allowed: inspect a part, and settings")
     place = Place(options.workers, options.settings.training.threads or None, options.scheduler)
     check_place("train", place)
     if options.resume:
@@ -150,7 +150,7 @@ def _calibrate(options: TrainOptions, words: list[str]) -> int:
     assert options.out is not None
     for name in ("config", "iterations", "minutes", "resume"):
         if getattr(options, name):
-            raise InputError(f"train: --{name} beside --calibrate-only is not allowed: the run has fixed its settings")
+            raise InputError(f"train: --{name} with --calibrate-only is not allowed: the settings of a run are fixed")
     folder = open_run(options.out)
     config = parse(TrainOptions, words, "train", TrainOptions(settings=folder.config())).settings
     calibrate_run(folder, config, options.sequence or None, options.json)
@@ -184,7 +184,7 @@ def _train_new(options: TrainOptions, words: list[str], schedule_note: str) -> t
     if options.minutes is not None:
         config, schedule_note = _of_minutes(options, sequence, config)
     found: RunRecord = {}
-    lines = ["effects: everything; `--effects auto` trains only what the clip calls for"]
+    lines = ["effects: everything; `--effects auto` trains only what the clip needs"]
     if options.effects == "auto":
         config, lines, effects = planned_settings(sequence, config, explicit_settings(TrainOptions, words))
         found["effects"] = effects
@@ -224,7 +224,7 @@ def _resume(options: TrainOptions, words: list[str]) -> tuple[RunFolder, "Sequen
     kept = folder.config()
     remembered, simulator = run_source(folder)
     if options.minutes is not None:
-        raise InputError(f"{options.out}: --minutes beside --resume is not allowed: the length of a run is fixed")
+        raise InputError(f"{options.out}: --minutes with --resume is not allowed: the length of a run is fixed")
     asked = _accepted_settings(options.out, words, kept, len(folder.sequence_record().train_index))
     source = options.sequence or remembered
     sequence = load_sequence(source, kept, simulator)

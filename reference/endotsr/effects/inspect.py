@@ -34,23 +34,23 @@ class Inspection(NamedTuple):
     noise: Noise
     verdicts: dict[str, EffectVerdict]  # by effect, in the order of `EFFECTS`
     lines: list[Line]  # rates of the motion
-    frame_rate: float | None  # frames a second, if it is known
+    frame_rate: float | None  # frames per second, if it is known
 
     def per_minute(self, cycles: float) -> float | None:
-        """A rate in cycles per sequence as a number a minute; None without a frame rate."""
+        """A rate in cycles per sequence per minute; None without a frame rate."""
         return None if self.frame_rate is None else 60.0 * cycles * self.frame_rate / self.clip.frames
 
 
 def inspect_sequence(sequence: Sequence, frame_rate: float | None = None) -> Inspection:
     """Test the training frames of a sequence for every effect.
 
-    frame_rate   frames a second; default: those of the sequence. Where known, rates are also given a minute
+    frame_rate   frames per second; default: those of the sequence. If known, rates are also given per minute
 
     Raises: InputError for a frame rate that is not positive and finite.
     Equal sequences give equal verdicts: the simulated null has a fixed seed.
     """
     if frame_rate is not None and not 0.0 < frame_rate < float("inf"):
-        raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames a second")
+        raise InputError(f"frame rate {frame_rate:g} is not allowed; allowed: a number > 0, frames per second")
     frame_rate = sequence.frame_rate if frame_rate is None else frame_rate
     clip = training_clip(sequence)
     noise = estimate_noise(sequence, clip)

@@ -197,7 +197,7 @@ def _remarks(inspection: Inspection) -> tuple[str, ...]:
         said.append("The masks exclude nothing: mask propagation costs nothing, and every pyramid pixel is valid.")
     highest = max((line.cycles for line in inspection.lines), default=0.0)
     if highest > inspection.clip.frames / SAMPLES_A_CYCLE / 2:
-        said.append(f"A rate of {highest:.3g} cycles has fewer than four frames a cycle: more frames would help.")
+        said.append(f"A rate of {highest:.3g} cycles has fewer than four frames per cycle: more frames would help.")
     return tuple(said)
 
 

@@ -1,6 +1,6 @@
 """The sum over atoms that equations (2) and (3) share: out[c, i] = sum_a coefficients[c, a, i] atoms[a].
 
-In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). The sum runs in the order of the atoms, one rounding a step,
+In: coefficients (3, 2F, N), atoms (2F,). Out: (3, N). The sum runs in the order of the atoms, one rounding per step,
 so the result does not depend on the block size or the number of threads. The reverse pass adds over the Gaussians in
 float64, block by block.
 """

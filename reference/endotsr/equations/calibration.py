@@ -31,7 +31,7 @@ class Calibration(NamedTuple):
 
     lambda_lap: float
     ratios: NDArray[np.float64]  # (valid views,)  g_lap / g_rgb, in the order of the views
-    table: str  # one line a view: name, g_rgb, g_lap, ratio or why it was dropped
+    table: str  # one line per view: name, g_rgb, g_lap, ratio or why it was dropped
 
 
 def rms(gradient: NDArray[np.floating]) -> float:

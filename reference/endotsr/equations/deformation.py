@@ -5,7 +5,7 @@
     gaussian:  basis = exp(-u),    u = (t - centre)^2 / (2 S)     (the textbook form)
 
 Channels 0-2 are added to the position, 3-6 to the raw quaternion, 7-9 to the log-scale, all before
-activation. In: three arrays (10, B, N) and one time. Out: ten offsets a Gaussian. The use of the offsets is no
+activation. In: three arrays (10, B, N) and one time. Out: ten offsets per Gaussian. The use of the offsets is no
 concern of this module.
 
 The arrays hold 510 of about 670 numbers of a Gaussian, so the passes are bound by memory: each (channel,

@@ -118,7 +118,7 @@ def support_masks(mask: BoolArray, levels: int = LEVELS, upsampling: Upsampling 
 
     mask     (H, W)  True = tissue
     returns  a mask of the size of each band. A band pixel is valid when every image pixel it depends on is
-             tissue: 5-7, 13-17, 29-37 pixels an axis for `co_sited`, 7, 17, 37 for `half_pixel`
+             tissue: 5-7, 13-17, 29-37 pixels per axis for `co_sited`, 7, 17, 37 for `half_pixel`
     Edges:   a level may be empty; it then adds 0 to the loss. Raises ValueError for an unknown `upsampling`.
     Oracle:  `endotsr.definition.laplacian`; impulse responses of the pyramid, tests/oracle/laplacian_oracle.py.
     """

@@ -2,7 +2,7 @@
 
 In: the pose that came with the sequence, and the parameters of its frame. Out: the pose that the frame is rendered
 with. Poses of robots and of tracking programs are off by more than a pixel; without this correction the difference is
-fitted as motion of the scene. Everything is computed in float64, because it is six numbers a frame. This module knows
+fitted as motion of the scene. Everything is computed in float64, because it is six numbers per frame. This module knows
 no frame number and no time.
 """
 

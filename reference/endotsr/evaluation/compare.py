@@ -1,8 +1,8 @@
 """Several methods on the same held-out frames: means, and differences paired frame by frame.
 
-In: dictionaries of metrics.json, of runs or of folders of pictures. Out: one row a method. A difference is that to the
-first method on the same frame, so that frames that are difficult for both cancel. Its interval is a bootstrap over the
-frames: it says how the mean would vary with the choice of frames of this clip, and nothing about other clips.
+In: dictionaries of metrics.json, of runs or of folders of pictures. Out: one row per method. A difference is taken from
+the first method on the same frame, so that frames that are difficult for both cancel. Its interval is a bootstrap over
+the frames: it covers other choices of frames of this clip, but not other clips.
 """
 
 from typing import Any, NamedTuple, cast

@@ -1,7 +1,7 @@
 """A folder of pictures or a video in the place of a model: the renders of any method, measured by the same code.
 
-In: a folder with one picture a frame, `.png`, `.tiff`, `.bmp` (8 or 16 bit) or `.npy` (float), or a video of them; the
-sequence that it shows. Out: the file of every frame, and the dictionary of metrics.json for these pictures. A float
+In: a folder with one picture per frame, `.png`, `.tiff`, `.bmp` (8 or 16 bit) or `.npy` (float), or a video of them;
+the sequence that it shows. Out: the file of every frame, and the dictionary of metrics.json for these pictures. A float
 array keeps what an 8-bit file rounds, so that the picture of a baseline that was saved as `.npy` gives the numbers of
 that baseline to the last digit. What the compression of a video loses counts as an error of its method.
 """
@@ -105,7 +105,7 @@ def _listed(folder: Path) -> list[Path]:
         files = sorted(f for f in folder.iterdir() if f.suffix.lower() == kind and not f.name.startswith("."))
         if files:
             return files
-    raise InputError(f"{folder}: holds no picture; allowed: one file a frame, {', '.join(KINDS)}")
+    raise InputError(f"{folder}: holds no picture; allowed: one file per frame, {', '.join(KINDS)}")
 
 
 def _by_name(files: list[Path], sequence: Sequence) -> dict[int, Path]:

@@ -102,7 +102,7 @@ class RunPart(TypedDict):
 
 
 class PicturesPart(TypedDict):
-    """`pictures` of metrics.json: the folder that was measured in place of a run."""
+    """`pictures` of metrics.json: the folder that was measured instead of a run."""
 
     folder: str
     pairing: str

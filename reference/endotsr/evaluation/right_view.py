@@ -157,7 +157,7 @@ def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) 
     files, width, height = list_pictures(folder, PICTURE_ENDINGS), sequence.width, sequence.height
     files = [files[i] for i in parse_frame_range(settings.frames, len(files))]
     if len(files) != sequence.count:
-        raise InputError(f"{folder}: {len(files)} pictures for {sequence.count} frames; allowed: one a frame")
+        raise InputError(f"{folder}: {len(files)} pictures for {sequence.count} frames; allowed: one per frame")
 
     def right(index: int) -> NDArray[np.uint8]:
         file = files[index]

@@ -4,7 +4,7 @@
     p <- p - rate (m / (1 - beta1^k)) / (sqrt(v / (1 - beta2^k)) + epsilon)
 
 k counts the steps of one array, so arrays that are created during a run start with k = 0 and zero moments.
-In: parameters and gradients by name, and one rate a name (or one per part of the leading axis). This module
+In: parameters and gradients by name, and one rate per name (or one per part of the leading axis). This module
 is independent of schedules and Gaussians.
 
 Two consequences. A zero gradient still moves a parameter by its momentum. With epsilon 1e-15 a gradient that is pure

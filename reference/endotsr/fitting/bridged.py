@@ -32,7 +32,7 @@ from endotsr.splatting.camera import Camera
 
 
 class Stored(NamedTuple):
-    """The targets of one time in whole numbers and bits: 8.5 bytes a pixel in place of 20. What is off is None."""
+    """The targets of one time in whole numbers and bits: 8.5 bytes per pixel instead of 20. What is off is None."""
 
     image: Array  # (3, H, W) uint16, steps of 1 / STEPS
     mask: PackedMask

@@ -2,7 +2,7 @@
 
 In: gradients and losses of an iteration. Out: `Diverged`, an exception that names iteration, frame and term, and lines
 of advice. Nothing here changes a number of the training, and the cost is below 0.5 % of an iteration: the sums of
-squares of eleven numbers a Gaussian, and every hundred iterations the distances of the centres.
+squares of eleven numbers per Gaussian, and every hundred iterations the distances of the centres.
 """
 
 import math

@@ -19,7 +19,7 @@ STEPS = 65535  # of a number in [0, 1]; 8-bit steps would be as large as the err
 
 
 class PackedMask(NamedTuple):
-    """A mask of one bit a pixel."""
+    """A mask of one bit per pixel."""
 
     bits: Array  # (ceil(H W / 8),) uint8
     shape: tuple[int, ...]  # (H, W)

@@ -1,4 +1,4 @@
-"""The training: one view an iteration, on the published schedule (specification, equation 6 and B10-B12).
+"""The training: one view per iteration, on the published schedule (specification, equation 6 and B10-B12).
 
 `training_step` computes what `view_gradients` (`fitting/view.py`) spells out, with the same functions. In place of the
 reverse passes of the time bases and of the Fourier coefficients it calls `optimise`, which fuses them with their Adam

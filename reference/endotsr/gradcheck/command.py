@@ -15,7 +15,7 @@ def run_gradcheck(
     names       pair names, as the table shows them
     seed        of the inputs, cotangents and directions; every pair draws its own stream from it
     json_path   file of the JSON report; None = no report
-    definition  check the functions of `endotsr.definition` in place of the compiled ones, in float64 only
+    definition  check the functions of `endotsr.definition` instead of the compiled ones, in float64 only
     returns     0 when every check passed, else 1
     Raises:     InputError for an unknown name, a seed below 0 or an unwritable file.
     """

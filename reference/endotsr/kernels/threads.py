@@ -76,7 +76,7 @@ def parallel_calls(*calls: Callable[[], Any]) -> list[Any]:
 def use_threads(asked: int) -> int:
     """Set the number of threads of compiled kernels (0 = all cores) and return it. No result depends on it.
 
-    A number above that of the threads Numba started (one a core) means all of them. Raises InputError below 0.
+    A number above that of the threads Numba started (one per core) means all of them. Raises InputError below 0.
     """
     if asked < 0:
         raise InputError(f"--threads {asked} is not allowed; allowed: 0 (all cores) or more")

@@ -125,7 +125,7 @@ def _check_one_upright(picture: Any, path: Path) -> None:
             " allowed: pictures that are stored as they are shown"
         )
     if getattr(picture, "n_frames", 1) != 1:
-        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture a file")
+        raise InputError(f"{path}: holds {picture.n_frames} pictures; allowed: one picture per file")
 
 
 def _check_size(size: tuple[int, int], path: Path) -> None:

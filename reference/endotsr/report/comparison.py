@@ -21,7 +21,7 @@ COMPARED = ("method", "metric", "mean", "difference", "low", "high", "frames_bet
 
 
 def comparison_table(rows: list[Row]) -> str:
-    """One line a method with its means, then one a method and metric with the difference to the first method."""
+    """One line a method with its means, then one per method and metric with the difference to the first method."""
     labels = list(dict.fromkeys(row.label for row in rows))
     metrics = list(dict.fromkeys(row.metric for row in rows))
     found = {(row.label, row.metric): row for row in rows}

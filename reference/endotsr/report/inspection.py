@@ -51,7 +51,7 @@ def _saving(time: float, memory: float) -> str:
 
 def _rate(inspection: Inspection, cycles: float, harmonics: int) -> str:
     per_minute = inspection.per_minute(cycles)
-    minute = f", {per_minute:.0f} a minute" if per_minute is not None else ""
+    minute = f", {per_minute:.0f} per minute" if per_minute is not None else ""
     return f"{cycles:.3g} cycles per sequence{minute}, {harmonics} harmonic{'s' if harmonics != 1 else ''}"
 
 

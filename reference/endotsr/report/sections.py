@@ -217,7 +217,7 @@ def pictures(data: ReportData) -> str:
     note = (
         "Worst first. Error: absolute difference, mean over the colour channels, in display units from 0 to 1; "
         "the same scale in all frames. Grey: excluded or without depth. The frame marks the window with the largest "
-        "tissue error, shown 4× beside or below."
+        "tissue error, shown 4× next to it or below."
     )
     frames = len(data.evaluation.get("held_out", {}).get("per_frame", ()))
     if frames > len(data.frames):

@@ -40,7 +40,7 @@ NORMAL, SMALL = Sizes(11, 9), Sizes(9.5, 8)
 
 DOTS_PER_INCH = 160
 METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}  # metadata that matplotlib would add
-HASH_SALT = "endotsr"  # of the names inside an svg file, in place of a random one
+HASH_SALT = "endotsr"  # of the names inside an svg file, instead of a random one
 
 
 def new_figure(width: float, height: float, *, constrained: bool = True) -> Any:

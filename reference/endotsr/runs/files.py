@@ -38,7 +38,7 @@ def refuse_inside(path: Path, data: Path, what: str) -> None:
     """Raises InputError if the folder `path` would lie in the folder `data`, which `what` describes in the message."""
     inner, outer = Path(path).resolve(), Path(data).resolve()
     if outer.is_dir() and inner.is_relative_to(outer):
-        raise InputError(f"{path}: lies inside {what} {data}; choose an --out outside of it")
+        raise InputError(f"{path}: is inside {what} {data}; choose an --out outside of it")
 
 
 def refuse_link(path: Path) -> None:

@@ -3,7 +3,7 @@
     config.toml      resolved settings; `load_config` reads back an equal Config
     run.json         command, versions, seed, threads, machine, input hashes, times, peak memory, status
     sequence.json    cameras, times, names, split: what rendering needs when the pictures are elsewhere
-    log.jsonl        one line an iteration
+    log.jsonl        one line per iteration
     checkpoint.npz   the latest checkpoint, and checkpoint.previous.npz, the one before it
     diverged.npz     the state before an iteration whose numbers were not finite
     training.html    how far the training is; it leads to report.html once there is one

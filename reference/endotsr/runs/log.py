@@ -1,4 +1,4 @@
-"""log.jsonl: one line an iteration, cut at the checkpoint when a run is resumed."""
+"""log.jsonl: one line per iteration, cut at the checkpoint when a run is resumed."""
 
 import contextlib
 import json

@@ -67,7 +67,7 @@ def start_record(
 ) -> RunRecord:
     """The entries of run.json at the start of a run.
 
-    command   command line of the run, one string a word
+    command   command line of the run, one string per word
     threads   kernel threads in use
     """
     return {

@@ -7,7 +7,7 @@ optimiser, renderer and iteration number.
 Rules. A Gaussian is pruned if its opacity is below `prune_opacity`. One that survives and whose mean screen
 gradient (NDC units) reaches `gradient_threshold` is cloned if its largest semi-axis is at most
 `dense_fraction` x extent, else split into two children of 1/1.6 of the size, drawn from the parent, which is
-removed. With `growth = "budget"` the Gaussians with the largest gradients are taken in place of those above the
+removed. With `growth = "budget"` the Gaussians with the largest gradients are taken instead of those above the
 threshold: the room below `maximum`, after pruning, divided by the densifications that remain. Scales are canonical, not
 deformed. Children inherit every other array. Optimiser moments start at zero for clones and children (`GatherPlan`).
 Clones are not split in the same call.

@@ -53,7 +53,7 @@ def _numbers(part: str, count: int) -> list[int]:
         raise InputError(f"--frames {part!r}: no frames; {ALLOWED}")
     for bound in numbers[:2]:
         if bound is not None and not -count <= bound <= count - (len(numbers) == 1):
-            raise InputError(f"--frames {part!r}: {bound} lies outside the {count} frames of the source")
+            raise InputError(f"--frames {part!r}: {bound} is outside the {count} frames of the source")
     if len(numbers) == 1:
         return [] if numbers[0] is None else [numbers[0] % count]
     return list(range(count)[slice(*numbers)])
@@ -62,7 +62,7 @@ def _numbers(part: str, count: int) -> list[int]:
 def _seconds(part: str, recording: Recording) -> list[int]:
     """The frames from one second up to another."""
     if recording.times is None and not recording.rate:
-        raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ beside seconds")
+        raise InputError(f"--frames {part!r}: the frame rate is unknown; allowed: --source-rate HZ with seconds")
     words = part.split(":")
     try:
         bounds = [float(word.removesuffix("s")) if word.strip() else None for word in words]

@@ -69,7 +69,7 @@ def check_pairing(reference: list[Path], other: list[Path]) -> None:
     elif here is None or there is None:
         bare, numbered = (reference, other) if here is None else (other, reference)
         raise InputError(
-            f"{bare[0]}: no frame number tells the names of {bare[0].parent.name} apart, while"
+            f"{bare[0]}: no frame number distinguishes the names of {bare[0].parent.name}, while"
             f" {numbered[0].parent.name} has them ({numbered[0].name}); {_counts(reference, other)}; {ALLOWED_NAMES}"
         )
     elif len(here[0]) != len(there[0]):
@@ -136,7 +136,7 @@ def _check_decimals(files: list[Path]) -> None:
 
 
 def _digit_columns(files: list[Path]) -> list[list[int]]:
-    """The groups of digits of every name: one list a group, with one number a file."""
+    """The groups of digits of every name: one list per group, with one number per file."""
     groups = [re.findall(r"\d+", file.stem) for file in files]
     return [[int(digits) for digits in column] for column in zip(*groups)]
 

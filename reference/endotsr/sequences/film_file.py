@@ -54,7 +54,7 @@ def write_video(path: Path, pictures: Iterable[Array], rate: float, lossless: bo
     """Write a video file; the ending of the name, .mp4 or .webm, chooses the container.
 
     pictures  (H, W, 3) uint8 RGB, all of one size with even sides
-    rate      pictures a second
+    rate      pictures per second
     lossless  PNG pictures: `video_pictures` returns the same pictures; few players show such a film
     Raises:   InputError if there is no picture, or no encoder for the format.
     """

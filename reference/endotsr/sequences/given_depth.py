@@ -1,7 +1,7 @@
 """Depth or disparity that another program wrote, as depth of a sequence in the common format.
 
-Comes in: a folder of files (png, tiff, npy, pfm), one a frame, and what the numbers mean; goes out: depth (H, W) in the
-unit of the sequence, 0 = none. Disparities are of the left picture, in pixels of the size of the file, positive (a
+Comes in: a folder of files (png, tiff, npy, pfm), one per frame, and what the numbers mean; goes out: depth (H, W) in
+the unit of the sequence, 0 = none. Disparities are of the left picture, in pixels of the size of the file, positive (a
 negative sign, as some programs write, is accepted if all are negative).
 """
 

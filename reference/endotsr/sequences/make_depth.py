@@ -87,7 +87,7 @@ def from_pairs(folder: Path, settings: StereoSettings) -> MadeDepth:
 
 
 def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDepth:
-    """Depth from the files of another program, one a frame. Raises InputError as `from_pairs`."""
+    """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
     lens = contents.file.camera.lens(folder)

@@ -111,7 +111,7 @@ def check_polarity(
     masks    (n, H, W) True = tissue, as understood so far
     depth    (n, H, W) 0 = missing
     images   (n, 3, H, W) display RGB
-    stated_in   the file that states the polarity in place of the settings; "": the settings do
+    stated_in   the file that states the polarity instead of the settings; "": the settings do
 
     Wrong if (a) at least 1 % of all pixels lack depth and the fraction without depth is larger by 0.25 on "tissue" than
     on excluded pixels; or (b) depth is no evidence (that difference lies within +-0.25) and excluded pixels are redder,

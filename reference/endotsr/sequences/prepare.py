@@ -55,7 +55,7 @@ class PrepareSettings:
 
     frames: str = ""  # of the source; see `editing.chosen_frames`
     drop: str = ""  # frames that are left out, in the same words
-    rate: float | None = None  # frames a second to keep
+    rate: float | None = None  # frames per second to keep
     scale: float = 1.0
     gaps: Literal["refuse", "drop", "fill"] = "refuse"  # frames without mask or pose where others have one
     pictures: Literal["png", "jpg"] = "png"
@@ -94,9 +94,10 @@ def select_frames(recording: Recording, settings: PrepareSettings, notes: list[s
     if settings.rate is None:
         return frames
     if recording.rate is None:
-        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ beside --rate")
+        raise InputError(f"{recording.where}: the frame rate is unknown; allowed: --source-rate HZ with --rate")
     if settings.rate > recording.rate:
-        raise InputError(f"rate {settings.rate:g}: the source has {recording.rate:g} frames a second; allowed: no more")
+        known = f"the source has {recording.rate:g} frames per second"
+        raise InputError(f"rate {settings.rate:g}: {known}; allowed: no more")
     seconds = _seconds(recording, frames)
     wanted = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * settings.rate + 1e-6) + 1) / settings.rate
     kept = np.unique(np.abs(seconds[None, :] - wanted[:, None] + 1e-9).argmin(axis=1))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from endotsr.sequences.sequence import Sequence
     from endotsr.splatting.camera import Camera
 
-UNKNOWN_RATE = 15.0  # frames a second at which a film or an animation shows a recording of unknown rate
+UNKNOWN_RATE = 15.0  # frames per second at which a film or an animation shows a recording of unknown rate
 ROTATION_TOLERANCE = 1e-3  # largest entry of R^T R - 1
 Row = tuple[Length, Length, Length]
 
@@ -135,7 +135,7 @@ def checked_record(data: Any, where: str, prefix: str = "") -> SequenceRecord:
     if len(set(names)) < len(names):
         raise InputError(f"{where}: names: two frames have one name; allowed: a name for each frame")
     if len(found.times) != len(names):
-        raise InputError(f"{where}: times: {len(found.times)} for {len(names)} frames; allowed: one a frame")
+        raise InputError(f"{where}: times: {len(found.times)} for {len(names)} frames; allowed: one per frame")
     _check_split(found, where)
     _check_cameras(found, where)
     return found

@@ -91,7 +91,7 @@ class Recording:
     rig: Rig | None = None
     baseline: float | None = None  # of a rectified pair, in `unit`
     poses: list[CameraPose | None] | None = None
-    rate: float | None = None  # frames a second
+    rate: float | None = None  # frames per second
     times: NDArray[np.float64] | None = None  # seconds of every frame, ascending; None: evenly spaced
     notes: list[str] = field(default_factory=list)
 
@@ -127,7 +127,7 @@ def checked_lens(lens: Lens, where: object) -> Lens:
         raise InputError(f"{where}: focal length {min(lens.fx, lens.fy):g}: allowed: numbers > 0")
     if not -lens.width <= lens.cx <= 2 * lens.width or not -lens.height <= lens.cy <= 2 * lens.height:
         raise InputError(
-            f"{where}: principal point ({lens.cx:g}, {lens.cy:g}) lies far outside the {lens.width}x{lens.height}"
+            f"{where}: principal point ({lens.cx:g}, {lens.cy:g}) is far outside the {lens.width}x{lens.height}"
             " pixels; is the calibration of another picture size?"
         )
     if len(lens.distortion) not in (0, 4, 5, 8):
@@ -152,7 +152,7 @@ def grey_plane(pixels: NDArray[Any], where: object) -> NDArray[Any]:
 def colour_picture(pixels: NDArray[Any], where: object) -> Picture:
     """An 8-bit RGB picture. Raises InputError for a grey picture or one of another type."""
     if pixels.dtype != np.uint8:
-        raise InputError(f"{where}: {8 * pixels.dtype.itemsize}-bit picture; images must have 8 bits a channel")
+        raise InputError(f"{where}: {8 * pixels.dtype.itemsize}-bit picture; images must have 8 bits per channel")
     if pixels.ndim == 2:
         raise InputError(f"{where}: grey picture; images must be RGB")
     return pixels

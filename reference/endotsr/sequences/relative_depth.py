@@ -6,7 +6,7 @@ matches, in each frame or once for the sequence. Without any, they are assumed: 
 tissue, one line for the sequence. The scale is then free, because the depth loss compares depth divided by its maximum
 (B8), and the shift is an assumption about the shape.
 
-Comes in: a folder in the common format and files of r, one a frame; goes out: depth frame by frame, and a sentence on
+Comes in: a folder in the common format and files of r, one per frame; goes out: depth frame by frame, and a sentence on
 what is assumed.
 """
 
@@ -88,7 +88,7 @@ def fitted_line(relative: FloatArray, depth: FloatArray) -> StraightLine | None:
 def relative_depth(contents: Contents, source: Path, align: Align, farthest: float, trusted: bool) -> MadeDepth:
     """Depth of every frame from the files of r.
 
-    align      one line a frame or for the sequence; auto: a frame where the clip has depth, else the sequence
+    align      one line per frame or for the sequence; auto: a frame where the clip has depth, else the sequence
     farthest   over the nearest depth; read only where the clip has no depth
     trusted    whether the light may contradict the numbers
 

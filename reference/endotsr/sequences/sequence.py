@@ -1,6 +1,6 @@
 """A sequence in memory: the output of every reader and of the simulator, the input of training and evaluation.
 
-Pictures stay 8-bit (one byte a channel); `Sequence.frame` converts one of them on demand. File formats and
+Pictures stay 8-bit (one byte per channel); `Sequence.frame` converts one of them on demand. File formats and
 mask polarities do not occur here: a mask is True on tissue, and a depth of 0 means no depth.
 """
 

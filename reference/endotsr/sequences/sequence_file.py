@@ -4,7 +4,7 @@
     source = "P2_8 (stereomis)"        # where the frames come from, in words
     frames = 120
     unit = "mm"                        # of poses and baseline; um, mm, cm, m or arbitrary
-    frame_rate = 25.0                  # frames a second, on average; 0 = unknown
+    frame_rate = 25.0                  # frames per second, on average; 0 = unknown
     times = [0.0, 0.04, 0.12, ...]     # seconds of the frames, ascending; absent: the frames are evenly spaced
 
     [camera]                           # pixels; the centre of the first pixel is at (0.5, 0.5)
@@ -28,10 +28,10 @@
     [poses]                            # absent: the camera rests at the origin
     direction = "world_to_camera"      # or "camera_to_world"
     axes = "opencv"                    # x right, y down, z forward; or "opengl": x right, y up, z backward
-    matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers a frame
+    matrices = [[r00, r01, r02, t0, r10, ..., t2], ...]   # one row of 12 numbers per frame
 
 Comes in: the file; goes out: `SequenceFile`, or an `InputError` that names the key and what is allowed. The folder
-`images/` holds one picture a frame, `images_right/` the right pictures of a stereo pair.
+`images/` holds one picture per frame, `images_right/` the right pictures of a stereo pair.
 """
 
 from pathlib import Path
@@ -156,11 +156,11 @@ def read_sequence_file(folder: Path) -> SequenceFile:
             " arbitrary (then of one scale), or neither"
         )
     if found.depth and found.depth.assumed and not found.arbitrary:
-        raise InputError(f"{path}: depth.assumed beside unit = {found.unit!r} is not allowed; allowed: 'arbitrary'")
+        raise InputError(f"{path}: depth.assumed with unit = {found.unit!r} is not allowed; allowed: 'arbitrary'")
     for key, entry in (("masks", found.masks), ("depth", found.depth)):
         if entry and not _plain_name(entry.folder):
             raise InputError(
-                f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder beside the file"
+                f"{path}: {key}.folder = {entry.folder!r} is not allowed; allowed: a folder next to the file"
             )
     found.camera.lens(path)
     _check_times(found, path)
@@ -168,11 +168,11 @@ def read_sequence_file(folder: Path) -> SequenceFile:
 
 
 def _check_times(found: SequenceFile, path: Path) -> None:
-    """Raises InputError unless there is one time a frame, and each lies after the one before."""
+    """Raises InputError unless there is one time per frame, and each lies after the one before."""
     if found.times is None:
         return
     if len(found.times) != found.frames:
-        raise InputError(f"{path}: times: {len(found.times)} numbers for {found.frames} frames; allowed: one a frame")
+        raise InputError(f"{path}: times: {len(found.times)} numbers for {found.frames} frames; allowed: one per frame")
     steps = np.diff(found.times)
     if not np.isfinite(found.times).all() or (steps <= 0).any():
         wrong = int(np.flatnonzero(~(steps > 0))[0]) + 1 if steps.size and not (steps > 0).all() else 0
@@ -213,7 +213,7 @@ def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
 
 
 def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPose | None] | None, list[str]]:
-    """As `read_poses`, with None in place of a pose that is none, and the reasons.
+    """As `read_poses`, with None instead of a pose that is none, and the reasons.
 
     Raises:  InputError for their number.
     """

@@ -25,6 +25,6 @@ class SourceOptions:
     depth_unit: Literal["um", "mm", "cm", "m", "arbitrary"] = "mm"
     depth_scale: float = 1.0
     trust_depth: bool = False  # the files of `depth` hold lengths, whatever speaks against it
-    rate: float | None = None  # frames a second of the source; its pictures then count as evenly spaced
+    rate: float | None = None  # frames per second of the source; its pictures then count as evenly spaced
     orientation: Literal["turned", "stored"] | None = None  # of a video that states a rotation
     points: Literal["interpolated", "sparse", "none"] = "interpolated"  # depth from points of a reconstruction

@@ -82,7 +82,7 @@ def pictures_from_files(
 def mask_reader(
     files: list[Path | None], excluded_value: str, width: int, height: int
 ) -> Callable[[int], NDArray[np.bool_] | None]:
-    """Tissue masks from files, one a frame; None where a frame has none.
+    """Tissue masks from files, one per frame; None where a frame has none.
 
     A mask of another size is resized to the nearest pixel if its proportions are those of the picture. Values above
     half of the largest are white, so that 0 and 1 are a mask, and the grey seams of a JPEG belong to their nearer side.
@@ -141,7 +141,7 @@ def numbered(files: list[Path], count: int) -> list[Path | None]:
 
 
 def depth_reader(files: list[Path | None], scale: float) -> Callable[[int], NDArray[np.float32] | None]:
-    """Depth from files, one a frame, in millimetres or the arbitrary unit; None where a frame has none."""
+    """Depth from files, one per frame, in millimetres or the arbitrary unit; None where a frame has none."""
 
     def depth(i: int) -> NDArray[np.float32] | None:
         path = files[i]
@@ -179,7 +179,7 @@ def stated_depth(
 
 
 def with_stated(recording: Recording, options: SourceOptions) -> Recording:
-    """The recording with the masks of `--masks` and the depth of `--depth` in place of its own, if they are stated.
+    """The recording with the masks of `--masks` and the depth of `--depth` instead of its own, if they are stated.
 
     Raises:  InputError for files that do not belong to its frames, or depth in millimetres beside an arbitrary unit.
     """
@@ -188,7 +188,7 @@ def with_stated(recording: Recording, options: SourceOptions) -> Recording:
     frames = [recording.where / f"{name}.png" for name in recording.names]
     masks, depth = stated_masks(options, frames, lens.width, lens.height), stated_depth(options, frames)
     if depth is not None and (options.depth_unit == ARBITRARY) != (recording.unit == ARBITRARY):
-        raise InputError(f"{recording.where}: --depth-unit {options.depth_unit} beside the unit {recording.unit}")
+        raise InputError(f"{recording.where}: --depth-unit {options.depth_unit} with the unit {recording.unit}")
     return replace(
         recording,
         masks=masks or recording.masks,

@@ -143,7 +143,7 @@ def parse_frame_range(text: str, count: int) -> range:
         raise InputError(f"frames {text!r}: the step must be 1 or more")
     for bound in (start, stop):
         if bound is not None and not -count <= bound <= count:
-            raise InputError(f"frames {text!r}: {bound} lies outside the {count} frames of the sequence")
+            raise InputError(f"frames {text!r}: {bound} is outside the {count} frames of the sequence")
     chosen = range(count)[slice(start, stop, step)]
     if len(chosen) < LEAST_FRAMES:
         raise InputError(

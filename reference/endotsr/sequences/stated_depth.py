@@ -33,7 +33,7 @@ LOOKED_AT = 8  # frames
 MATCHED = 128  # px: narrower stereo pairs are not matched
 REMEDY = (
     "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth, a"
-    " relative inverse depth with --kind relative; --trust-depth reads the files as lengths all the same"
+    " relative inverse depth with --kind relative; --trust-depth reads the files as lengths anyway"
 )
 
 
@@ -99,7 +99,7 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
 
 def _refuse_flipped(found: list[Finding], path: Path) -> None:
     for flipped in (f for f in found if f.code == "flipped-depth"):
-        raise InputError(f"{path}: {flipped.what}; {flipped.remedy}; --trust-depth reads the files all the same")
+        raise InputError(f"{path}: {flipped.what}; {flipped.remedy}; --trust-depth reads the files anyway")
 
 
 def _full_scale(stored: list[NDArray[np.float32]]) -> str:

@@ -107,10 +107,10 @@ def poses_of_frames(
             found[int(stamp)] = pose
         return found, "stamps are frame numbers"
     if len(stamps) == count:
-        return list(trajectory.poses), "one pose a frame, in order"
+        return list(trajectory.poses), "one pose per frame, in order"
     if rate is None:
         raise InputError(
-            f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose a frame, frame"
+            f"{trajectory.path}: {len(stamps)} poses with times for {count} frames; allowed: one pose per frame, frame"
             " numbers as stamps, or a known frame rate"
         )
     wanted = stamps[0] + (np.arange(count) / rate if times is None else times)

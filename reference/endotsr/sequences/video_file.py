@@ -41,7 +41,7 @@ class VideoFacts(NamedTuple):
     width: int  # as stored
     height: int
     count: int
-    rate: float | None  # pictures a second on average
+    rate: float | None  # pictures per second on average
     times: NDArray[np.float64] | None  # (count,) seconds from the first picture, ascending; None: not stated
     turn: int  # degrees counter-clockwise by which a player turns the pictures: 0, 90, 180 or 270
     interlaced: bool
@@ -90,7 +90,7 @@ def _remarks(frame: Any, streams: int) -> tuple[str, ...]:
     if streams > 1:
         found.append(f"{streams} streams of pictures: one is read; for a stereo pair, export each as a file of its own")
     if any(part.is_alpha for part in frame.format.components):
-        found.append("its transparency is left out")
+        found.append("its transparency is ignored")
     if int(frame.colorspace) == UNSTATED and not frame.format.is_rgb and frame.height > HIGH_DEFINITION:
         found.append("states no matrix of colour: that of BT.601 is taken, players take BT.709 at this size")
     if int(frame.color_primaries or 0) == BT2020:

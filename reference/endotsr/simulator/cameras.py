@@ -1,4 +1,4 @@
-"""The cameras of a simulated sequence: one a frame, and the right one of a stereo pair."""
+"""The cameras of a simulated sequence: one per frame, and the right one of a stereo pair."""
 
 import numpy as np
 

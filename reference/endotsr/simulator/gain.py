@@ -1,6 +1,6 @@
 """The gain of the camera over time: exposure drift, jumps of the automatic exposure, and their Fourier content.
 
-In: settings and times. Out: one factor a channel, in linear light, which `to_display` encodes for display.
+In: settings and times. Out: one factor per channel, in linear light, which `to_display` encodes for display.
 """
 
 from typing import NamedTuple

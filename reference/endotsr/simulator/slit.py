@@ -44,7 +44,7 @@ def make_slit(settings: SimulatorSettings) -> Slit:
     widest = 2 * LARGEST_STRETCH * part.reach / STEEPEST
     if part.opening > widest:
         raise InputError(
-            f"simulator: cutting.opening = {part.opening:g} folds the tissue beside the slit; allowed: at most"
+            f"simulator: cutting.opening = {part.opening:g} folds the tissue next to the slit; allowed: at most"
             f" {widest:.3g} with cutting.reach = {part.reach:g}"
         )
     if part.start >= part.stop:

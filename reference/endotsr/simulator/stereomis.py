@@ -1,6 +1,6 @@
 """A simulated scene as a raw recording in the layout of StereoMIS, with the truth beside it.
 
-    simulated.mp4             left picture over right, one pair a frame
+    simulated.mp4             left picture over right, one pair per frame
     StereoCalibration.ini     both cameras, OpenCV's convention; R and T of x_right = R x_left + T, millimetres
     groundtruth.txt           frame tx ty tz qx qy qz qw: camera-to-world, metres
     masks/000123l.png         of the left picture, any value above 0 = tissue; only where there are instruments
@@ -26,7 +26,7 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.splatting.camera import camera_centre
 
 VIDEO, CALIBRATION, TRAJECTORY, MASKS = "simulated.mp4", "StereoCalibration.ini", "groundtruth.txt", "masks"
-RATE = 25.0  # frames a second
+RATE = 25.0  # frames per second
 METRE = 1000.0  # millimetres
 
 

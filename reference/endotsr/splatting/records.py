@@ -142,7 +142,7 @@ def gather_footprint_gradients(
     conic_epsilon: float,
     keep_depth: bool,
 ) -> FootprintGrads:
-    """As `gather_gradients`, but by A, m, r of the footprint (3, N) in place of covariance2d."""
+    """As `gather_gradients`, but by A, m, r of the footprint (3, N) instead of covariance2d."""
     n, dtype = determinant.size, records.dtype
     out = FootprintGrads(*(np.zeros(shape, dtype) for shape in ((2, n), (3, n), n, (3, n), n)))
     parallel_for(

@@ -47,7 +47,7 @@ class Twin(NamedTuple):
 
 
 def definition_stages() -> dict[str, Stage]:
-    """Every stage that the definition computes, by name, with its functions in place of the compiled ones.
+    """Every stage that the definition computes, by name, with its functions instead of the compiled ones.
 
     The discrete decisions are those of the compiled stage. Variants that differ in the compiled function only are left
     out.

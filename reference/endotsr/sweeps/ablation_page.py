@@ -146,7 +146,7 @@ def interval_text(found: IncrementRow, of: str, digits: int) -> str:
 
 
 def draw(record: AblationRecord, path: Path, metric: str = "psnr_full") -> None:
-    """Mean differences with their intervals, one line a comparison, one panel a split; crosses are the paper's."""
+    """Mean differences with their intervals, one line per comparison, one panel per split; crosses are the paper's."""
     chosen = [found for found in record["increments"] if found["metric"] == metric]
     splits = list(dict.fromkeys(found["split"] for found in chosen))
     count = max(sum(found["split"] == split for found in chosen) for split in splits)

@@ -1,7 +1,7 @@
 """The runs of a sweep, and what their folders say about them.
 
-In: a checked spec, the folder of the sweep and its sequences. Out: one `Job` a run with its settings, name and folder.
-A job holds all that another process or machine needs to make the run.
+In: a checked spec, the folder of the sweep and its sequences. Out: one `Job` per run with its settings, name and
+folder. A job holds all that another process or machine needs for the run.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ STOP = "sweep.stop"  # a file for which the workers of a sweep look, and end
 
 
 class Beginning(Protocol):
-    """A state that a run begins with in place of the initialisation, made where the run takes place."""
+    """A state that a run begins with instead of the initialisation, made where the run takes place."""
 
     def about(self) -> StartPart:
         """`start` of run.json."""

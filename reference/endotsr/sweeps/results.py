@@ -1,4 +1,4 @@
-"""The table of a sweep: one row a run, as JSON, CSV and Markdown, written anew after every run.
+"""The table of a sweep: one row per run, as JSON, CSV and Markdown, written anew after every run.
 
 In: jobs and what their folders hold. Out: rows of plain values. A row of a finished run is read from its folder; the
 reason of a failed one is kept in results.json alone.

@@ -173,7 +173,7 @@ def _configuration(name: str, values: Any, file: SpecFile, where: str) -> Config
 
 def _changed(config: Config, changes: dict[str, Any], where: str) -> Config:
     if "preset" in changes:
-        raise InputError(f"{where}: settings.preset is not allowed; allowed: preset beside settings")
+        raise InputError(f"{where}: settings.preset is not allowed; allowed: preset next to settings")
     changes = without_former_keys(changes, where, config.training.bridge_fraction)
     refuse_unknown_keys(changes, Config, where)
     return config_from_dict(merged(msgspec.to_builtins(config), changes), where)

@@ -93,7 +93,7 @@ def _refuse_moving(chunks: list[tuple[bytes, bytes]], name: object) -> None:
     """Refuse a moving PNG, of which a decoder shows the first picture."""
     frames = next((int.from_bytes(content[:4], "big") for kind, content in chunks if kind == b"acTL"), 1)
     if frames > 1:
-        raise InputError(f"{name}: holds {frames} pictures; allowed: one picture a file")
+        raise InputError(f"{name}: holds {frames} pictures; allowed: one picture per file")
 
 
 def _palette(chunks: list[tuple[bytes, bytes]], header: PngHeader, name: object) -> list[tuple[bytes, bytes]]:

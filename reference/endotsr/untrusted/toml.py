@@ -40,7 +40,7 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, str):
         return msgspec.json.encode(value).decode()  # a JSON string is a valid TOML basic string
     if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
-        return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line a row
+        return "[\n" + "".join(f"    {_toml_value(row)},\n" for row in value) + "]"  # a matrix: one line per row
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml_value(v) for v in value) + "]"
     return repr(value)

@@ -1,6 +1,6 @@
 """Camera paths around an observed camera, and cameras of a file.
 
-In: the cameras of the frames and a pivot depth. Out: one camera a picture. A path of a static clip shows what the
+In: the cameras of the frames and a pivot depth. Out: one camera per picture. A path of a static clip shows what the
 observed camera cannot: that the scene is three-dimensional. Conventions are those of `splatting.camera`.
 """
 

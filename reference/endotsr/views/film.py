@@ -1,7 +1,7 @@
 """Films: a series of pictures as one mp4, webm or gif file.
 
 In: pictures of one size. Out: a file that appears whole or not at all. mp4 holds H.264, which browsers, PowerPoint and
-QuickTime play (VP9 where there is no encoder); webm holds VP9; a gif has 256 colours a picture and plays everywhere.
+QuickTime play (VP9 where there is no encoder); webm holds VP9; a gif has 256 colours per picture and plays everywhere.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,7 +18,7 @@ from endotsr.untrusted.writing import replace_file
 KINDS = (".mp4", ".webm", ".gif")
 GIF_COLOURS = 256
 PALETTE_FRAMES = 8  # pictures that the colours of a gif are chosen from
-LOWEST, USUAL = 0.1, (1.0, 60.0)  # pictures a second
+LOWEST, USUAL = 0.1, (1.0, 60.0)  # pictures per second
 HUNDREDTHS = 100  # of a second: the unit of time in a gif
 
 
@@ -27,10 +27,11 @@ def check_film(file: Path, rate: float | None = None, slow: float | None = None)
     if file.suffix.lower() not in KINDS:
         raise InputError(f"{file}: not a film; allowed: a name that ends in {', '.join(KINDS)}")
     if rate is not None and slow is not None:
-        raise InputError("render: --rate beside --slow: each of them decides how fast the film is; allowed: one")
+        raise InputError("render: --rate with --slow: each of them sets the speed of the film; allowed: one")
     highest = _highest(file)
     if rate is not None and not LOWEST <= rate <= highest:
-        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: {LOWEST:g} to {highest} pictures a second")
+        allowed = f"{LOWEST:g} to {highest} pictures per second"
+        raise InputError(f"render: --rate {rate:g} is not allowed; allowed: {allowed}")
     if slow is not None and not 0 < slow < float("inf"):
         raise InputError(f"render: --slow {slow:g} is not allowed; allowed: a number > 0")
     if file.suffix.lower() != ".gif":
@@ -44,7 +45,7 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
 
     times      of the pictures, normalised
     duration   seconds from time 0 to time 1; 0 = unknown
-    slow       default: 1, within USUAL pictures a second; 15 a second where times or duration give no speed
+    slow       default: 1, within USUAL pictures per second; 15 per second where times or duration give no speed
 
     Raises: InputError for a speed that is asked for and unknown, or that the film cannot have.
     """
@@ -54,14 +55,14 @@ def film_rate(file: Path, times: list[float], duration: float, slow: float | Non
             unknown = (
                 "its pictures are not in the order of time" if duration else "the recording's frame rate is unknown"
             )
-            raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures a second")
+            raise InputError(f"render: --slow {slow:g}: {unknown}; allowed: --rate, pictures per second")
         return UNKNOWN_RATE
     own = (len(times) - 1) / seconds
     if slow is None:
         return min(max(own, USUAL[0]), min(USUAL[1], _highest(file)))
     if not LOWEST <= own / slow <= _highest(file):
         raise InputError(
-            f"render: --slow {slow:g} is {own / slow:.3g} pictures a second; allowed: --slow from"
+            f"render: --slow {slow:g} is {own / slow:.3g} pictures per second; allowed: --slow from"
             f" {own / _highest(file):.3g} to {own / LOWEST:.3g} with {len(times)} pictures (--count), or --rate"
         )
     return own / slow
@@ -74,7 +75,7 @@ def speed_in_words(times: list[float], duration: float, rate: float) -> str:
 
 
 def _highest(file: Path) -> int:
-    """The highest rate of a film, pictures a second."""
+    """The highest rate of a film, pictures per second."""
     return 50 if file.suffix.lower() == ".gif" else 120
 
 
@@ -82,7 +83,7 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
     """Write a film; returns the number of its pictures.
 
     pictures   (H, W, 3) uint8 RGB, all of one size; an odd side of an mp4 or webm is repeated by one pixel
-    rate       pictures a second; a gif rounds the time of a picture to a hundredth of a second
+    rate       pictures per second; a gif rounds the time of a picture to a hundredth of a second
     Raises: InputError if there is no picture or this FFmpeg cannot encode the film.
     """
     count = 0

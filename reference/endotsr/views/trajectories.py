@@ -1,9 +1,9 @@
 """The moving Gaussians at key times, rounded to few bytes, for the viewer page.
 
-In: a scene and its cameras. Out: 20 bytes a Gaussian and key time (position and log-scale 16 bits, rotation, colour and
-opacity 8 bits), stored as differences between neighbouring key times and compressed. Between two key times the viewer
-interpolates. The colour of a Gaussian is the one in the direction of the observed camera, exposure included; how it
-changes with the direction is not part of the page.
+In: a scene and its cameras. Out: 20 bytes per Gaussian and key time (position and log-scale 16 bits, rotation, colour
+and opacity 8 bits), stored as differences between neighbouring key times and compressed. Between two key times the
+viewer interpolates. The colour of a Gaussian is the one in the direction of the observed camera, exposure included; its
+dependence on the direction is not part of the page.
 """
 
 import zlib

@@ -83,7 +83,7 @@ def window_folder(run: Path, window: Window) -> Path:
 
 
 def make_windows(run: Path, outcomes: Outcomes, reporter: Reporter) -> list[Outcome]:
-    """Train every window that is not finished; returns one outcome a window, in their order.
+    """Train every window that is not finished; returns one outcome per window, in their order.
 
     The job of a warm window is made when its neighbour is trained, whose Gaussians are the most that it may hold.
 

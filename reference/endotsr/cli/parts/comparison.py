@@ -31,22 +31,22 @@ SHOWN = ShownSettings()
 
 @dataclass
 class EvaluateOptions:
-    """Measure a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
+    """Evaluate a run on its held-out frames; write its metrics, pictures, report.html and view.html in its folder.
 
-    Several METHODs are compared on the same held-out frames: means, and differences to the first one frame by frame.
+    Several METHODs are compared on the same held-out frames: means, and differences from the first one frame by frame.
     Each is a run folder that was evaluated, a JSON file of --json, or pictures; NAME=PATH gives it another
-    name. The interval of a difference is a bootstrap over the frames of this clip; it says nothing about others.
+    name. The interval of a difference is a bootstrap over the frames of this clip; it does not cover other clips.
 
-    With --pictures the renders of any method are measured by the same code beside the same baselines, on the sequence
-    of the run or on --sequence. One picture a held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
+    With --pictures the renders of any method are evaluated by the same code with the same baselines, on the sequence
+    of the run or on --sequence. One picture per held-out frame is needed: .png, .tiff or .bmp (8 or 16 bit) or
     .npy (float, display units) in a folder, paired by the names of the frames, by their numbers, or in order; or a
-    video of all frames or of the held-out ones. The run, if one is named, is not changed.
+    video of all frames or of the held-out ones. A named run is not changed.
     """
 
     methods: Annotated[tuple[str, ...], Option("[METHOD ...]", positional=True)] = ()
-    """run folder, or several methods to compare; with --pictures it may be left out"""
+    """run folder, or several methods to compare; optional with --pictures"""
     pictures: Annotated[Path | None, Option("FOLDER|VIDEO")] = None
-    """measure the pictures of this folder or video, not the run"""
+    """evaluate the pictures of this folder or video, not the run"""
     label: Annotated[str, Option("TEXT")] = ""
     """name of the method in the tables (default: the name of the folder)"""
     sequence: Annotated[str | None, Option("SEQUENCE")] = None
@@ -58,13 +58,13 @@ class EvaluateOptions:
     lpips: Annotated[Path | None, Option("FILE")] = None
     """AlexNet LPIPS weights (.npz)"""
     measures: Annotated[tuple[str, ...], Option("NAME")] = ()
-    """measure more of a run, each with rows to compare: depth, flicker, right_view"""
+    """additional measurements, each with reference rows: depth, flicker, right_view"""
     view: bool = True
     """write the viewer page that the report links to, view.html"""
     compare: bool = False
-    """compare a single METHOD with its baselines as several are compared"""
+    """compare a single METHOD with its baselines"""
     baselines: bool = True
-    """compare the baselines of the first METHOD too"""
+    """include the baselines of the first METHOD in a comparison"""
     seed: int = 0
     """seed of the resampling of a comparison"""
     threads: int = 0
@@ -87,7 +87,7 @@ def shown_sequence(command: str, run: Path | None, source: str | None, settings:
 
     if run is not None:
         if settings != SHOWN:
-            raise InputError(f"{command}: --sequence.* beside {run} is not allowed: the run has fixed these settings")
+            raise InputError(f"{command}: --sequence.* with {run} is not allowed: the settings of a run are fixed")
         return load_run_sequence(open_run(run), source)
     if source is None:
         raise InputError(f"{command}: --sequence is missing: the sequence that the pictures show, or a run folder")

@@ -72,7 +72,7 @@ def _outputs(report: Report, status: str) -> list[tuple[CaseReport, OutputReport
 
 
 def _missing(report: Report) -> list[str]:
-    """The names of missing outputs, one line a case, and below it what is there under another name."""
+    """The names of missing outputs, one line per case, and below it what is there under another name."""
     lines: dict[str, list[str]] = {}
     more: dict[str, list[str]] = {}
     for case, output in _outputs(report, "missing"):

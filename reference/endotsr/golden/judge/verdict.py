@@ -20,7 +20,7 @@ from endotsr.golden.judge.relate import relations
 from endotsr.golden.judge.store import Golden
 from endotsr.golden.judge.trajectory import FirstWrong, first_wrong_iteration
 
-NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one a line
+NOT_PORTED = "not_ported.txt"  # in the folder of outputs: operations that the port leaves out, one per line
 INSIDE = "inside"  # in that file: the port has no arrays inside its operations to show
 LARGEST_RELATED = 20_000  # entries of an output for which relations are sought
 MISSING = "missing"  # how the reader of arrays refuses a file that is not there

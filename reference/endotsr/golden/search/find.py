@@ -62,7 +62,7 @@ def explain(golden: Golden, report: Report, outputs: Path, seconds: float = SECO
 
 
 def sentences(trial: Trial) -> list[str]:
-    """The changes that explain most, one a line of the source; nothing where changes in many functions do."""
+    """The changes that explain most, one per line of the source; nothing where changes in many functions do."""
     best: dict[str, Hit] = {}
     for hit in trial.hits:
         if hit.rank[:3] == trial.hits[0].rank[:3]:

@@ -57,7 +57,7 @@ def lens_or_rig(path: Path, width: int, height: int) -> tuple[Lens | None, Rig |
         return lens(found.left, "left"), None
     rotation = checked_rotation(found.rotation, f"{path}: rotation between the cameras")
     if not np.isfinite(found.translation).all() or not found.translation.any():
-        raise InputError(f"{path}: the cameras stand in one place; allowed: a translation between them")
+        raise InputError(f"{path}: both cameras are in one place; allowed: a translation between them")
     return None, Rig(lens(found.left, "left"), lens(found.right, "right"), rotation, found.translation)
 
 

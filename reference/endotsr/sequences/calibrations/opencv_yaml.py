@@ -26,7 +26,7 @@ def read(path: Path, keys: dict[str, Any]) -> StoredCalibration | None:
         if left in keys and right in keys:
             for name in ("R", "T"):
                 if name not in keys:
-                    raise InputError(f"{path}: {name} is missing beside {left} and {right}")
+                    raise InputError(f"{path}: {name} is missing next to {left} and {right}")
             return StoredCalibration(
                 _camera(path, keys, left, left_distortion, size),
                 _camera(path, keys, right, right_distortion, size),

@@ -27,7 +27,7 @@ def camera_findings(cameras: list[Camera], depth: float, where: str) -> list[Fin
     if depth and step > FARTHEST_STEP * depth:
         found.append(finding("pose-unit", where, f"the camera moves {step:.4g} a frame, the depth is {depth:.4g}"))
     if depth and distance > FAR_FROM_ORIGIN * depth:
-        found.append(finding("far-from-origin", where, f"the cameras stand {distance:.3g} from the origin"))
+        found.append(finding("far-from-origin", where, f"the cameras are {distance:.3g} from the origin"))
     return found
 
 

@@ -34,7 +34,7 @@ def guarded(
     """Notes on what the checks of pictures, depth and cameras find.
 
     images   the files of the frames, in time order
-    facts    of pictures and of depth, one a frame
+    facts    of pictures and of depth, one per frame
     seconds  of the frames, where they are not evenly spaced
     assumed  what is not measured of the depth
 

@@ -2,7 +2,7 @@
 
 0_color.png ...       1350x1080, of an omnidirectional camera (Scaramuzza); straightened here to a pinhole camera
 0000_depth.tiff ...   16 bits, 65535 = 100 mm along the optical axis; 0 and 65535 = none
-pose.txt              16 numbers a line, the transposed camera-to-world matrix, millimetres, OpenCV axes
+pose.txt              16 numbers per line, the transposed camera-to-world matrix, millimetres, OpenCV axes
 """
 
 from collections.abc import Iterator
@@ -82,7 +82,7 @@ def open_c3vd(path: Path, options: SourceOptions) -> Recording:
     files, planes = (sorted(path.glob(f"*{end}"), key=number) for end in (COLOUR, DEPTH))
     poses, maps = read_poses(path / POSES), pinhole_maps()
     if len(poses) != len(files):
-        raise InputError(f"{path / POSES}: {len(poses)} poses for {len(files)} pictures; allowed: one a picture")
+        raise InputError(f"{path / POSES}: {len(poses)} poses for {len(files)} pictures; allowed: one per picture")
     paired = beside(files, planes) if planes else []
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:

@@ -1,4 +1,4 @@
-"""Hamlyn, rectified by Endo-Depth-and-Motion: one folder a clip, `rectified01` and so on.
+"""Hamlyn, rectified by Endo-Depth-and-Motion: one folder per clip, `rectified01` and so on.
 
 color/ or image01/   left pictures, jpg or png
 image02/             right pictures (optional); their baseline is not in the folder

@@ -1,4 +1,4 @@
-"""A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one a frame, alone or as stereo pairs.
+"""A plain folder of pictures, or one picture: png, jpg, tiff, webp or bmp, one per frame, alone or as stereo pairs.
 
 A folder with `left/` and `right/` (or `images/` and `images_right/`, `image_0/` and `image_1/`, `cam0/` and `cam1/`),
 or with `000_left.png` beside `000_right.png` (or `000_l.png`, `left_000.png`), is a stereo recording.

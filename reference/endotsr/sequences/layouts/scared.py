@@ -2,7 +2,7 @@
 
 endoscope_calibration.yaml        OpenCV: M1 D1 M2 D2 R T, millimetres (camera_calibration.yaml in some copies)
 data/rgb.mp4                      left over right
-data/frame_data.tar.gz            or data/frame_data/: one JSON a frame, camera-pose (4x4), world-to-camera, mm
+data/frame_data.tar.gz            or data/frame_data/: one JSON per frame, camera-pose (4x4), world-to-camera, mm
 
 Depth of the structured light belongs to pictures that are not rectified and is not read; `endotsr depth` matches pairs.
 """

@@ -1,7 +1,8 @@
 """TUM RGB-D folders: `rgb.txt`, `rgb/`, and optionally `depth.txt`, `depth/` and `groundtruth.txt`.
 
-`rgb.txt` and `depth.txt` hold one line a picture, `time file`; `groundtruth.txt` is a trajectory in seconds and metres,
-camera-to-world. Depth is stored in 5000 steps a metre. Pictures, depth and poses belong together within 0.02 s.
+`rgb.txt` and `depth.txt` hold one line per picture, `time file`; `groundtruth.txt` is a trajectory in seconds and
+metres, camera-to-world. Depth is stored in 5000 steps per metre. Pictures, depth and poses belong together within
+0.02 s.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A video file: one picture a frame, or stereo pairs side by side or stacked."""
+"""A video file: one picture per frame, or stereo pairs side by side or stacked."""
 
 from collections.abc import Iterator
 from pathlib import Path

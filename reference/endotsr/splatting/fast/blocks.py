@@ -11,7 +11,7 @@ order of gain:
 * The lane loop is vector code: the pixels of a block stand side by side in flat planes (`compositing_tiles`), never
   across two cache lines, and the sums of a loop are local arrays in registers (`vectors`), which need no guards and no
   reloads.
-* Terms that depend only on the lane and on the row of blocks are computed once a Gaussian (`_lane_tables`).
+* Terms that depend only on the lane and on the row of blocks are computed once per Gaussian (`_lane_tables`).
 * Records are prefetched some pairs ahead: depth order is random in memory, and each would be a cache miss.
 * log2(opacity) and log2(e) are folded into the exponent: alpha is a bare 2^x.
 * The sign of T, or T = 0, marks a finished pixel: the lane loop has selects and no branches.
