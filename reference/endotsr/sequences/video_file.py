@@ -225,7 +225,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             raise InputError(f"{path}: not a video by its first bytes; allowed: {', '.join(VIDEO_ENDINGS)}")
         file.seek(0)
         try:
-            options: dict[str, Any] = _metadata_ignored(av.__version__)
+            options: Any = _metadata_ignored(av.__version__)
             container = av.open(file, "r", **options)
         except (av.error.FFmpegError, ValueError, MemoryError) as error:
             raise InputError(f"{path}: not a video that can be decoded: {plain_line(str(error))}") from None

@@ -47,8 +47,10 @@ def _toml_value(value: Any) -> str:
 
 
 def by_key(settings: Any) -> dict[str, Any]:
-    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. {} for anything else."""
+    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. Else {}."""
     found: dict[str, Any] = {}
     for name, values in settings.items() if isinstance(settings, dict) else ():
-        found |= {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
+        found |= (
+            {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
+        )
     return found
