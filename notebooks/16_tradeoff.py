@@ -31,11 +31,10 @@ from endotsr.config import ModelConfig
 from endotsr.fitting.model import scene_at, spectral_from
 from endotsr.scene import workload
 from endotsr.splatting.render import render_forward
-from endotsr.tradeoff.study import Ranked, non_dominated
 from endotsr.tradeoff.measure import errors, frame, prepare, seconds
 from endotsr.tradeoff.scenes import StudyScene
 from endotsr.tradeoff.settings import ACCURATE, CLOSE, Setting
-from endotsr.tradeoff.study import reference_setting
+from endotsr.tradeoff.study import Ranked, non_dominated, reference_setting
 
 # %% tags=["hide-input"] mystnb={"code_prompt_show": "Set-up of the examples", "code_prompt_hide": "Hide the set-up"}
 SMALL = os.environ.get("ENDOTSR_NOTEBOOK_SIZE") == "small"

@@ -7,8 +7,7 @@ import bench_peers
 
 from endotsr.bench.clock import REST
 from endotsr.errors import InputError
-from endotsr.report.tables import markdown
-from endotsr.report.tables import memory
+from endotsr.report.tables import markdown, memory
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of

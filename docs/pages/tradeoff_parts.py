@@ -3,9 +3,15 @@
 from typing import Any
 
 from tradeoff_dials import OMITTED
-from tradeoff_text import judge_presets
-from tradeoff_text import advice, eight_bit_setting, error_over_cutoff, float32_floor
-from tradeoff_text import summary, training_rows
+from tradeoff_text import (
+    advice,
+    eight_bit_setting,
+    error_over_cutoff,
+    float32_floor,
+    judge_presets,
+    summary,
+    training_rows,
+)
 
 from endotsr.report.tables import markdown
 from endotsr.tradeoff.text import COLUMNS, front_rows, levels, made

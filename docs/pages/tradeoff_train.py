@@ -7,8 +7,8 @@ import argparse
 from pathlib import Path
 
 import msgspec
-from tradeoff_training import run_training_study
 from tradeoff_text import training_lines
+from tradeoff_training import run_training_study
 
 from endotsr.cli.parts.progress import StepBar
 from endotsr.config import PRESETS, config_from_dict

@@ -13,8 +13,8 @@ from endotsr.cli.main import main
 from endotsr.kernels.threads import use_threads
 from endotsr.opencv import read_png
 from endotsr.report.run_text import held_out_table
-from endotsr.views.pictures import depth_bytes, depth_step
 from endotsr.runs.files import os_error_line, write_json
+from endotsr.views.pictures import depth_bytes, depth_step
 
 CALIBRATE = ("train", "--calibrate-only", "--out")
 

@@ -9,7 +9,9 @@ import pytest
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
 
-@pytest.mark.parametrize("study, name", [(study, name) for study, about in levers.STUDIES.items() for name in about.tables])
+@pytest.mark.parametrize(
+    "study, name", [(study, name) for study, about in levers.STUDIES.items() for name in about.tables]
+)
 def test_a_table_of_the_levers_is_what_the_result_says(study, name):
     about = levers.STUDIES[study]
     found = json.loads(about.file.read_text(encoding="utf-8"))

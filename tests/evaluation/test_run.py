@@ -1,11 +1,10 @@
 """The evaluation of a whole run: what it keeps, and what the report shows of it."""
 
-import numpy as np
-import pytest
-
 from collections import Counter
 from types import SimpleNamespace
 
+import numpy as np
+import pytest
 from made_up_sequence import made_up
 
 from endotsr.evaluation import run

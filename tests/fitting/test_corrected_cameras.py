@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from endotsr.equations.pose import pose_forward, pose_reverse
-from endotsr.fitting.model import camera_at, corrected_cameras, with_corrected_cameras, with_pose_correction, with_pose_correction_reverse
+from endotsr.fitting.model import (
+    camera_at,
+    corrected_cameras,
+    with_corrected_cameras,
+    with_pose_correction,
+    with_pose_correction_reverse,
+)
 from endotsr.scene.parameters import FrameParameters, Pose, pose_at
 from endotsr.scene.workload import sequence as made_up_sequence
 from endotsr.splatting.camera import CameraGrads

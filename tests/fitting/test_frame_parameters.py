@@ -25,7 +25,13 @@ from endotsr.evaluation.run import measure_model
 from endotsr.export.model import load_slim_model, save_slim_model
 from endotsr.fitting import model as model_module
 from endotsr.fitting.checkpoint import load_checkpoint
-from endotsr.fitting.model import corrected_cameras, render_at, spectral_from, with_corrected_cameras, with_pose_correction
+from endotsr.fitting.model import (
+    corrected_cameras,
+    render_at,
+    spectral_from,
+    with_corrected_cameras,
+    with_pose_correction,
+)
 from endotsr.fitting.state import new_training, save_state, state_from_checkpoint, training_constants
 from endotsr.fitting.trainer import train, training_step
 from endotsr.runs.model import Model

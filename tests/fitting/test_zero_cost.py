@@ -8,7 +8,7 @@ from endotsr.effects.plan import with_setting
 from endotsr.effects.savings import numbers_of_a_gaussian
 from endotsr.equations import laplacian
 from endotsr.equations.laplacian import support_masks
-from endotsr.fitting.model import with_exposure, with_exposure_reverse, scene_at, spectral_from
+from endotsr.fitting.model import scene_at, spectral_from, with_exposure, with_exposure_reverse
 from endotsr.fitting.objective import (
     LossWeights,
     depth_term,

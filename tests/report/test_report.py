@@ -134,7 +134,17 @@ def test_tables_hold_the_numbers(page):
     words = " ".join(Reader(page).words)
     for word in ("This model", "Blend of two", "Temporal mean", "30.25", "32.05", "0.9671"):
         assert word in words, word
-    for word in ("without A", "29.50", "-0.50 dB", "Seed", "two cores", 'preset = "paper"', "ab" * 32, "numpy 2.1", "1:01"):
+    for word in (
+        "without A",
+        "29.50",
+        "-0.50 dB",
+        "Seed",
+        "two cores",
+        'preset = "paper"',
+        "ab" * 32,
+        "numpy 2.1",
+        "1:01",
+    ):
         assert word in words, word
     assert page.count("<table") == 4
 

@@ -82,7 +82,10 @@ REFUSED = {
         'configurations.A.start = { configuration = "A", iteration = -6 }',
         "start.iteration = -6 is not allowed; allowed: an integer >= 1",
     ),
-    "no configuration": ("configurations = {}", "configurations = {} is not allowed; allowed: a table of keys, at least 1"),
+    "no configuration": (
+        "configurations = {}",
+        "configurations = {} is not allowed; allowed: a table of keys, at least 1",
+    ),
     "configuration": ("configurations.A = 3", "configurations.A = 3 is not allowed; allowed: a table of keys"),
     "no such start": ('configurations.A.start = { configuration = "B", iteration = 3 }', "allowed: A"),
     "chain": (

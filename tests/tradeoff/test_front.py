@@ -7,8 +7,7 @@ import pytest
 from made_up import moving_scene
 from tradeoff_text import KEPT, dominates, judge_presets
 
-from endotsr.tradeoff.study import Ranked, non_dominated
-from endotsr.tradeoff.study import run_study
+from endotsr.tradeoff.study import Ranked, non_dominated, run_study
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 

@@ -1,13 +1,10 @@
 """`endotsr evaluate`: the held-out metrics of a run or of any pictures beside baselines, and of several methods."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, cast
 
-from endotsr.cli.parts.fields import Option
-from endotsr.cli.parts.parser import parse
-from endotsr.cli.parts.result import JsonFile
 from endotsr.cli.parts.comparison import SHOWN, EvaluateOptions, compare_methods, shown_sequence
+from endotsr.cli.parts.parser import parse
 from endotsr.errors import InputError
 from endotsr.runs.files import write_json
 from endotsr.runs.folder import RunFolder, open_run

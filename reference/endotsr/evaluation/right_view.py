@@ -147,7 +147,7 @@ def _frame(
 
 
 def _right_pictures(folder: Path, sequence: Sequence, settings: SequenceConfig) -> Callable[[int], NDArray[np.uint8]]:
-    """Frame number -> right picture (3, H, W) in the size of the sequence; InputError if it is unreadable or smaller."""
+    """Frame number -> right picture (3, H, W) in the size of the sequence; InputError if unreadable or smaller."""
     from endotsr.opencv import area_resize
     from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
     from endotsr.sequences.files import list_pictures

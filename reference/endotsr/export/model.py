@@ -58,7 +58,10 @@ def save_slim_model(path: Path, model: Model, record: SequenceRecord) -> None:
     }
     entries = {f"gaussians.{name}": a for name, a in arrays(model.gaussians).items()}
     entries |= {f"frames.{name}": a for name, a in trained(exposures).items()}
-    stored = {name: a.astype(np.float32) if name in KEPT_WHOLE else np.clip(a, HALF.min, HALF.max).astype(np.float16) for name, a in entries.items()}
+    stored = {
+        name: a.astype(np.float32) if name in KEPT_WHOLE else np.clip(a, HALF.min, HALF.max).astype(np.float16)
+        for name, a in entries.items()
+    }
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
 
     def write(temporary: Path) -> None:

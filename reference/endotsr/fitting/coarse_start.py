@@ -17,7 +17,7 @@ from endotsr.config import Config
 from endotsr.equations.calibration import calibration_views
 from endotsr.equations.laplacian import laplacian_levels, support_masks
 from endotsr.fitting.model import camera_at, render_at
-from endotsr.fitting.state import TrainingState, TrainingConstants, training_constants
+from endotsr.fitting.state import TrainingConstants, TrainingState, training_constants
 from endotsr.losses.masked_l1 import masked_l1_forward
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.smaller import halved

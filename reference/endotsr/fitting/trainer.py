@@ -21,13 +21,13 @@ from endotsr.fitting.fused.step import optimise
 from endotsr.fitting.model import (
     SceneGrads,
     SceneSaved,
-    with_pose_correction,
-    with_pose_correction_reverse,
-    with_exposure,
-    with_exposure_reverse,
     raster_settings,
     scene_at,
     scene_reverse,
+    with_exposure,
+    with_exposure_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
 )
 from endotsr.fitting.objective import ImageLoss, LossWeights, Targets, calibrate_on, image_loss
 from endotsr.fitting.records import LogEntry, RngState
@@ -42,7 +42,7 @@ from endotsr.fitting.schedules import (
     smoothness_active,
     statistics_active,
 )
-from endotsr.fitting.state import TrainingState, TrainingConstants, check_state, new_training, training_constants
+from endotsr.fitting.state import TrainingConstants, TrainingState, check_state, new_training, training_constants
 from endotsr.kernels.arrays import FloatArray
 from endotsr.kernels.threads import parallel_calls
 from endotsr.kernels.timer import NO_TIMER, Timer, timed
@@ -202,7 +202,12 @@ def _optimise(
 
 
 def _optimise_frames(
-    state: TrainingState, constants: TrainingConstants, view: View, d_exposure: Exposure | None, d_pose: Pose | None, iteration: int
+    state: TrainingState,
+    constants: TrainingConstants,
+    view: View,
+    d_exposure: Exposure | None,
+    d_pose: Pose | None,
+    iteration: int,
 ) -> None:
     """One Adam step of the parameters of frames: of all columns, with gradient 0 for the frames that were not seen."""
     if state.frames is None:

@@ -19,13 +19,13 @@ from endotsr.equations.deformation import deformation_reverse
 from endotsr.equations.matern import matern_penalty_forward, matern_penalty_reverse
 from endotsr.fitting.model import (
     Spectral,
-    with_pose_correction,
-    with_pose_correction_reverse,
-    with_exposure,
-    with_exposure_reverse,
     raster_settings,
     scene_at,
     scene_reverse,
+    with_exposure,
+    with_exposure_reverse,
+    with_pose_correction,
+    with_pose_correction_reverse,
 )
 from endotsr.fitting.objective import LossWeights, Targets, image_loss
 from endotsr.kernels.arrays import FloatArray

@@ -1,8 +1,8 @@
 """Measured numbers as text: a comparison of methods for the terminal, and CSV for a spreadsheet or a plot.
 
 In: the dictionary of metrics.json, or the rows of `evaluation.compare.compare`. Out: a table of means and paired
-differences; or a CSV file (RFC 4180, `.` in numbers, an empty cell for no value), one row a method and frame or a method
-and metric, whose numbers keep every digit, so that they read back as the same numbers.
+differences; or a CSV file (RFC 4180, `.` in numbers, an empty cell for no value), one row a method and frame or a
+method and metric, whose numbers keep every digit, so that they read back as the same numbers.
 """
 
 import csv

@@ -110,7 +110,9 @@ def _training(inputs: Inputs, settings: Settings) -> tuple[Found, None]:
     gaussians = Gaussians(**{name: a.copy() for name, a in arrays(gaussians_of(inputs)).items()})
     constants = training_constants(sequence, config)
     given = config.loss.lambda_lap
-    weight = calibrate_on(gaussians, constants.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
+    weight = (
+        calibrate_on(gaussians, constants.spectral, sequence, config).lambda_lap if given == "auto" else float(given)
+    )
     tape: Any = Tape(inputs["frame_order"], inputs["split_noise"])
     state = TrainingState(gaussians, adam_state(arrays(gaussians)), 0, tape, empty_statistics(gaussians.count), weight)
     log = [training_step(state, constants) | _sizes(state) for _ in range(config.training.iterations)]

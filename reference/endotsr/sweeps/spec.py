@@ -72,7 +72,7 @@ class SpecFile(Section, frozen=True, kw_only=True):
     iterations: Iteration | None = None
     lpips: Text | None = None
     keep_checkpoints: bool = True
-    settings: dict[str, Any] = {}
+    settings: dict[str, Any] = msgspec.field(default_factory=dict)
     simulator: SimulatorSettings = SimulatorSettings()
     configurations: Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
 

@@ -89,7 +89,8 @@ def write_film(file: Path, pictures: Iterable[ByteImage], rate: float) -> int:
 
     def counted() -> Iterator[ByteImage]:
         nonlocal count
-        for count, picture in enumerate(pictures, start=1):
+        for picture in pictures:
+            count += 1
             yield picture
 
     if file.suffix.lower() == ".gif":

@@ -16,10 +16,10 @@ from endotsr.runs.folder import open_run, refuse_existing
 from endotsr.runs.log import last_entry, last_iteration
 from endotsr.sequences.splits import split_frames
 from endotsr.simulator.settings import SimulatorSettings
-from endotsr.sweeps.place import Size
 from endotsr.sweeps.execute import FAILED, FINISHED, Outcome
 from endotsr.sweeps.jobs import Job, finished_folder
 from endotsr.sweeps.locks import file_lock
+from endotsr.sweeps.place import Size
 from endotsr.sweeps.sweep import Outcomes, Reporter, Watch, as_they_end
 from endotsr.untrusted.writing import replacing_folder
 from endotsr.windows.carry import CarriedStart

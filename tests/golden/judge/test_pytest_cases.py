@@ -1,4 +1,4 @@
-"""One pytest test a case for ports in Python: a right port, a wrong one, one that is not finished, and known failures."""
+"""Ports in Python, one test a case: a right one, a wrong one, one that is not finished, and known failures."""
 
 import textwrap
 

@@ -6,7 +6,7 @@ gives the length of the run gives it exactly: `config.merged`.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
@@ -21,6 +21,7 @@ from endotsr.config import (
 )
 from endotsr.errors import InputError
 from endotsr.untrusted.toml import by_key, read_toml
+
 
 @dataclass
 class Sources:
