@@ -72,7 +72,8 @@ def plain_step(state, constants):
     loss, o = config.loss, config.optimiser
     weights = LossWeights(loss.ssim_weight, loss.depth_weight, loss.smoothness_weight, state.lambda_lap)
     view = view_gradients(
-        state.gaussians, constants.spectral, constants.targets_of(index), weights, config, constants.sequence.cameras[index], t,
+        state.gaussians, constants.spectral, constants.targets_of(index), weights, config,
+        constants.sequence.cameras[index], t,
         exposure=exposure_of(state.frames, column), pose=pose_at(state.frames, t), degree=min(3, iteration // 2),
     )  # fmt: skip
     gradients = dict(view.gradients)
