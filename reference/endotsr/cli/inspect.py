@@ -13,6 +13,8 @@ from endotsr.errors import InputError
 from endotsr.runs.files import write_json
 from endotsr.untrusted.writing import replace_text
 
+SHORT = ("sequence.scale", "sequence.frames", "sequence.masks")
+
 
 @dataclass
 class InspectOptions:
@@ -32,9 +34,7 @@ class InspectOptions:
     """frames per second (default: those of the recording, if known); rates are then also given per minute"""
     config: Annotated[Path | None, Option("FILE.toml")] = None
     """settings to start from"""
-    settings: Annotated[Config, Option(flat=True, short=("sequence.scale", "sequence.frames", "sequence.masks"))] = (
-        PAPER
-    )
+    settings: Annotated[Config, Option(flat=True, short=SHORT)] = PAPER
 
 
 def run(words: list[str]) -> int:

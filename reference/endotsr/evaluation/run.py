@@ -75,7 +75,7 @@ def measure_model(
     weights: LpipsWeights | None = None,
     true_positions: TruePositions | None = None,
 ) -> tuple[EvaluationRecord, RenderFrame]:
-    """The part of metrics.json that needs no run folder, and the render of a held-out frame (the last are kept).
+    """The part of metrics.json that needs no run folder, and the render of a held-out frame; the last are kept.
 
     weights         None: the LPIPS values are None
     true_positions  of a simulated sequence: the motion is measured too

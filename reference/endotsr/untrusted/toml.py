@@ -47,10 +47,9 @@ def _toml_value(value: Any) -> str:
 
 
 def by_key(settings: Any) -> dict[str, Any]:
-    """`section.key` -> value of settings as plain data; a key outside of a section stands alone. Else {}."""
-    found: dict[str, Any] = {}
+    """`section.key` -> value of plain tables; a key outside of a section stands alone. {} for anything else."""
+    found = {}
     for name, values in settings.items() if isinstance(settings, dict) else ():
-        found |= (
-            {f"{name}.{key}": value for key, value in values.items()} if isinstance(values, dict) else {name: values}
-        )
+        inside = isinstance(values, dict)
+        found |= {f"{name}.{key}": value for key, value in values.items()} if inside else {name: values}
     return found

@@ -58,7 +58,7 @@ def parse_known(options: type[T], words: list[str]) -> T:
 
 
 def given_keys(options: type, words: list[str]) -> frozenset[str]:
-    """Keys of the options that words name: `model.bases` for `--model.bases 9`, `sequence.scale` for `--scale 3`."""
+    """Keys of the options that words name: `model.bases` for `--model.bases 9`, `sequence.scale` for `--scale 1`."""
     fields = fields_of(options)
     named = {field.path: field.key for field in fields}
     return frozenset(named[path] for path in _given(fields, words)[0])
