@@ -145,7 +145,7 @@ def _values(trial: Trial, spot: Spot, mode: str, late: list[int] | None = None) 
         if late is None or np.asarray(value).dtype.kind != "f":
             return value
         changed = True
-        return value * (1 + START)
+        return np.multiply(value, 1 + START)
 
     spot.place.module.__dict__["_seen"] = seen
     with contextlib.suppress(Exception):
