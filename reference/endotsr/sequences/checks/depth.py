@@ -114,9 +114,9 @@ def mark_finding(facts: list[DepthFacts], where: str) -> list[Finding]:
     found = [fact for fact in facts if fact.at_highest > MARKED and fact.highest > MARK * fact.median]
     if not found or len(found) <= len(facts) / 2:
         return []
-    share = float(np.mean([fact.at_highest for fact in found]))
+    fraction = float(np.mean([fact.at_highest for fact in found]))
     times = float(np.mean([fact.highest / fact.median for fact in found]))
-    stored = f"{share:.1%} of the pixels hold {found[0].stored_highest:g}"
+    stored = f"{fraction:.1%} of the pixels hold {found[0].stored_highest:g}"
     return [finding("marked-depth", where, f"{stored}, {times:.3g} times the median depth")]
 
 
