@@ -66,7 +66,7 @@ def add(folders: list[Path], name: str) -> None:
 
 def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
     """The means of every row over its seeds, by ascending time."""
-    numbers = ("iterations", "gaussians", "seconds", "peak_memory_bytes", *METRICS)
+    numbers = ("threads", "iterations", "gaussians", "seconds", "peak_memory_bytes", *METRICS)
     means = {name: {key: mean(run[key] for run in runs) for key in numbers} for name, runs in result["rows"].items()}
     return dict(sorted(means.items(), key=lambda row: row[1]["seconds"]))
 
@@ -74,9 +74,9 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
 def table(result: dict[str, Any]) -> str:
     """One training a row, then the baselines and the published numbers."""
     names = [name for name, _ in METRICS.values()]
-    headings = ["Training", "Seeds", "Minutes", "Iterations", "Gaussians", "GB", *names]
+    headings = ["Training", "Threads", "Minutes", "Iterations", "Gaussians", "GB", *names]
     rows = [
-        [f"`{name}`", str(len(result["rows"][name])), f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
+        [f"`{name}`", f"{row['threads']:.0f}", f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
          f"{row['gaussians']:.0f}", f"{row['peak_memory_bytes'] / 1e9:.1f}",
          *(form.format(row[key]) for key, (_, form) in METRICS.items())]
         for name, row in ordered(result).items()
@@ -89,14 +89,12 @@ def table(result: dict[str, Any]) -> str:
 
 
 def about(result: dict[str, Any]) -> str:
-    """Clip, threads, machine and days."""
+    """Clip, processor and the last day."""
     runs = [run for rows in result["rows"].values() for run in rows]
     clip = result["clip"]
     return (
         f"{clip['name']}, {clip['frames']} frames of {clip['size']}, held out: every eighth frame; "
-        f"{', '.join(sorted({str(run['threads']) for run in runs}))} thread of "
-        f"{', '.join(sorted({run['processor'] for run in runs}))}, with other work on the machine; "
-        f"{min(run['date'] for run in runs)} to {max(run['date'] for run in runs)}."
+        f"{', '.join(sorted({run['processor'] for run in runs}))}; {max(run['date'] for run in runs)}."
     )
 
 
@@ -112,8 +110,8 @@ def draw(result: dict[str, Any], path: Path) -> None:
             axes.axhline(row[key], color=GREY, linewidth=1, linestyle="--")
             axes.annotate(name, (1.0, row[key]), xycoords=("axes fraction", "data"), xytext=(-4, 2),
                           textcoords="offset points", ha="right", fontsize=8, color=GREY)  # fmt: skip
-        ticks = (1, 2, 4, 8, 16)
-        axes.set(xscale="log", xlim=(0.9, 24), xticks=ticks, xticklabels=[str(n) for n in ticks])
+        ticks = (1, 2, 4, 8, 16, 32)
+        axes.set(xscale="log", xlim=(0.9, 50), xticks=ticks, xticklabels=[str(n) for n in ticks])
         axes.minorticks_off()
         name_axes(axes, "minutes of training", METRICS[key][0])
         plain_axes(axes)

@@ -30,7 +30,7 @@ def test_row_is_the_mean_of_its_runs_and_the_time_that_of_the_iterations(tmp_pat
     monkeypatch.setattr(minutes, "FILE", tmp_path / "minutes.json")
     minutes.add([run(tmp_path / "a", "clip", 30.0), run(tmp_path / "b", "clip", 32.0)], "sharp")
     result = json.loads(minutes.FILE.read_text())
-    assert "| `sharp` | 2 | 1.5 | 2 | 5 | 1.0 | 31.00 | 0.9000 | 0.1000 |" in minutes.table(result)
+    assert "| `sharp` | 1 | 1.5 | 2 | 5 | 1.0 | 31.00 | 0.9000 | 0.1000 |" in minutes.table(result)
     assert "/somewhere" not in minutes.FILE.read_text()
     with pytest.raises(InputError, match="allowed: the clip of the other rows"):
         minutes.add([run(tmp_path / "c", "other", 30.0)], "other")
