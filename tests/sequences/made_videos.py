@@ -1,5 +1,8 @@
 """Videos with real codecs, as cameras and recorders leave them: interlaced, uneven in time, turned."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 
@@ -35,6 +38,22 @@ def woven(count: int = 12) -> list[Picture]:
     return found
 
 
+@contextmanager
+def own_scheduling() -> Iterator[None]:
+    """Take back the real-time scheduling class that the encoder SVT-AV1 gives to the thread of its caller.
+
+    It does so where the user may (root in a container), and each process that the tests start later would inherit it.
+    """
+    if not hasattr(os, "sched_getscheduler"):
+        yield
+        return
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, *before)
+
+
 def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int = 25, milliseconds=None, **more) -> Path:
     """A video.
 
@@ -42,7 +61,7 @@ def write(path: Path, frames: list[Picture], codec: str = "libx264", rate: int =
     more          `options` of the encoder, those of the `container`, `layout` (pixel format), `shape` (of a pixel),
                   `transfer` (function), `primaries` (of colour)
     """
-    with av.open(str(path), "w", options=more.get("container") or {}) as container:
+    with own_scheduling(), av.open(str(path), "w", options=more.get("container") or {}) as container:
         stream = container.add_stream(codec, rate=1000 if milliseconds else rate, options=more.get("options") or {})
         stream.width, stream.height = frames[0].shape[1], frames[0].shape[0]
         stream.pix_fmt = more.get("layout") or "yuv420p"

@@ -1,5 +1,7 @@
 """Videos: what they hold, decoded or refused, and never another picture, time or orientation in silence."""
 
+import os
+
 import av
 import numpy as np
 import pytest
@@ -154,6 +156,8 @@ def test_av1_and_other_codecs_are_read(tmp_path):
         facts = video_facts(tmp_path / name)
         assert (facts.count, facts.width, facts.height) == (8, WIDTH, HEIGHT), name
         assert all(apart(a, b) < CLOSE for a, b in zip(video_pictures(tmp_path / name, list(range(8))), frames)), name
+    if hasattr(os, "sched_getscheduler"):
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER, "an encoder left this process in a real-time class"
 
 
 def test_high_dynamic_range_is_refused(tmp_path):
