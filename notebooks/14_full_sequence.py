@@ -396,7 +396,7 @@ SimpleNamespace(_repr_html_=lambda: picture)
 #
 # With every eighth frame held out, the preset `quick` is 2.2 dB above the blend of the two neighbours there, and
 # `paper` is 0.6 dB above it. On a recorded clip with little noise, the preset `paper` is 1.5 dB below that blend, and
-# `sharp` is 0.8 dB above it. The blend adds its own noise, and smears moving tissue, so it is strong on a clip with
+# `sharp` is 0.9 dB above it. The blend adds its own noise, and smears moving tissue, so it is strong on a clip with
 # little noise and motion. The worst frame of `paper` shows the same fault as the blend. Every vessel appears twice,
 # because the model fades one training frame into the next and does not move the vessel between them:
 #

@@ -62,9 +62,11 @@ def test_evaluate_refuses_what_it_cannot_measure(finished_run, flow_pictures, tm
     run, pictures = str(finished_run), str(flow_pictures)
     assert_refused(capsys, ["evaluate"], "evaluate: RUN is missing", "--pictures FOLDER")
     assert_refused(capsys, ["evaluate", "--pictures", pictures], "--sequence is missing")
-    assert_refused(capsys, ["evaluate", run, "--sequence.scale", "0.5"], "--sequence.*", "the run has fixed")
+    assert_refused(
+        capsys, ["evaluate", run, "--sequence.scale", "0.5"], "--sequence.*", "the settings of a run are fixed"
+    )
     words = ["evaluate", run, "--pictures", pictures]
-    assert_refused(capsys, [*words, "--sequence.scale", "0.5"], "--sequence.*", "the run has fixed")
+    assert_refused(capsys, [*words, "--sequence.scale", "0.5"], "--sequence.*", "the settings of a run are fixed")
     assert_refused(capsys, [*words, "--csv", str(tmp_path / "no" / "m.csv")], "m.csv: cannot be written")
     assert_refused(capsys, [*words[:-1], str(tmp_path)], f"{tmp_path}: holds no picture")
 

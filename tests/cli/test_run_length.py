@@ -1,7 +1,7 @@
 """The length of a run is exactly what a user gives; only where nobody gives it does it follow the number of frames.
 
-Expected lengths are written out, not computed: `sharp` has 3000 iterations, or 64 for each training frame where these
-are more. 55 frames make 3520, and 47 make 3008, the least number of frames that makes a run longer.
+Expected lengths are written out, not computed: `sharp` has 3000 iterations, or 72 for each training frame where these
+are more. 55 frames make 3960, and 42 make 3024, the least number of frames that makes a run longer.
 """
 
 import msgspec
@@ -19,8 +19,8 @@ from endotsr.runs.folder import open_run
 from endotsr.sweeps.jobs import jobs_of
 from endotsr.sweeps.spec import read_spec, spec_of
 
-GIVEN = (2999, 3000, 3001, 3520)
-FRAMES = (20, 47, 55, 100)
+GIVEN = (2999, 3000, 3001, 3960)
+FRAMES = (20, 42, 55, 100)
 TINY = ("--initialisation.first-frame-points", "150", "--initialisation.other-frame-points", "40", "--threads", "1")
 
 
@@ -70,14 +70,14 @@ def test_a_given_length_is_kept_through_every_door(given, frames, tmp_path):
 
 def ablated(folder, frames: int, *words: str) -> set[int]:
     """The lengths of the runs of an ablation of `sharp`."""
-    line = ["simulated", "--preset", "sharp", "--configurations", "base", "A", *words]
+    line = ["simulated", "--out", "runs", "--preset", "sharp", "--configurations", "base", "A", *words]
     options = parse(AblateOptions, line, "ablate")
     spec = spec_of(spec_data(options), "ablate", folder)
     return {job.config.training.iterations for job in jobs_of(spec, folder, lambda job: frames)}
 
 
 @pytest.mark.parametrize(
-    "frames, length", [(20, 3000), (47, 3008), (55, 3520), (64, 4096), (65, 4096), (100, 5120), (400, 10240)]
+    "frames, length", [(20, 3000), (42, 3024), (55, 3960), (64, 4608), (65, 4608), (100, 5760), (400, 11520)]
 )
 def test_a_length_that_nobody_gives_follows_the_number_of_frames(frames, length, tmp_path):
     file = tmp_path / "mine.toml"

@@ -102,7 +102,7 @@ def behind_flow(row: dict) -> float:
 
 
 def test_what_chapter_14_says_of_the_blend():
-    """2.2 above for quick and 0.6 for paper; on the recorded clip 1.5 below for paper and 0.8 above for sharp."""
+    """2.2 above for quick and 0.6 for paper; on the recorded clip 1.5 below for paper and 0.9 above for sharp."""
     words = " ".join(line.removeprefix("# ") for line in NOTEBOOK.read_text(encoding="utf-8").splitlines())
     recorded = full_size_text.recorded()
     ahead = {"quick": full_size_text.ahead(RUNS["quick_eighth"])}

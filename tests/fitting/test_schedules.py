@@ -172,7 +172,7 @@ def test_tracked_motion_is_trained_from_the_first_iteration_at_a_constant_rate_u
 
 
 def test_the_visits_of_a_frame_stretch_a_run_and_fix_its_length():
-    assert lengthened(SHARP, 55) == with_iterations(SHARP, 55 * 64)
+    assert lengthened(SHARP, 55) == with_iterations(SHARP, 55 * 72)
     assert lengthened(lengthened(SHARP, 55), 70) == lengthened(SHARP, 55)
     assert lengthened(SHARP, 20) == with_iterations(SHARP, 3000) and lengthened(PAPER, 10_000) == PAPER
     assert lengthened(SHARP, 55).training.visits_per_frame == 0

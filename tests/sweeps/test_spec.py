@@ -41,7 +41,7 @@ def test_runs_that_begin_alike_name_one_checkpoint(tmp_path):
 def test_a_preset_that_follows_the_number_of_frames_gets_its_length(tmp_path):
     text = BASE.replace("iterations = 30", 'preset = "sharp"') + CONFIGURATIONS
     jobs = jobs_of(read_spec(write_spec(tmp_path, text)), tmp_path, lambda job: 100)
-    assert {job.config.training.iterations for job in jobs} == {5120}
+    assert {job.config.training.iterations for job in jobs} == {5760}
 
 
 @pytest.mark.parametrize("split", ["every_eighth", "every_second", "blocks 4", "end 8"])

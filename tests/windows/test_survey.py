@@ -23,9 +23,8 @@ def test_a_whole_recording_is_one_scene_that_moves(recording):
 
 
 def test_the_selected_frames_alone_are_read(recording):
-    seen = []
-    names = [frame.name for frame in survey(recording, SequenceConfig(frames="8:40:4"), lambda: seen.append(1))]
-    assert names == [f"{i:06d}" for i in range(8, 40, 4)] and len(seen) == 8
+    names = [frame.name for frame in survey(recording, SequenceConfig(frames="8:40:4"))]
+    assert names == [f"{i:06d}" for i in range(8, 40, 4)]
 
 
 @pytest.mark.parametrize("kind", ["images", "masks", "depth"])

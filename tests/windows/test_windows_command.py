@@ -53,7 +53,7 @@ def test_a_recording_with_a_damaged_frame_from_the_command_to_the_metrics(tmp_pa
     ("words", "visits", "iterations"),
     [
         (["--preset", "demo"], 36, 36 * 49),  # 56 frames, 49 of which are trained on
-        (["--preset", "sharp"], 64, 64 * 49),
+        (["--preset", "sharp"], 72, 72 * 49),
         (["--preset", "demo", "--iterations", "600"], 0, 600),
         (["--preset", "demo", "--training.visits-per-frame", "10"], 10, 1500),
     ],

@@ -1,4 +1,4 @@
-"""Judge each mistake of `training.toml` alone, and print the answer of the report: python .../training.py [NAME ...]
+"""Judge each mistake of `training_mistakes.toml` alone, and print the answer: python training_mistakes.py [NAME ...]
 
 The mistakes of the reference are judged on the operations of a training, in float64 and up to level 4, those of the
 port in C99 up to level 2; each report is written after the search for the cause. The set is for tuning: it is no part
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "injected"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "injected"))
 import inject
 
 from endotsr.golden.judge.npy import write_npy
