@@ -71,6 +71,12 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
     return dict(sorted(means.items(), key=lambda row: row[1]["seconds"]))
 
 
+def levels(result: dict[str, Any]) -> dict[str, Any]:
+    """What is known without a training: the baselines, and the numbers that the paper gives for this clip."""
+    published = [row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]]
+    return result["baselines"] | dict(zip(["as published"], published, strict=False))
+
+
 def table(result: dict[str, Any]) -> str:
     """One training a row, then the baselines and the published numbers."""
     names = [name for name, _ in METRICS.values()]
@@ -81,9 +87,7 @@ def table(result: dict[str, Any]) -> str:
          *(form.format(row[key]) for key, (_, form) in METRICS.items())]
         for name, row in ordered(result).items()
     ]  # fmt: skip
-    published = [row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]]
-    others = result["baselines"] | {row["label"]: row for row in published}
-    for name, row in others.items():
+    for name, row in levels(result).items():
         rows.append([name, *["-"] * 5, *(form.format(row[key]) for key, (_, form) in METRICS.items())])
     return markdown(headings, rows)
 
@@ -106,7 +110,7 @@ def draw(result: dict[str, Any], path: Path) -> None:
             at = row["seconds"] / 60, row[key]
             axes.plot(*at, "o", color=BLUE, markersize=5)
             axes.annotate(name, at, xytext=(4, 4), textcoords="offset points", fontsize=8, color=INK)
-        for name, row in result["baselines"].items():
+        for name, row in levels(result).items():
             axes.axhline(row[key], color=GREY, linewidth=1, linestyle="--")
             axes.annotate(name, (1.0, row[key]), xycoords=("axes fraction", "data"), xytext=(-4, 2),
                           textcoords="offset points", ha="right", fontsize=8, color=GREY)  # fmt: skip
