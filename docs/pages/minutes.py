@@ -82,7 +82,7 @@ def table(result: dict[str, Any]) -> str:
     names = [name for name, _ in METRICS.values()]
     headings = ["Training", "Threads", "Minutes", "Iterations", "Gaussians", "GB", *names]
     rows = [
-        [f"`{name}`", f"{row['threads']:.0f}", f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
+        [" ".join((f"`{name.split()[0]}`", *name.split()[1:])), f"{row['threads']:.0f}", f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
          f"{row['gaussians']:.0f}", f"{row['peak_memory_bytes'] / 1e9:.1f}",
          *(form.format(row[key]) for key, (_, form) in METRICS.items())]
         for name, row in ordered(result).items()
