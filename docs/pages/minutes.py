@@ -77,12 +77,18 @@ def levels(result: dict[str, Any]) -> dict[str, Any]:
     return result["baselines"] | dict(zip(["as published"], published, strict=False))
 
 
+def label(name: str) -> str:
+    """The first word of a name as code, so that the others can stand on another line."""
+    first, *others = name.split()
+    return " ".join((f"`{first}`", *others))
+
+
 def table(result: dict[str, Any]) -> str:
     """One training a row, then the baselines and the published numbers."""
     names = [name for name, _ in METRICS.values()]
     headings = ["Training", "Threads", "Minutes", "Iterations", "Gaussians", "GB", *names]
     rows = [
-        [" ".join((f"`{name.split()[0]}`", *name.split()[1:])), f"{row['threads']:.0f}", f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
+        [label(name), f"{row['threads']:.0f}", f"{row['seconds'] / 60:.1f}", f"{row['iterations']:.0f}",
          f"{row['gaussians']:.0f}", f"{row['peak_memory_bytes'] / 1e9:.1f}",
          *(form.format(row[key]) for key, (_, form) in METRICS.items())]
         for name, row in ordered(result).items()
