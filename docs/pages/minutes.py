@@ -8,7 +8,6 @@ The result is docs/results/minutes.json; the table is part of docs/bench.md.
 """
 
 import argparse
-import json
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -20,6 +19,7 @@ from endotsr.errors import InputError
 from endotsr.report.style import BLUE, GREY, INK, name_axes, new_figure, plain_axes, save
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
+from endotsr.runs.log import log_until
 
 DOCS = Path(__file__).parents[1]
 FILE, PICTURE, PAGE = DOCS / "results" / "minutes.json", DOCS / "results" / "minutes.svg", DOCS / "bench.md"
@@ -30,7 +30,7 @@ LEVELS = {"two_neighbours": "blend", "flow_interpolation": "flow"}  # baselines 
 def run_row(folder: Path) -> dict[str, Any]:
     """What one finished run shows; its seconds are those of its iterations alone."""
     metrics = read_json(folder / "metrics.json", "endotsr train")
-    run, log = metrics["run"], (folder / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    run = metrics["run"]
     return {
         "seed": run["seed"],
         "iterations": run["iteration"],
@@ -38,7 +38,7 @@ def run_row(folder: Path) -> dict[str, Any]:
         "threads": run["threads"],
         "processor": run["machine"]["processor"],
         "date": run["started"][:10],
-        "seconds": sum(json.loads(line)["seconds"] for line in log),
+        "seconds": sum(entry["seconds"] for entry in log_until(folder / "log.jsonl", run["iteration"])),
         "peak_memory_bytes": run["peak_memory_bytes"],
         **{key: metrics["held_out"]["mean"][key] for key in METRICS},
     }
@@ -73,8 +73,8 @@ def ordered(result: dict[str, Any]) -> dict[str, dict[str, float]]:
 
 def levels(result: dict[str, Any]) -> dict[str, Any]:
     """What is known without a training: the baselines, and the numbers that the paper gives for this clip."""
-    published = [row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]]
-    return result["baselines"] | dict(zip(["as published"], published, strict=False))
+    published = next((row for clip, row in PUBLISHED.items() if clip in result["clip"]["name"]), None)
+    return result["baselines"] | ({"as published": published} if published else {})
 
 
 def label(name: str) -> str:

@@ -31,6 +31,7 @@ from seam_errors import seam_errors
 
 from endotsr.report.tables import markdown
 from endotsr.runs.files import write_json
+from endotsr.runs.log import log_until
 from endotsr.runs.machine import machine
 from endotsr.simulator.recorded import recorded_positions
 from endotsr.sweeps.execute import execute
@@ -42,6 +43,7 @@ DOCS = Path(__file__).parents[1]
 FILE, PAGE = DOCS / "results" / "windows.json", DOCS / "guides" / "recording.md"
 EFFECTS = "breathing,pulsation,camera_motion,exposure,instrument,highlights,noise"
 FRAMES_A_BREATH, FRAMES_A_BEAT, FRAMES_A_SWING = 80, 24, 160
+LONGEST = 10**9  # iterations: the whole log
 LAST = 0.1  # of the log of a run, whose mean loss is compared
 
 
@@ -175,8 +177,7 @@ def warm(run: Path, most: int) -> list[dict[str, Any]]:
 
 def losses(folder: Path) -> np.ndarray:
     """The loss of every iteration of a run."""
-    lines = (folder / "log.jsonl").read_text(encoding="utf-8").splitlines()
-    return np.array([json.loads(line)["loss"] for line in lines])
+    return np.array([entry["loss"] for entry in log_until(folder / "log.jsonl", LONGEST)])
 
 
 def table(rows: list[dict[str, Any]]) -> str:

@@ -1,11 +1,16 @@
 """Settings for a wish in minutes."""
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from endotsr.cli.parts.options import base_settings
-from endotsr.config import PRESETS, lengthened
+from endotsr.config import PRESETS, QUICK, lengthened, with_settings
 from endotsr.errors import InputError
+from endotsr.fitting.state import new_training
+from endotsr.runs import pace
 from endotsr.runs.pace import SHARP_LENGTH, paced, paced_for, seconds_of_unit
 from endotsr.sequences.checks.cost import at_start, work_left
 from endotsr.simulator.settings import SimulatorSettings
@@ -50,6 +55,17 @@ def test_too_few_minutes_are_refused_with_the_least(still):
 
 def test_the_machine_is_timed_without_a_trace(still):
     assert 0 < seconds_of_unit(still, SHARP) < 60
+
+
+def test_a_late_iteration_of_the_whole_model_takes_longer_than_the_timed_ones(still, monkeypatch):
+    """A clock on which each call takes a second: an iteration of one second is 0.55 of a late one."""
+    monkeypatch.setattr(pace, "time", SimpleNamespace(perf_counter=itertools.count(0.0).__next__))
+    monkeypatch.setattr(pace, "training_step", lambda state, constants: None)
+    points = new_training(
+        still, with_settings(SHARP, initialisation=with_settings(QUICK.initialisation, motion="none"))
+    )
+    work = 0.1 + 0.4 * 64 * 48 / (640 * 512) + 0.5 * points.gaussians.count / 60_000
+    assert seconds_of_unit(still, SHARP) == pytest.approx(1 / work / 0.55)
 
 
 @pytest.mark.parametrize("words", [["--minutes", "5"], ["--minutes=5"]])

@@ -22,7 +22,7 @@ def run(folder, clip, psnr):
              "input": {"source": f"/somewhere/{clip}", "frames": 9, "width": 8, "height": 6}}  # fmt: skip
     levels = {name: {"mean": means} for name in minutes.LEVELS}
     (folder / "metrics.json").write_text(json.dumps({"run": about, "held_out": {"mean": means}, "baselines": levels}))
-    (folder / "log.jsonl").write_text('{"seconds": 60.0}\n{"seconds": 30.0}\n')
+    (folder / "log.jsonl").write_text('{"iteration": 1, "seconds": 60.0}\n{"iteration": 2, "seconds": 30.0}\n')
     return folder
 
 

@@ -101,8 +101,8 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDept
 
 def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:
     """The depth. Raises InputError for lengths among which one number seems to mark missing depth."""
-    for found in mark_finding([depth_facts(file.name, depth, depth, None)], str(file)) if kind == "depth" else []:
-        raise InputError(f"{file}: {found.what}: {found.why}; {found.remedy}")
+    if kind == "depth" and (marked := mark_finding([depth_facts(file.name, depth, depth, None)], str(file))):
+        raise InputError(f"{file}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}")
     return depth
 
 

@@ -71,7 +71,7 @@ def _inner(operation: str, golden: Golden) -> set[str]:
 def _places(trial: Trial, places: Sequence[Statement]) -> None:
     """Changes of some places: numbers, then other texts, then other names; of a trajectory, numbers at the end."""
     long = any(one.length for one in trial.cases)
-    live = _looked_at(trial, places) if long else _numbers(trial, places)
+    live = _reached(trial, places, long)
     trial.live += live
     for texts, rank in ((_texts, 1), (_names, 2)):
         lines = {hit.where for hit in trial.hits if hit.rank[:2] < (0, 2) and not trial.discrete}
@@ -101,21 +101,12 @@ def _best_fixed(trial: Trial, at: Callable[[float], OtherReading], rest: float) 
     return [at(value) for value, _ in numbers]
 
 
-def _numbers(trial: Trial, places: Sequence[Statement]) -> list[Live]:
-    """Factors, terms and constants of another size; returns the spots that are reached, the most promising first."""
-    live: list[Live] = []
-    for place in places:
-        for spot in spots(place):
-            for mode in trial.modes(place):
-                if trial.over:
-                    return live
-                if values := _values(trial, spot, mode):
-                    live.append(Live(spot, mode, values, _solved(trial, spot, mode, values)))
-    return sorted(live, key=lambda one: one.late)
+def _reached(trial: Trial, places: Sequence[Statement], long: bool) -> list[Live]:
+    """Spots that are reached, the most promising first.
 
-
-def _looked_at(trial: Trial, places: Sequence[Statement]) -> list[Live]:
-    """Spots that are reached, the most promising first, each after one computation: a trajectory takes long."""
+    Each is judged by the factor, term or constant with which it explains most; of a trajectory, which takes long, by
+    one computation.
+    """
     live: list[Live] = []
     for place in places:
         for spot in spots(place):
@@ -123,8 +114,9 @@ def _looked_at(trial: Trial, places: Sequence[Statement]) -> list[Live]:
                 if trial.over:
                     return live
                 late = list[int]()
-                if values := _values(trial, spot, mode, late):
-                    live.append(Live(spot, mode, values, late[0] if late else UNKNOWN))
+                if values := _values(trial, spot, mode, late if long else None):
+                    rank = next(iter(late), UNKNOWN) if long else _solved(trial, spot, mode, values)
+                    live.append(Live(spot, mode, values, rank))
     return sorted(live, key=lambda one: one.late)
 
 

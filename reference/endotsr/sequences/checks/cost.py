@@ -56,7 +56,7 @@ def at_start(config: Config) -> Standing:
 
 
 def iteration_work(gaussians: float | NDArray, pixels: float | NDArray, progress: float | NDArray) -> float | NDArray:
-    """Units of work of one iteration; `progress` is the fraction of the run before it."""
+    """Units of work of one iteration; `progress` is the fraction of the run up to it."""
     early = EARLY + (1 - EARLY) * np.minimum(progress / LATE_FROM, 1.0)
     return (BASE + OF_PIXELS * pixels / PIXELS + OF_GAUSSIANS * gaussians / GAUSSIANS) * early
 
