@@ -35,7 +35,7 @@ from endotsr.runs.log import log_until
 from endotsr.runs.machine import machine
 from endotsr.simulator.recorded import recorded_positions
 from endotsr.sweeps.execute import execute
-from endotsr.windows.make import recording_settings, window_job
+from endotsr.windows.make import WARM, recording_settings, window_job
 from endotsr.windows.record import read_record
 from endotsr.windows.scene import WindowFrames, open_windows
 
@@ -225,6 +225,17 @@ def warm_table(rows: list[dict[str, Any]]) -> str:
     ])  # fmt: skip
 
 
+def chain_table(windows: int = 64) -> str:
+    """Work and time of chains, in schedules of a cold window, for 2 to 64 workers with equal windows."""
+    rows = []
+    for chain in (1, 4, 16):
+        chains, length = windows // chain, 1 + WARM * (chain - 1)
+        times = [-(-chains // workers) * length for workers in (2, 4, 16, 64)]
+        rows.append([f"{chain}", *(f"{value:.3g}" for value in (chains * length, *times))])
+    headings = ["`--chain`", "Work", *(f"Time, {workers} workers" for workers in (2, 4, 16, 64))]
+    return markdown(headings, rows)
+
+
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -258,6 +269,7 @@ def main() -> None:
     write_json(FILE, known)
     if PAGE.exists():
         tables = {"runs": table(known["rows"]), "seams": seam_table(known["rows"]), "warm": warm_table(known["warm"])}
+        tables["chains"] = chain_table()
         write_marked(PAGE, tables, "windows")
 
 
