@@ -11,7 +11,7 @@ from endotsr.report.tables import markdown, memory
 
 Result = Mapping[str, Any]
 MAIN = {"gaussians": 60_000, "precision": "float32", "threads": 2, "scene": None}  # the case that targets speak of
-WHOLE = "pulling_paper_seed0"  # the recorded run whose time is asked for
+WHOLE = "pulling_paper_seed1"  # the recorded run whose time is asked for
 
 
 class Target(NamedTuple):

@@ -3,7 +3,7 @@
     python docs/pages/scale.py      write the part `scale:minutes` of docs/bench.md and docs/results/scale.svg again
 
 Nothing is trained here. The numbers are those that `endotsr check` and the start of a training print
-(`sequences/checks/cost.py`); measured runs of docs/results stand beside them.
+(`sequences/checks/cost.py`); the trainings that were timed for docs/results/minutes.json follow below the table.
 """
 
 import json
@@ -23,7 +23,6 @@ FRAMES = (16, 32, 63, 160, 256, 512)
 SIZES = ((320, 256), (640, 512), (1280, 1024))
 MEMORY = 8.0  # GB allowed to a training: part of its frames and targets lie in files beyond a share of it
 COLOURS = {"quick": GREEN, "paper": BLUE, "sharp": ORANGE}  # by preset
-RECORDS = {"paper": "pulling_paper_seed0", "sharp": "pulling_sharp_seed0"}  # of docs/results: 63 frames of 640x512
 
 
 def estimated(preset: str, frames: int, width: int, height: int) -> tuple[int, Cost]:
@@ -46,15 +45,14 @@ def table() -> str:
 
 
 def measured() -> str:
-    """The recorded runs beside their estimates, a sentence each."""
-    lines = []
-    for preset, name in RECORDS.items():
-        run = json.loads((DOCS / "results" / f"{name}.json").read_text(encoding="utf-8"))["run"]
-        iterations, cost = estimated(preset, 63, 640, 512)
+    """The timed trainings of docs/results/minutes.json with their estimates, a sentence each."""
+    lines, rows = [], json.loads((DOCS / "results" / "minutes.json").read_text(encoding="utf-8"))["rows"]
+    for preset in COLOURS:
+        run, (iterations, cost) = rows[preset][-1], estimated(preset, 63, 640, 512)
         lines.append(
-            f"- `{preset}`, 63 frames of 640x512, {iterations} iterations: estimated {cost.minutes:.0f} minutes, "
-            f"{cost.gaussians} Gaussians and {cost.total_bytes / 1e9:.1f} GB; recorded {run['seconds'] / 60:.0f} "
-            f"minutes with the evaluation, {run['gaussians']} Gaussians and {run['peak_memory_bytes'] / 1e9:.1f} GB."
+            f"- `{preset}`, 63 frames of 640x512, {iterations} iterations: estimated {cost.minutes:.1f} minutes, "
+            f"{cost.gaussians} Gaussians and {cost.total_bytes / 1e9:.1f} GB; measured {run['seconds'] / 60:.1f} "
+            f"minutes, {run['gaussians']} Gaussians and {run['peak_memory_bytes'] / 1e9:.1f} GB on {run['processor']}."
         )
     return "\n".join(lines)
 
