@@ -11,7 +11,7 @@ def test_the_table_and_the_recorded_runs_are_those_of_the_page():
 
 
 def test_the_estimates_are_near_the_timed_trainings():
-    """The ratio of estimate to time is that of the assumed machine to the timed one, and nearly equal for all presets."""
+    """The ratio of estimate to time belongs to the machine and is nearly equal for all presets."""
     rows = json.loads((scale.DOCS / "results" / "minutes.json").read_text(encoding="utf-8"))["rows"]
     ratios = {}
     for preset in scale.COLOURS:
