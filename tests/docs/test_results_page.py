@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from statistics import fmean
 
 import levers
 import pytest
@@ -26,6 +27,36 @@ def test_the_readme_says_which_preset_has_the_smaller_error():
     words = " ".join((RESULTS.parents[1] / "README.md").read_text(encoding="utf-8").split())
     assert below == ("the preset `sharp` has a smaller squared error than flow" in words)
     assert "the model has the smaller squared error" not in words
+
+
+def tissue(name):
+    """Held-out PSNR on tissue of a recorded run and of flow, dB."""
+    found = json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+    flow = found["baselines"]["flow_interpolation"]
+    return found["held_out"]["mean"]["psnr_tissue"], flow["mean"]["psnr_tissue"]
+
+
+def test_the_readme_compares_with_flow_as_recorded():
+    words = " ".join((RESULTS.parents[1] / "README.md").read_text(encoding="utf-8").split())
+    model = fmean(tissue(f"pulling_sharp_seed{seed}")[0] for seed in range(3))
+    assert f"{tissue('pulling_sharp_seed0')[1]:.2f} dB on tissue against {model:.2f} dB" in words
+    ahead = {gap: tissue(f"pulling_sharp_blocks{gap}") for gap in (4, 8, 16)}
+    ahead = {gap: model - flow for gap, (model, flow) in ahead.items()}
+    assert max(abs(ahead[4]), abs(ahead[8])) < 0.2 and "differ by less than 0.2 dB" in words
+    assert f"the scene is {ahead[16]:.1f} dB ahead" in words
+
+
+def test_the_readme_states_the_minutes_that_were_timed():
+    rows = json.loads((RESULTS / "minutes.json").read_text(encoding="utf-8"))["rows"]
+    minutes = {name: round(rows[name][-1]["seconds"] / 60) for name in ("quick", "sharp", "paper")}
+    readme = (RESULTS.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert minutes == {"quick": 1, "sharp": 5, "paper": 7}
+    for words in (
+        "the best picture: five minutes",
+        "a first look in about one minute",
+        "without a preset: seven minutes",
+    ):
+        assert words in readme
 
 
 def test_differences_are_paired_by_seed():
