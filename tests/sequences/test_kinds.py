@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from endotsr.sequences import checks
-from endotsr.sequences.checks.findings import finding, worst_first
-from endotsr.sequences.checks.kinds import KINDS
+from endotsr.sequences.checks.kinds import KINDS, finding, worst_first
 
 SOURCES = [ast.parse(path.read_text(encoding="utf-8")) for path in Path(checks.__path__[0]).glob("*.py")]
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "prepare.md"

@@ -14,8 +14,7 @@ from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv import read_png, write_png
 from endotsr.sequences.common import read_common
-from endotsr.sequences.given_depth import depth_of_values
-from endotsr.sequences.make_depth import from_files, write_depth
+from endotsr.sequences.make_depth import depth_of_values, from_files, write_depth
 from endotsr.sequences.recording import Lens
 from endotsr.sequences.sequence_file import FILE_NAME, CameraEntry, read_sequence_file
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median

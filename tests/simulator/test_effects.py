@@ -7,8 +7,7 @@ import pytest
 from endotsr.errors import InputError
 from endotsr.simulator import EFFECTS, SimulatorSettings, simulate, with_effects
 from endotsr.simulator.bleeding import blood_cover
-from endotsr.simulator.blur import open_span, shutter_times
-from endotsr.simulator.cameras import make_cameras
+from endotsr.simulator.cameras import make_cameras, open_span, shutter_times, vignette
 from endotsr.simulator.coarse import see_coarsely, views_during
 from endotsr.simulator.frames import Eye, make_scene, simulated_frames, tissue_light
 from endotsr.simulator.gain import auto_exposure_gain, gain_series, gain_spectrum
@@ -181,8 +180,6 @@ def test_the_second_lamp_adds_light_from_its_side():
 
 
 def test_vignetting_takes_its_fraction_in_the_corners_and_nothing_in_the_middle():
-    from endotsr.simulator.lens import vignette
-
     factor = vignette(msgspec.structs.replace(SMALL, width=2000, height=1600))
     assert factor[800, 1000] == pytest.approx(1, abs=1e-5)
     for corner in (factor[0, 0], factor[0, -1], factor[-1, 0], factor[-1, -1]):

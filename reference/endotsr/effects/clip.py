@@ -87,6 +87,15 @@ def tile_means(values: FloatArray, weights: BoolArray) -> tuple[FloatArray, Floa
     return np.where(enough, sums / np.maximum(counts, 1.0), np.nan), counts
 
 
+def without_gaps(values: FloatArray, times: FloatArray) -> FloatArray:
+    """Values (m, ...) over time, those that are not finite interpolated between their neighbours in time."""
+    out = values.copy()
+    for column in out.reshape(len(times), -1).T:
+        known = np.isfinite(column)
+        column[~known] = np.interp(times[~known], times[known], column[known])
+    return out
+
+
 def tile_map(values: FloatArray, height: int, width: int) -> FloatArray:
     """Values of the tiles (T,) as a picture (h, w); pixels beyond the last whole tile are nan."""
     rows, columns = height // TILE, width // TILE

@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 
 from endotsr.effects.clarity import clarity_verdicts, clear_frames
 from endotsr.effects.clip import Clip, training_clip, with_clear_reference
-from endotsr.effects.depth_quality import depth_verdict
 from endotsr.effects.motion import motion_verdict
 from endotsr.effects.noise import Noise, estimate_noise
 from endotsr.effects.periodic import Line
 from endotsr.effects.photometric import photometric_verdict
-from endotsr.effects.seen import camera_verdict, highlight_verdict, occluder_verdict
+from endotsr.effects.seen import camera_verdict, depth_verdict, highlight_verdict, occluder_verdict
 from endotsr.effects.topology import topology_verdict
 from endotsr.effects.tracks import make_tracks, without_frames
 from endotsr.effects.verdict import EffectVerdict, verdict_record

@@ -8,11 +8,11 @@ are left out, and the distance by which flow to a frame and back misses counts a
 
 import numpy as np
 
-from endotsr.effects.clip import TILE, Clip, tile_map
+from endotsr.effects.clip import TILE, Clip, tile_map, without_gaps
 from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line, spectral_lines
 from endotsr.effects.rigid import fit_rigid
-from endotsr.effects.tracks import FlowTracks, filled_tiles
+from endotsr.effects.tracks import FlowTracks
 from endotsr.effects.verdict import UNKNOWN, Curve, EffectVerdict, Map
 from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.sequence import Sequence
@@ -46,7 +46,7 @@ def motion_verdict(
     statistic = float(np.sort(ratio)[-needed])
     if statistic < 1.0:
         return _verdict("none", statistic, clip, moving, size, [], 0), []
-    filled = filled_tiles(moving, clip.times)
+    filled = without_gaps(moving.tiles[:, :, moving.usable], clip.times)
     waves = half_waves(filled, clip.times, null[moving.usable])
     lines = spectral_lines(filled, clip.times, clip.frames, null[moving.usable])
     kind = "periodic" if lines else "rigid" if _affine_fraction(filled, clip, moving) > AFFINE_FRACTION else "irregular"

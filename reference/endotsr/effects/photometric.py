@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means
+from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means, without_gaps
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import FlowTracks
 from endotsr.effects.verdict import Curve, EffectVerdict, Map
@@ -79,7 +79,7 @@ def colour_ratios(clip: Clip, tracks: FlowTracks, noise: Noise) -> Ratios:
         pixels = np.minimum(pixels, np.where(count > 0, count, np.inf))
     values = np.array(rows)
     usable &= np.isfinite(values).mean(axis=0).min(axis=0) >= 0.6
-    values = _without_gaps(values[:, :, usable], clip.times)
+    values = without_gaps(values[:, :, usable], clip.times)
     level = tile_means(start, clip.masks[reference])[0][:, usable]
     level = np.where(np.isfinite(level), level, 0.5)
     count = np.clip(pixels[usable], TILE, TILE * TILE)
@@ -120,14 +120,6 @@ def _tile_gradient(clip: Clip) -> FloatArray:
 
 def _comparable(image: FloatArray) -> BoolArray:
     return (image.max(axis=0) < BRIGHT) & (image.max(axis=0) > DARK) & (image.min(axis=0) > 0.0)
-
-
-def _without_gaps(values: FloatArray, times: FloatArray) -> FloatArray:
-    out = values.copy()
-    for column in out.reshape(len(times), -1).T:
-        known = np.isfinite(column)
-        column[~known] = np.interp(times[~known], times[known], column[known])
-    return out
 
 
 def _error_of_median(ratios: Ratios) -> FloatArray:

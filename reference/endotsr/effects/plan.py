@@ -143,7 +143,7 @@ def _assembled(
 def carried(inspection: Inspection, config: Config) -> Dictionary:
     """The largest dictionary within the configured one that the training stamps determine."""
     model, times = config.model, inspection.clip.times
-    configured = report_atoms(times, _omega(model.frequencies, model.frequency_min, model.frequency_max))
+    configured = report_atoms(times, frequencies(model.frequencies, model.frequency_min, model.frequency_max))
     nyquist = inspection.clip.frames / SAMPLES_A_CYCLE
     full = configured.rank == 2 * model.frequencies and configured.condition <= MOST_CONDITION
     if full and model.frequency_max <= nyquist:
@@ -154,19 +154,11 @@ def carried(inspection: Inspection, config: Config) -> Dictionary:
         for top in np.unique(np.round([highest, 0.9 * highest, 0.75 * highest], 2))[::-1]:
             if top <= model.frequency_min:
                 continue
-            report = report_atoms(times, _omega(count, model.frequency_min, float(top)))
+            report = report_atoms(times, frequencies(count, model.frequency_min, float(top)))
             if report.rank == 2 * count and report.condition <= MOST_CONDITION:
                 return Dictionary(count, float(top), report.rank, report.condition, configured)
-    report = report_atoms(times, _omega(1, model.frequency_min, model.frequency_max))
+    report = report_atoms(times, frequencies(1, model.frequency_min, model.frequency_max))
     return Dictionary(1, model.frequency_max, report.rank, report.condition, configured)
-
-
-def _omega(count: int, low: float, high: float) -> np.ndarray:
-    return frequencies(count, low, high)
-
-
-def _periodic(inspection: Inspection, dictionary: Dictionary) -> bool:
-    return any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
 
 
 def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Config) -> tuple[bool, str]:
@@ -174,8 +166,9 @@ def _spectral_motion(inspection: Inspection, dictionary: Dictionary, config: Con
     motion = inspection.verdicts["motion"]
     if motion.present and config.initialisation.motion != "none":
         return True, f"{motion.reason[:-1]}: the Gaussians start with the motion that flow shows."
-    if not inspection.lines or _periodic(inspection, dictionary):
-        return _periodic(inspection, dictionary), motion.reason
+    periodic = any(line.cycles <= dictionary.frequency_max for line in inspection.lines)
+    if periodic or not inspection.lines:
+        return periodic, motion.reason
     return False, f"The rates found lie above the {dictionary.frequency_max:g} cycles that the stamps can carry."
 
 

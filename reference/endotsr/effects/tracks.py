@@ -108,12 +108,3 @@ def noise_flow(grey: FloatArray, mask: BoolArray, sigma: float, copies: int) -> 
         means, _ = tile_means(dense_flow(start, normalised(copy, mask, sigma)), mask)
         squares.append((means**2).sum(axis=0))
     return np.sqrt(np.mean(squares, axis=0))
-
-
-def filled_tiles(tracks: FlowTracks, times: FloatArray) -> FloatArray:
-    """Tile flow of the usable tiles (m, 2, U), frames in which a tile is hidden interpolated over time."""
-    tiles = tracks.tiles[:, :, tracks.usable].copy()
-    for column in tiles.reshape(len(times), -1).T:
-        known = np.isfinite(column)
-        column[~known] = np.interp(times[~known], times[known], column[known])
-    return tiles

@@ -6,8 +6,6 @@ imports `cv2` on first use, so that commands which read no picture start without
 room, except through the Canny edges, which are an input of the smoothness loss.
 """
 
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -17,42 +15,13 @@ from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
 from endotsr.opencv.library import cv2_library as _cv2
 from endotsr.untrusted.files import read_bytes
-from endotsr.untrusted.names import plain_line
 from endotsr.untrusted.png import LARGEST_FILE, pixels_only
 
-PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 CANNY_LOW, CANNY_HIGH = 20, 200  # ruling: thresholds of the released smoothness term, on 8-bit depth
-
-
-def check_png_bytes(data: bytes, name: object) -> None:
-    """Refuse PNG bytes that a decoder might silently repair: check the CRC of every chunk up to IEND.
-
-    Raises InputError naming `name` if the signature, a chunk length, a checksum or the end chunk is wrong.
-    """
-    if data[:8] != PNG_SIGNATURE:
-        reason = "is empty" if not data else "does not start with the PNG signature"
-        raise InputError(f"{name}: not a PNG file: it {reason}")
-    position = 8
-    while True:
-        if position + 12 > len(data):
-            raise InputError(f"{name}: truncated PNG: the file ends after {len(data)} bytes, before its IEND chunk")
-        (length,) = struct.unpack_from(">I", data, position)
-        kind = data[position + 4 : position + 8]
-        end = position + 12 + length
-        if end > len(data):
-            shown = plain_line(kind.decode("latin-1"))
-            raise InputError(f"{name}: truncated PNG: chunk {shown} needs {end} bytes, the file has {len(data)}")
-        (stored,) = struct.unpack_from(">I", data, end - 4)
-        if zlib.crc32(memoryview(data)[position + 4 : end - 4]) != stored:
-            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {plain_line(kind.decode('latin-1'))}")
-        if kind == b"IEND":
-            return
-        position = end
 
 
 def decode_png(data: bytes, name: object) -> Array:
     """Pixels of a PNG held in memory; `name` is used in messages only. See `read_png`."""
-    check_png_bytes(data, name)
     return decoded(pixels_only(data, name), name, "cannot be decoded as a PNG picture")
 
 
@@ -108,11 +77,15 @@ def write_png(path: Path, pixels: Array) -> None:
     pixels = np.asarray(pixels)
     if pixels.dtype not in (np.uint8, np.uint16) or not (pixels.ndim == 2 or pixels.shape[2:] == (3,)):
         raise ValueError(f"{path}: PNG needs (H, W) or (H, W, 3) of uint8 or uint16, not {pixels.shape} {pixels.dtype}")
-    cv2 = _cv2()
+    write_encoded(path, pixels, ".png", ())
+
+
+def write_encoded(path: Path, pixels: Array, ending: str, options: tuple[int, ...]) -> None:
+    """Write grey or RGB pixels in the format of an ending. Raises InputError if the file cannot be written."""
     ordered = np.ascontiguousarray(pixels[:, :, ::-1] if pixels.ndim == 3 else pixels)
-    done, encoded = cv2.imencode(".png", ordered)
+    done, encoded = _cv2().imencode(ending, ordered, options)
     if not done:
-        raise InputError(f"{path}: the picture cannot be encoded as PNG")
+        raise InputError(f"{path}: the picture cannot be encoded as {ending[1:].upper()}")
     try:
         Path(path).write_bytes(encoded.tobytes())
     except OSError as error:

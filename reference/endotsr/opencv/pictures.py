@@ -17,7 +17,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import Array
-from endotsr.opencv import decoded, opaque, read_png
+from endotsr.opencv import decoded, opaque, read_png, write_encoded
 from endotsr.opencv.library import cv2_library
 from endotsr.untrusted.files import MOST_PIXELS, read_bytes
 from endotsr.untrusted.names import plain_line
@@ -159,11 +159,4 @@ def _check_start_and_end(data: bytes, ending: str, path: Path) -> str:
 
 def write_jpeg(path: Path, pixels: Array, quality: int = 95) -> None:
     """Write (H, W, 3) RGB uint8 as JPEG. Raises InputError if the file cannot be written."""
-    cv2 = cv2_library()
-    done, encoded = cv2.imencode(".jpg", np.ascontiguousarray(pixels[:, :, ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not done:
-        raise InputError(f"{path}: the picture cannot be encoded as JPEG")
-    try:
-        Path(path).write_bytes(encoded.tobytes())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    write_encoded(path, pixels, ".jpeg", (cv2_library().IMWRITE_JPEG_QUALITY, quality))

@@ -21,7 +21,7 @@ from endotsr.sequences.checks.kinds import KINDS, ONE_CAMERA
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.masks import tissue_masks
-from endotsr.sequences.read_frames import FrameFiles
+from endotsr.sequences.read_frames import FrameFiles, of_size
 from endotsr.sequences.recording import CameraPose, PicturePair, Recording, colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.sequence_file import (
@@ -36,6 +36,7 @@ from endotsr.sequences.sequence_file import (
 from endotsr.sequences.splits import parse_frame_range, split_frames
 from endotsr.splatting.camera import Camera
 
+STATES = f"{FILE_NAME} states"
 EVERYTHING = (0.0, 100.0)  # percentiles that clip nothing
 
 
@@ -136,9 +137,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         contents.masks,
         contents.depth,
         size=(camera.width, camera.height),
-        picture=lambda path: _colour(contents, path),
-        mask=lambda path: grey_plane(_sized(contents, read_picture(path), path), path),
-        plane=lambda path: _sized(contents, read_plane(path), path),
+        size_said=STATES,
         excluded_value=excluded,
         unit=contents.file.unit_in_words,
         depth_unit=entry.unit,
@@ -192,12 +191,7 @@ def cameras_of(contents: Contents) -> list[Camera]:
 
 
 def _sized(contents: Contents, pixels: NDArray, path: Path) -> NDArray:
-    entry = contents.file.camera
-    if pixels.shape[:2] != (entry.height, entry.width):
-        raise InputError(
-            f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {FILE_NAME} states {entry.width}x{entry.height}"
-        )
-    return pixels
+    return of_size(pixels, path, (contents.file.camera.width, contents.file.camera.height), STATES)
 
 
 def _colour(contents: Contents, path: Path) -> NDArray[np.uint8]:

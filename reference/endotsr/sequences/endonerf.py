@@ -12,17 +12,14 @@ an `InputError` of one line that names file, frame and reason. This module does 
 from pathlib import Path
 from typing import NamedTuple
 
-from numpy.typing import NDArray
-
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.assemble import assemble, check_percentiles
-from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
+from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.files import check_pairing, hash_files, list_pictures
 from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows
 from endotsr.sequences.read_frames import FrameFiles
-from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.splits import parse_frame_range, split_frames
 
@@ -97,20 +94,12 @@ def read_endonerf(folder: Path, config: SequenceConfig, near: float = NEAR) -> S
     height, width = read_picture(files.images[0]).shape[:2]
     cameras = cameras_from_rows(rows, width, height, files.poses, files.frames)
 
-    def sized(pixels: NDArray, path: Path) -> NDArray:
-        if pixels.shape[:2] != (height, width):
-            size = f"{pixels.shape[1]}x{pixels.shape[0]}"
-            raise InputError(f"{path}: {size} pixels, the first image has {width}x{height}")
-        return pixels
-
     found = FrameFiles(
         files.images,
         files.masks,
         files.depth,
         size=(width, height),
-        picture=lambda path: colour_picture(sized(read_picture(path), path), path),
-        mask=lambda path: grey_plane(sized(read_picture(path), path), path),
-        plane=lambda path: sized(read_plane(path), path),
+        size_said="the first image has",
         excluded_value=config.excluded_value,
         unit=UNIT,
         depth_unit=UNIT,

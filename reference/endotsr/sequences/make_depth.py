@@ -6,7 +6,7 @@ frame. The new folder takes its place when it is whole.
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -17,16 +17,17 @@ from endotsr.sequences.checks.depth import LITTLE, depth_facts, mark_finding
 from endotsr.sequences.common import list_contents, open_common
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, read_plane
 from endotsr.sequences.files import check_pairing, list_pictures
-from endotsr.sequences.given_depth import Kind, depth_of_values
 from endotsr.sequences.prepare import step_of_depth, write_levels
-from endotsr.sequences.recording import ARBITRARY, PicturePair, Recording
+from endotsr.sequences.recording import ARBITRARY, Lens, PicturePair, Recording
 from endotsr.sequences.relative_depth import Align, MadeDepth, relative_depth
 from endotsr.sequences.sequence_file import DEPTH, FILE_NAME, DepthEntry, SequenceFile, sequence_text
+from endotsr.sequences.smaller import nearest_pixels
 from endotsr.sequences.stereo_depth import StereoSettings, disparity_range, stereo_depth, temporal_median
 from endotsr.untrusted.writing import replace_text, replacing_folder
 
 EXCHANGED = 3.0  # times as many matches with left and right exchanged
 OnFrame = Callable[[int, int], None]
+Kind = Literal["depth", "disparity"]
 
 
 class DepthReport(NamedTuple):
@@ -97,6 +98,32 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDept
         for file in files
     )
     return MadeDepth(frames, f"{kind} from {source.name}", "")
+
+
+def depth_of_values(
+    values: NDArray, kind: Kind, scale: float, lens: Lens, baseline: float | None, where: object
+) -> NDArray[np.float32]:
+    """Depth (H, W) in the unit of the sequence and at its size, 0 = none, from the values of another program.
+
+    values  as stored. Disparities refer to the left picture, in pixels at the width of the file. Their sign is reversed
+            if all of them are negative.
+    kind    of the values
+    scale   length, or pixels of disparity, per stored unit
+
+    Raises:  InputError for another aspect ratio, or for disparities without a baseline.
+    """
+    numbers = values.astype(np.float64) * scale
+    numbers[~np.isfinite(numbers)] = 0.0
+    if kind == "disparity":
+        if not baseline:
+            raise InputError(f"{where}: disparity needs the baseline: [camera] baseline is 0 in sequence.toml")
+        if (numbers <= 0).all():
+            numbers = -numbers
+        focal = lens.fx * values.shape[1] / lens.width
+        numbers = np.divide(focal * baseline, numbers, out=np.zeros_like(numbers), where=numbers > 0)
+    depth = nearest_pixels(np.maximum(numbers, 0.0), lens.width, lens.height, where).astype(np.float32)
+    depth[~np.isfinite(depth)] = 0.0
+    return depth
 
 
 def _without_mark(depth: NDArray[np.float32], kind: Kind, file: Path) -> NDArray[np.float32]:

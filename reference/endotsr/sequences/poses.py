@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
-from endotsr.sequences.arrays import read_npy
+from endotsr.sequences.depth_files import read_npy
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.splatting.camera import Camera, camera_centre
 

@@ -1,10 +1,10 @@
 """All frames of a clip read into arrays, in several threads, with the facts that the checks need.
 
-Comes in: functions that read one picture, mask or depth file, and the settings; goes out: the arrays, in memory or in a
-file (see `frame_store`). What a layout knows of names, sizes and units stays with the layout.
+Comes in: the files, what a layout knows of their size and units, and the settings; goes out: the arrays, in memory or
+in a file (see `frame_store`).
 """
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,25 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
+from endotsr.errors import InputError
+from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.depth import DepthFacts, depth_facts
 from endotsr.sequences.checks.frames import FrameFacts, frame_facts
-from endotsr.sequences.depth_files import check_depth_scale, clip_depth, depth_plane
+from endotsr.sequences.depth_files import check_depth_scale, clip_depth, depth_plane, read_plane
 from endotsr.sequences.frame_store import FrameStore
 from endotsr.sequences.masks import tissue_masks
-from endotsr.sequences.recording import Picture
+from endotsr.sequences.recording import colour_picture, grey_plane
 from endotsr.untrusted.files import in_threads
 
 
 class FrameFiles(NamedTuple):
-    """The files of the selected frames, how one of them is read, and what the layout knows of them."""
+    """The files of the selected frames, and what the layout knows of them."""
 
     images: list[Path]
     masks: list[Path]  # empty: every pixel is tissue
     depth: list[Path]
     size: tuple[int, int]  # width and height of every file
-    picture: Callable[[Path], Picture]  # (H, W, 3), of the right size
-    mask: Callable[[Path], NDArray]  # (H, W) as stored
-    plane: Callable[[Path], NDArray]  # (H, W) numbers of a depth file as stored
+    size_said: str  # what has or states this size, for messages
     excluded_value: str  # of the masks, white or black
     unit: str  # of the sequence, in words
     depth_unit: str  # of the numbers of a depth file
@@ -64,17 +64,18 @@ def read_frames(files: FrameFiles, config: SequenceConfig, where: object, notes:
     stored_masks = store.array((n, height, width), np.uint8) if store.in_file and files.masks else None
     masks, types = [depth] * n, [depth.dtype] * n
     facts: list[tuple[FrameFacts, DepthFacts] | None] = [None] * n
+    sized = partial(of_size, size=files.size, said=files.size_said)
 
     def read_frame(i: int) -> None:
-        picture = files.picture(files.images[i])
+        image, mask, prior = files.images[i], files.masks[i] if files.masks else None, files.depth[i]
+        picture = colour_picture(sized(read_picture(image), image), image)
         images[i] = picture.transpose(2, 0, 1)
-        if files.masks:
-            masks[i] = _kept(files.mask(files.masks[i]), stored_masks, i)
-        raw = files.plane(files.depth[i])
+        if mask:
+            masks[i] = _kept(grey_plane(sized(read_picture(mask), mask), mask), stored_masks, i)
+        raw = sized(read_plane(prior), prior)
         types[i] = raw.dtype
-        plane = depth_plane(raw, files.depth_scale, files.depth[i])
-        name, other = files.images[i].name, files.depth[i].name
-        facts[i] = frame_facts(name, picture), depth_facts(other, plane, raw, None)
+        plane = depth_plane(raw, files.depth_scale, prior)
+        facts[i] = frame_facts(image.name, picture), depth_facts(prior.name, plane, raw, None)
         depth[i] = clip_depth(plane, config.depth_percentiles)
 
     in_threads(read_frame, n)
@@ -86,6 +87,13 @@ def read_frames(files: FrameFiles, config: SequenceConfig, where: object, notes:
         tissue[...] = True
     both = [fact for fact in facts if fact is not None]
     return Frames(images, tissue, depth, ([fact[0] for fact in both], [fact[1] for fact in both]), store)
+
+
+def of_size(pixels: NDArray, path: Path, size: tuple[int, int], said: str) -> NDArray:
+    """The pixels of a file. Raises InputError unless they have the width and height that `said` has or states."""
+    if pixels.shape[1::-1] != size:
+        raise InputError(f"{path}: {pixels.shape[1]}x{pixels.shape[0]} pixels, {said} {size[0]}x{size[1]}")
+    return pixels
 
 
 def _kept(plane: NDArray, stored: NDArray[np.uint8] | None, i: int) -> NDArray:

@@ -1,8 +1,8 @@
 """The split into training and held-out frames, and the normalised time of a frame.
 
-In: the number of frames that were selected (a frame range is applied before the split), and their seconds where they
-are not evenly spaced. Out: two sorted index arrays, and times. The split counts frames and does not depend on the
-pictures or the times.
+In: the number of selected frames (a frame range is applied before the split), and the seconds of frames that are not
+evenly spaced. Out: normalised times, and the split as ascending frame numbers (train (n_train,), test (n_test,)). The
+split counts frames. It does not depend on their pictures or times.
 """
 
 import numpy as np
@@ -45,10 +45,7 @@ def evenly_spaced(seconds: NDArray[np.float64]) -> bool:
 
 
 def every_eighth(count: int) -> tuple[IndexArray, IndexArray]:
-    """The published split: frame i is held out when (i - 1) % 8 == 0, that is 1, 9, 17, ...
-
-    returns  (train (n_train,), test (n_test,)), ascending
-    """
+    """The published split: frame i is held out when (i - 1) % 8 == 0, that is 1, 9, 17, ..."""
     index = np.arange(count)
     held_out = (index - 1) % 8 == 0
     return index[~held_out], index[held_out]
@@ -61,7 +58,6 @@ def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
     middle of each. A block without a training frame after it is dropped: held-out frames always have a
     training frame on both sides.
 
-    returns  (train (n_train,), test (n_test,)), ascending
     Raises:  InputError if no block fits.
     """
     period = max(LEAST_BLOCK_PERIOD, 2 * length)
@@ -79,10 +75,7 @@ def blocks(count: int, length: int) -> tuple[IndexArray, IndexArray]:
 
 
 def every_second(count: int) -> tuple[IndexArray, IndexArray]:
-    """Frames 1, 3, 5, ... are held out: a clip at half its frame rate.
-
-    returns  (train (n_train,), test (n_test,)), ascending
-    """
+    """Frames 1, 3, 5, ... are held out: a clip at half its frame rate."""
     index = np.arange(count)
     return index[::2], index[1::2]
 
@@ -90,7 +83,6 @@ def every_second(count: int) -> tuple[IndexArray, IndexArray]:
 def end_of_clip(count: int, length: int) -> tuple[IndexArray, IndexArray]:
     """The last `length` frames are held out: the model has to extrapolate, with no training frame after them.
 
-    returns  (train (n_train,), test (n_test,)), ascending
     Raises:  InputError if fewer than 2 training frames remain.
     """
     first = count - length

@@ -24,8 +24,8 @@ from endotsr.sequences.checks.depth import (
     mark_finding,
     unit_finding,
 )
-from endotsr.sequences.checks.findings import Finding
 from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
+from endotsr.sequences.checks.kinds import Finding
 from endotsr.sequences.recording import ARBITRARY, Recording
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")

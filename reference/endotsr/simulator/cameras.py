@@ -1,4 +1,4 @@
-"""The cameras of a simulated sequence: one per frame, and the right one of a stereo pair."""
+"""The cameras of a simulated sequence: poses, shutter and vignetting."""
 
 import numpy as np
 
@@ -42,3 +42,23 @@ def _looking_at(forward: FloatArray) -> FloatArray:
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z])
+
+
+def open_span(settings: SimulatorSettings) -> float:
+    """Normalised time for which the shutter is open; 0 while motion blur is off."""
+    part = settings.motion_blur
+    return part.shutter / settings.frames if part.on else 0.0
+
+
+def shutter_times(settings: SimulatorSettings) -> FloatArray:
+    """The averaged times: middles of equal parts of the open time, relative to the time of the frame."""
+    samples = settings.motion_blur.samples
+    return open_span(settings) * ((np.arange(samples) + 0.5) / samples - 0.5)
+
+
+def vignette(settings: SimulatorSettings) -> FloatArray:
+    """The factor on the light of every pixel, (H, W): 1 - amplitude (r / r_corner)^2, r from the image centre."""
+    x = (np.arange(settings.width) + 0.5) / settings.width - 0.5
+    y = ((np.arange(settings.height) + 0.5) / settings.height - 0.5) * settings.height / settings.width
+    corner = 0.25 * (1 + (settings.height / settings.width) ** 2)
+    return 1 - settings.vignetting.amplitude * (x**2 + y[:, None] ** 2) / corner

@@ -54,10 +54,8 @@ def views_during(
     slit = surface.slit
     cut = slit is not None and is_open(slit, t + times[-1])
     sides = (1.0, -1.0) if cut else (None,)
-    paths = [
-        [_node_material(surface, camera, t + at, side) for camera, at in zip(cameras, (times[0], 0.0, times[-1]))]
-        for side in sides
-    ]
+    moments = t + times[0], t, t + times[-1]
+    paths = [[_seen_at_nodes(surface, *at, side).material for at in zip(cameras, moments)] for side in sides]
     for u in times / times[-1]:
         weights = 0.5 * u * (u - 1), 1 - u**2, 0.5 * u * (u + 1)
         found = [spread(np.asarray(sum(w * m for w, m in zip(weights, path))), cameras[1]) for path in paths]
@@ -83,17 +81,10 @@ def spread(values: FloatArray, camera: Camera) -> FloatArray:
     return np.ascontiguousarray(high.reshape(camera.height, channels, -1).transpose(1, 0, 2))
 
 
-def _node_rays(camera: Camera) -> tuple[FloatArray, FloatArray]:
-    x, y = np.meshgrid((nodes(camera.width) - camera.cx) / camera.fx, (nodes(camera.height) - camera.cy) / camera.fy)
-    return x, y
-
-
 def _spread_view(
     surface: Surface, camera: Camera, t: float, rays: tuple[FloatArray, FloatArray], side: float | None
 ) -> SurfaceView:
-    ray_x, ray_y = _node_rays(camera)
-    sides = None if side is None else np.full_like(ray_x, side)
-    coarse = see_side(surface, camera, t, ray_x, ray_y, sides)
+    coarse = _seen_at_nodes(surface, camera, t, side)
     fine = spread(np.concatenate([coarse.material, coarse.normal, coarse.depth[None]]), camera)
     normal, depth = fine[2:5], fine[5]
     normal /= np.sqrt((normal**2).sum(axis=0))
@@ -101,11 +92,10 @@ def _spread_view(
     return SurfaceView(fine[:2], rotate(camera.rotation.T, seen), normal, depth)
 
 
-def _node_material(surface: Surface, camera: Camera, t: float, side: float | None) -> FloatArray:
-    """Material coordinates seen at the nodes, (2, rows, columns)."""
-    ray_x, ray_y = _node_rays(camera)
-    sides = None if side is None else np.full_like(ray_x, side)
-    return see_side(surface, camera, t, ray_x, ray_y, sides).material
+def _seen_at_nodes(surface: Surface, camera: Camera, t: float, side: float | None) -> SurfaceView:
+    """The view at the nodes, (rows, columns), of one side of an open slit or of the whole sheet."""
+    x, y = np.meshgrid((nodes(camera.width) - camera.cx) / camera.fx, (nodes(camera.height) - camera.cy) / camera.fy)
+    return see_side(surface, camera, t, x, y, None if side is None else np.full_like(x, side))
 
 
 def _interpolation(count: int) -> Any:

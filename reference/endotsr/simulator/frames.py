@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
 from endotsr.sequences.splits import time_stamps
-from endotsr.simulator.blur import open_span, shutter_times
-from endotsr.simulator.cameras import make_cameras
+from endotsr.simulator.cameras import make_cameras, open_span, shutter_times, vignette
 from endotsr.simulator.coarse import see_coarsely, views_during
 from endotsr.simulator.gain import camera_gain, to_display
 from endotsr.simulator.instrument import Drawing, draw
 from endotsr.simulator.lamps import INSTRUMENT_DEPTH, Blocker, make_blocker
-from endotsr.simulator.lens import vignette
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.shading import TissueLight, lit_by_all, shade
 from endotsr.simulator.smoke import with_smoke

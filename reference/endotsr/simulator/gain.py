@@ -24,11 +24,9 @@ class GainSpectrum(NamedTuple):
 
 def camera_gain(settings: SimulatorSettings, t: float) -> FloatArray | None:
     """Gain of the three channels at time t, (3,); None while no effect changes it."""
-    if settings.exposure.on and settings.auto_exposure.on:
-        return exposure_gain(settings, t) * auto_exposure_gain(settings, t)
-    if settings.auto_exposure.on:
-        return np.full(3, auto_exposure_gain(settings, t))
-    return exposure_gain(settings, t) if settings.exposure.on else None
+    if not settings.auto_exposure.on:
+        return exposure_gain(settings, t) if settings.exposure.on else None
+    return exposure_gain(settings, t) * auto_exposure_gain(settings, t)
 
 
 def exposure_gain(settings: SimulatorSettings, t: float) -> FloatArray:

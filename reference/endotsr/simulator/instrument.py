@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.simulator.blur import open_span, shutter_times
+from endotsr.simulator.cameras import open_span, shutter_times
 from endotsr.simulator.settings import SimulatorSettings
 
 SHAFT, WRIST, JAW = 0.042, 0.036, 0.017  # half widths, image widths

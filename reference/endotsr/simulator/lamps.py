@@ -40,32 +40,36 @@ def lit_by_endoscope(
 
     eye      the camera of the view if the lamp is not there
     """
-    towards = camera_centre(camera)[:, None, None] - view.point
-    r = np.sqrt((towards**2).sum(axis=0))
-    towards /= r
-    cosine = (view.normal * towards).sum(axis=0)
+    towards, r = _towards(view, camera_centre(camera))
     axis = view.depth / r  # cosine of the angle to the optical axis
     received = GAIN * (settings.distance / r) ** 2 * axis**BEAM
     if blocker is not None:
         lamp = camera_centre(camera) + camera.rotation.T @ [settings.shadows.offset, 0.0, 0.0]
         received = received * shadow(settings, blocker, lamp, view)
-    diffuse = received * np.maximum(cosine + WRAP, 0.0) / (1 + WRAP)
-    return Lit(diffuse, received, towards if eye is None else _half_way(view, towards, eye))
+    return Lit(_diffuse(view, towards, received), received, towards if eye is None else _half_way(view, towards, eye))
 
 
 def lit_by_second(settings: SimulatorSettings, view: SurfaceView, blocker: Blocker | None, eye: Camera) -> Lit:
     """The second lamp, at a fixed place and without a beam."""
     part = settings.second_light
     lamp = np.array([part.right, part.down, 0.0])
-    towards = lamp[:, None, None] - view.point
-    r = np.sqrt((towards**2).sum(axis=0))
-    towards /= r
-    cosine = (view.normal * towards).sum(axis=0)
+    towards, r = _towards(view, lamp)
     received = part.strength * GAIN * (settings.distance / r) ** 2
     if blocker is not None:
         received = received * shadow(settings, blocker, lamp, view)
-    diffuse = received * np.maximum(cosine + WRAP, 0.0) / (1 + WRAP)
-    return Lit(diffuse, received, _half_way(view, towards, eye))
+    return Lit(_diffuse(view, towards, received), received, _half_way(view, towards, eye))
+
+
+def _towards(view: SurfaceView, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (3, H, W) from the tissue to a place in the world (3,), and its distance (H, W)."""
+    towards = place[:, None, None] - view.point
+    r = np.sqrt((towards**2).sum(axis=0))
+    return towards / r, r
+
+
+def _diffuse(view: SurfaceView, towards: FloatArray, received: FloatArray) -> FloatArray:
+    """The light received at the angle to the surface, softened by scattering inside the tissue."""
+    return received * np.maximum((view.normal * towards).sum(axis=0) + WRAP, 0.0) / (1 + WRAP)
 
 
 def bent_normal(normal: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -111,6 +115,5 @@ def make_blocker(settings: SimulatorSettings, cover: FloatArray, camera: Camera)
 
 
 def _half_way(view: SurfaceView, towards: FloatArray, eye: Camera) -> FloatArray:
-    back = camera_centre(eye)[:, None, None] - view.point
-    half = towards + back / np.sqrt((back**2).sum(axis=0))
+    half = towards + _towards(view, camera_centre(eye))[0]
     return half / np.sqrt((half**2).sum(axis=0))

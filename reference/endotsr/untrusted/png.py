@@ -13,7 +13,9 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.untrusted.files import MOST_PIXELS
+from endotsr.untrusted.names import plain_line
 
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
 LARGEST_FILE = 1 << 28  # bytes: 256 MiB
 MOST_EXTRA = 64  # bytes after the end of the compressed pixels, which some programs leave there
 CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type
@@ -36,14 +38,14 @@ class PngHeader(NamedTuple):
 def pixels_only(data: bytes, name: object) -> bytes:
     """The same picture with the chunks IHDR, PLTE, tRNS, IDAT and IEND alone.
 
-    data     a PNG file whose chunks are whole (`opencv.check_png_bytes`)
+    data     content of a PNG file
     name     for messages
 
-    Raises: InputError if the header is not allowed, if the picture has more than 2^26 pixels, if a chunk that the
-            pixels need is missing, repeated or unknown, if the file holds several pictures (APNG), or if the
-            compressed pixels are not those of the header.
+    Raises: InputError if the signature, the length or the checksum of a chunk up to IEND is wrong, if the header is not
+            allowed, if the picture has more than 2^26 pixels, if a chunk that the pixels need is missing, repeated or
+            unknown, if the file holds several pictures (APNG), or if the compressed pixels do not match the header.
     """
-    chunks = _chunks(data)
+    chunks = _chunks(data, name)
     header = _header(chunks, name)
     _refuse_moving(chunks, name)
     kept = [chunks[0]]
@@ -60,13 +62,24 @@ def pixels_only(data: bytes, name: object) -> bytes:
     return data[:8] + b"".join(_chunk(kind, content) for kind, content in kept)
 
 
-def _chunks(data: bytes) -> list[tuple[bytes, bytes]]:
-    """Kind and content of every chunk up to IEND."""
+def _chunks(data: bytes, name: object) -> list[tuple[bytes, bytes]]:
+    """Kind and content of every chunk up to IEND, each with its checksum verified."""
+    if data[:8] != SIGNATURE:
+        reason = "is empty" if not data else "does not start with the PNG signature"
+        raise InputError(f"{name}: not a PNG file: it {reason}")
     found, position = [], 8
     while not found or found[-1][0] != b"IEND":
+        if position + 12 > len(data):
+            raise InputError(f"{name}: truncated PNG: the file ends after {len(data)} bytes, before its IEND chunk")
         (length,) = struct.unpack_from(">I", data, position)
-        found.append((data[position + 4 : position + 8], data[position + 8 : position + 8 + length]))
-        position += 12 + length
+        kind, end = data[position + 4 : position + 8], position + 12 + length
+        said = plain_line(kind.decode("latin-1"))
+        if end > len(data):
+            raise InputError(f"{name}: truncated PNG: chunk {said} needs {end} bytes, the file has {len(data)}")
+        if zlib.crc32(memoryview(data)[position + 4 : end - 4]) != int.from_bytes(data[end - 4 : end]):
+            raise InputError(f"{name}: damaged PNG: wrong checksum in chunk {said}")
+        found.append((kind, data[position + 8 : end - 4]))
+        position = end
     return found
 
 

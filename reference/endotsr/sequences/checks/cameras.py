@@ -3,7 +3,7 @@
 import numpy as np
 
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 from endotsr.sequences.recording import Lens
 from endotsr.sequences.world import FAR_FROM_ORIGIN
 from endotsr.splatting.camera import Camera, camera_centre, degrees_between

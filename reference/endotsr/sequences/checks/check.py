@@ -25,7 +25,6 @@ from endotsr.sequences.checks.depth import (
     light_correlation,
     light_finding,
 )
-from endotsr.sequences.checks.findings import Finding, finding, worst_first
 from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
 from endotsr.sequences.checks.frames import (
     FrameFacts,
@@ -35,6 +34,7 @@ from endotsr.sequences.checks.frames import (
     profile_findings,
     time_findings,
 )
+from endotsr.sequences.checks.kinds import Finding, finding, worst_first
 from endotsr.sequences.checks.parts import Parts, parts_of
 from endotsr.sequences.depth_files import depth_plane, read_plane
 from endotsr.sequences.files import check_pairing

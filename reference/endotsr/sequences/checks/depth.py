@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 
 NEAREST, FARTHEST = 5.0, 500.0  # mm; medians outside are another unit
 FEW_LEVELS = 6  # whole millimetres, as published clips have them, give a dozen and more

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.kernels.arrays import Array
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 
 FLIPS = {"upside down": (0,), "mirrored": (1,), "turned by half a turn": (0, 1)}  # axes of a plane (H, W)
 CELLS = 48  # along the shorter side of a picture, whose means are compared

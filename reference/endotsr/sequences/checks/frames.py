@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.opencv.pictures import other_profile
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 from endotsr.sequences.checks.scenes import alternating_finding, cut_findings, halves_finding
 from endotsr.sequences.files import frame_numbers, shortened
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from endotsr.errors import InputError
 from endotsr.sequences.checks.cameras import camera_findings
 from endotsr.sequences.checks.depth import DepthFacts, depth_findings
-from endotsr.sequences.checks.findings import Finding, worst_first
 from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
+from endotsr.sequences.checks.kinds import Finding, worst_first
 from endotsr.splatting.camera import Camera
 
 SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes

@@ -1,4 +1,4 @@
-"""Everything that `endotsr check` can find: how serious it is, why it matters, and how it is mended.
+"""Everything that `endotsr check` can find, and a finding: how serious it is, why it matters, and how it is mended.
 
 The code of a kind is its name in `--json` and stays the same in every version.
 """
@@ -126,3 +126,33 @@ KINDS: dict[str, Kind] = {
     "memory": Kind("warning", "the training would be stopped",
                    "endotsr prepare --scale 0.5, or a smaller --sequence.memory"),
 }  # fmt: skip
+
+
+class Finding(NamedTuple):
+    """One thing that a check found."""
+
+    level: Level
+    code: str  # key of `KINDS`
+    where: str  # file or folder
+    frame: int | None  # number within the sequence, from 0
+    what: str
+    why: str
+    remedy: str
+
+    @property
+    def line(self) -> str:
+        """The finding in one line."""
+        place = f"{self.where}, frame {self.frame}" if self.frame is not None else self.where
+        return f"{place}: {self.what}; {self.why}; {self.remedy}"
+
+
+def finding(code: str, where: object, what: str, frame: int | None = None) -> Finding:
+    """A finding of a kind of `KINDS`, at a file or folder and, where it concerns one, a frame."""
+    kind = KINDS[code]
+    return Finding(kind.level, code, str(where), frame, what, kind.why, kind.remedy)
+
+
+def worst_first(findings: list[Finding]) -> list[Finding]:
+    """Refusals, then warnings, then notes; each in the order found."""
+    order = {"refusal": 0, "warning": 1, "note": 2}
+    return sorted(findings, key=lambda found: order[found.level])

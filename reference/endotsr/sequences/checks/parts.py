@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 from endotsr.sequences.common import Contents, cameras_of, polarity
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.endonerf import NO_MASKS

@@ -7,7 +7,7 @@ taken for one picture, are each trained without an error and give a scene that m
 import numpy as np
 
 from endotsr.kernels.arrays import BoolArray, FloatArray
-from endotsr.sequences.checks.findings import Finding, finding
+from endotsr.sequences.checks.kinds import Finding, finding
 
 ALIKE = 0.6  # correlation of the halves of the pictures: two views; published clips of one view stay within 0.3
 OTHER_SCENE, SAME_SCENE = 0.4, 0.7  # of neighbouring frames: below the one, where the others are above the other
