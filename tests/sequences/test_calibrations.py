@@ -8,7 +8,8 @@ from public_layouts import K, stereo_yaml
 from raw_sources import ini
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations import formats, lens_or_rig
+from endotsr.sequences.calibration_formats import FORMATS
+from endotsr.sequences.calibrations import lens_or_rig
 
 SIZE = (128, 96)
 BENT = [-0.2, 0.05, 0.001, -0.002, 0.01]
@@ -137,4 +138,4 @@ def test_what_is_no_calibration_is_refused(said, tmp_path):
 
 
 def test_every_format_says_what_it_reads():
-    assert len(formats()) == 5 and len({module.ABOUT for module in formats()}) == 5
+    assert len(FORMATS) == 5 and len({entry.about for entry in FORMATS}) == 5

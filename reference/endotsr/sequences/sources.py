@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.sequences.calibrations import lens_or_rig
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, frame_numbers, list_pictures
 from endotsr.sequences.recording import (
@@ -205,8 +206,6 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
 
     Raises:  InputError for a calibration of another size (proportional sizes are scaled).
     """
-    from endotsr.sequences.calibrations import lens_or_rig
-
     if options.calibration is not None:
         return lens_or_rig(options.calibration, width, height)
     if options.camera is None:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import HALF_A_PIXEL
+from endotsr.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Recording, StatedDepth
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions

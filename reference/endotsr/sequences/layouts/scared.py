@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from endotsr.errors import InputError
-from endotsr.sequences.calibrations.stored import HALF_A_PIXEL
+from endotsr.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.sequences.layouts import Layout
 from endotsr.sequences.layouts.video import open_video
 from endotsr.sequences.recording import CameraPose, Recording

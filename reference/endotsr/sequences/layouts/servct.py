@@ -11,7 +11,7 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
-from endotsr.sequences.calibrations.stored import HALF_A_PIXEL
+from endotsr.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
