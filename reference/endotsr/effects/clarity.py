@@ -22,27 +22,20 @@ SCATTER = 4.0  # deviations (MAD) of the frames, which a single frame must excee
 NEIGHBOURS = 4  # frames on either side: slow change, as of the view, is no blur
 
 
-class _Series:
-    """Sharpness and dark channel of the training frames."""
-
-    def __init__(self, sequence: Sequence, clip: Clip, noise: Noise) -> None:
-        rows = [_measures(sequence.images[i], sequence.masks[i], noise.level) for i in sequence.train_index]
-        self.sharpness, self.dark = (np.array(column) for column in zip(*rows))
-
-
 def clarity_verdicts(sequence: Sequence, clip: Clip, noise: Noise) -> tuple[EffectVerdict, EffectVerdict]:
     """Verdicts on smoke and on blur."""
-    series = _Series(sequence, clip, noise)
-    fall = _local_median(series.sharpness) - series.sharpness
-    slow_fall = np.percentile(series.sharpness, 75) - series.sharpness
-    rise = series.dark - np.percentile(series.dark, 25)
+    rows = [_measures(sequence.images[i], sequence.masks[i], noise.level) for i in sequence.train_index]
+    sharpness, dark = (np.array(column) for column in zip(*rows))
+    fall = _local_median(sharpness) - sharpness
+    slow_fall = np.percentile(sharpness, 75) - sharpness
+    rise = dark - np.percentile(dark, 25)
     spread = SCATTER * float(np.median(np.abs(fall - np.median(fall)))) / 0.6745
     score = np.minimum(rise / SMOKE_RISE, slow_fall / SMOKE_FALL)
     smoke = _verdict("smoke", score, 1.0, "times the threshold", "rise of the dark channel with a fall of sharpness",
-                     clip, {"dark channel": series.dark})  # fmt: skip
+                     clip, {"dark channel": dark})  # fmt: skip
     clear = np.where(score >= 1.0, 0.0, fall)
     blur = _verdict("blur", clear, max(BLUR, spread), "natural logarithm", "fall of the log sharpness below its"
-                    " neighbours", clip, {"log sharpness": series.sharpness})  # fmt: skip
+                    " neighbours", clip, {"log sharpness": sharpness})  # fmt: skip
     return smoke, blur
 
 

@@ -96,6 +96,16 @@ def without_gaps(values: FloatArray, times: FloatArray) -> FloatArray:
     return out
 
 
+def slow_courses(times: FloatArray, count: int) -> FloatArray:
+    """cos(pi k t) for k = 0 ... count - 1, one column each: (m, count). Column k has k half waves over the clip."""
+    return np.cos(np.pi * np.arange(count) * times[:, None])
+
+
+def residual(design: FloatArray, values: FloatArray) -> FloatArray:
+    """Values (m,) or (m, n) less their least-squares fit by the columns of the design (m, k)."""
+    return values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+
+
 def tile_map(values: FloatArray, height: int, width: int) -> FloatArray:
     """Values of the tiles (T,) as a picture (h, w); pixels beyond the last whole tile are nan."""
     rows, columns = height // TILE, width // TILE

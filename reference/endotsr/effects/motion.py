@@ -8,7 +8,7 @@ are left out, and the distance by which flow to a frame and back misses counts a
 
 import numpy as np
 
-from endotsr.effects.clip import TILE, Clip, tile_map, without_gaps
+from endotsr.effects.clip import TILE, Clip, residual, slow_courses, tile_map, without_gaps
 from endotsr.effects.noise import Noise
 from endotsr.effects.periodic import Line, spectral_lines
 from endotsr.effects.rigid import fit_rigid
@@ -58,8 +58,7 @@ def half_waves(filled: FloatArray, times: FloatArray, null: FloatArray) -> int:
     flat = filled.reshape(len(times), -1) - filled.mean(axis=0).ravel()
     noise, total = len(times) * float((null**2).sum()), float((flat**2).sum())
     for count in range(1, len(times)):
-        design = np.stack([np.cos(np.pi * k * times) for k in range(count + 1)], axis=1)
-        rest = float(((flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]) ** 2).sum())
+        rest = float((residual(slow_courses(times, count + 1), flat) ** 2).sum())
         if rest <= (1 - EXPLAINED) * total + noise * (1 - count / len(times)):
             return count
     return len(times)
@@ -78,8 +77,7 @@ def _affine_fraction(filled: FloatArray, clip: Clip, tracks: FlowTracks) -> floa
     place = np.indices((rows, columns)).reshape(2, -1)[:, tracks.usable]
     design = np.stack([np.ones(place.shape[1]), *place], axis=1)
     flat = filled.reshape(-1, place.shape[1]).T
-    left = flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]
-    return 1.0 - float((left**2).sum() / max((flat**2).sum(), 1e-30))
+    return 1.0 - float((residual(design, flat) ** 2).sum() / max((flat**2).sum(), 1e-30))
 
 
 def _verdict(kind: str, statistic: float, clip: Clip, tracks: FlowTracks, size: FloatArray, lines: list[Line],

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+from endotsr.effects.clip import residual, slow_courses
 from endotsr.kernels.arrays import FloatArray
 
 LEAST_CYCLES = 3.0
@@ -59,7 +60,7 @@ def spectral_lines(tiles: FloatArray, times: FloatArray, frames: int, null: Floa
 
 def _lines_of(course: FloatArray, times: FloatArray, frames: int) -> list[Line]:
     """Lines of one mode, one after the other: each joins the slow part before the next is searched."""
-    base, lines = _slow(times), []
+    base, lines = slow_courses(times, SLOW), []
     for _ in range(LINES_OF_A_MODE):
         line = _strongest(course, times, frames, base)
         if line is None:
@@ -71,7 +72,7 @@ def _lines_of(course: FloatArray, times: FloatArray, frames: int) -> list[Line]:
 
 def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatArray) -> Line | None:
     """The rate that explains most, if it passes all conditions."""
-    left, m = _residual(base, course), len(times)
+    left, m = residual(base, course), len(times)
     total = float(left @ left)
     highest = frames / 2.2
     rates = np.arange(LEAST_CYCLES, highest, STEP)
@@ -82,7 +83,7 @@ def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatAr
         for harmonics in (1, 2, 3):
             if harmonics * rate > highest:
                 break
-            rest = _residual(np.concatenate([base, _waves(times, rate, harmonics)], axis=1), course)
+            rest = residual(np.concatenate([base, _waves(times, rate, harmonics)], axis=1), course)
             free, used = m - base.shape[1] - 2 * harmonics, 2 * harmonics
             square = max(float(rest @ rest), 1e-12 * total)
             single = stats.f.sf((total - square) / used / (square / free), used, free)
@@ -91,24 +92,16 @@ def _strongest(course: FloatArray, times: FloatArray, frames: int, base: FloatAr
     assert best is not None
     single, rate, harmonics = best
     probability = min(1.0, single * 3 * highest)  # about one independent rate a cycle, three numbers of harmonics
-    rest = _residual(np.concatenate([base, _waves(times, rate, harmonics)], axis=1), course)
+    rest = residual(np.concatenate([base, _waves(times, rate, harmonics)], axis=1), course)
     explained = 1.0 - float(rest @ rest) / total
     if probability > ALARM or explained < EXPLAINED or not _coherent(left, times, rate):
         return None
     return Line(rate, harmonics, explained, probability, (explained * total / float(course @ course)) ** 0.5)
 
 
-def _slow(times: FloatArray) -> FloatArray:
-    return np.stack([np.cos(np.pi * k * times) for k in range(SLOW)], axis=1)
-
-
 def _waves(times: FloatArray, rate: float, harmonics: int) -> FloatArray:
     phase = 2 * np.pi * rate * times[:, None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
-
-
-def _residual(design: FloatArray, course: FloatArray) -> FloatArray:
-    return course - design @ np.linalg.lstsq(design, course, rcond=None)[0]
 
 
 def _coherent(left: FloatArray, times: FloatArray, rate: float) -> bool:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from endotsr.effects.clip import LUMINANCE, TILE, Clip, tile_map, tile_means, without_gaps
+from endotsr.effects.clip import LUMINANCE, TILE, Clip, residual, slow_courses, tile_map, tile_means, without_gaps
 from endotsr.effects.noise import Noise
 from endotsr.effects.tracks import FlowTracks
 from endotsr.effects.verdict import Curve, EffectVerdict, Map
@@ -99,8 +99,7 @@ def local_change(clip: Clip, ratios: Ratios, gain: FloatArray, moving: bool) -> 
     courses = min(COURSES, (m - 2) // 2)
     if courses < 1:
         return np.zeros(left.shape[1], bool), np.zeros(left.shape[1])
-    design = np.stack([np.cos(np.pi * k * clip.times) for k in range(courses + 1)], axis=1)
-    rest = left - design @ np.linalg.lstsq(design, left, rcond=None)[0]
+    rest = residual(slow_courses(clip.times, courses + 1), left)
     free = m - courses - 1
     floor = (LUMINANCE @ ratios.noise) ** 2 * free
     explained = (left**2).sum(axis=0) - (rest**2).sum(axis=0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
-from endotsr.sequences.checks.guard import guarded, with_coverage
+from endotsr.sequences.checks.guard import guarded
 from endotsr.sequences.masks import check_polarity, check_single_masks, check_tissue_fraction
 from endotsr.sequences.read_frames import FrameFiles, Frames, read_frames
 from endotsr.sequences.sequence import Sequence
@@ -47,7 +47,7 @@ def assemble(
         notes.append(world_note(world, files.unit))
     notes += _mask_notes(frames, files, config)
     notes.append(_depth_note(depth, near, files.depth, "scene units" if files.arbitrary else files.unit))
-    notes += _guarded(frames, files, cameras, near)
+    notes += guarded(files, frames, cameras, near)
     notes += [frames.store.note] if frames.store.note else []
     if files.masks:
         notes += check_single_masks(masks, depth, images, list(map(str, files.masks)), config.allow_tissue_fraction)
@@ -77,13 +77,6 @@ def assemble(
         notes=notes,
         duration=files.duration,
     )
-
-
-def _guarded(frames: Frames, files: FrameFiles, cameras: list[Camera], near: float) -> list[str]:
-    """Notes of the checks that `endotsr check` makes too. Raises InputError for what it refuses."""
-    facts = frames.facts[0], with_coverage(frames.facts[1], frames.depth, frames.masks)
-    where = files.depth[0].parent
-    return guarded(files.images, facts, cameras, where, files.arbitrary, near, files.seconds, files.assumed)
 
 
 def check_percentiles(config: SequenceConfig) -> None:

@@ -33,7 +33,7 @@ from endotsr.sequences.sequence_file import (
     read_poses_with_gaps,
     read_sequence_file,
 )
-from endotsr.sequences.splits import parse_frame_range, split_frames
+from endotsr.sequences.splits import selected_frames
 from endotsr.splatting.camera import Camera
 
 STATES = f"{FILE_NAME} states"
@@ -97,11 +97,7 @@ def select_contents(folder: Path, config: SequenceConfig) -> tuple[Contents, ran
         )
     if config.masks == "none":
         contents = contents._replace(masks=[])
-    try:
-        frames = parse_frame_range(config.frames, len(contents.images))
-        split_frames(len(frames), config.split, config.block_length)
-    except InputError as error:
-        raise InputError(f"{folder}: {error}") from None
+    frames = selected_frames(config, len(contents.images), folder)
     chosen = {
         name: [getattr(contents, name)[i] for i in frames if getattr(contents, name)]
         for name in ("images", "right", "masks", "depth")
@@ -141,7 +137,7 @@ def read_common(folder: Path, config: SequenceConfig, near: float) -> Sequence:
         excluded_value=excluded,
         unit=contents.file.unit_in_words,
         depth_unit=entry.unit,
-        depth_scale=entry.scale * contents.file.to_scene(entry.unit),
+        depth_scale=contents.file.depth_scale,
         stated_in=stated_in,
         arbitrary=contents.file.arbitrary,
         assumed=entry.assumed,
@@ -203,7 +199,6 @@ def open_common(folder: Path) -> Recording:
     contents = list_contents(folder, poses=False)
     found = contents.file
     poses, faults = read_poses_with_gaps(found, folder / FILE_NAME)
-    scale = found.to_scene(found.depth.unit) * found.depth.scale if found.depth else 1.0
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i in wanted:
@@ -218,7 +213,7 @@ def open_common(folder: Path) -> Recording:
 
     def depth(i: int) -> NDArray[np.float32]:
         path = contents.depth[i]
-        return depth_plane(_sized(contents, read_plane(path), path), scale, path)
+        return depth_plane(_sized(contents, read_plane(path), path), found.depth_scale, path)
 
     return Recording(
         layout="common",
@@ -233,7 +228,7 @@ def open_common(folder: Path) -> Recording:
         depth_assumed=found.depth.assumed if found.depth else "",
         unit="arbitrary" if found.arbitrary else "mm",
         lens=found.camera.lens(folder),
-        baseline=found.camera.baseline * found.to_scene(found.unit) or None,
+        baseline=found.baseline or None,
         poses=poses,
         rate=found.frame_rate or None,
         times=None if found.times is None else np.array(found.times, np.float64),

@@ -14,6 +14,7 @@ from endotsr.kernels.arrays import FloatArray
 from endotsr.sequences.recording import Lens, Picture, PicturePair, Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import masks_are_proposed, stated_masks
+from endotsr.sequences.splits import parse_frame_range
 
 ALLOWED = "allowed: frames A:B[:S] or N, seconds As:Bs, several with commas, such as 0:10,12,30s:45s"
 
@@ -44,19 +45,17 @@ def without(frames: list[int], text: str, recording: Recording) -> list[int]:
 
 
 def _numbers(part: str, count: int) -> list[int]:
-    words = part.split(":")
+    """The frames of a slice, or the frame of a number."""
     try:
-        numbers = [int(word) if word.strip() else None for word in words]
+        number = int(part)
     except ValueError:
-        numbers = []
-    if not 1 <= len(numbers) <= 3 or (len(numbers) == 3 and numbers[2] is not None and numbers[2] < 1):
-        raise InputError(f"--frames {part!r}: no frames; {ALLOWED}")
-    for bound in numbers[:2]:
-        if bound is not None and not -count <= bound <= count - (len(numbers) == 1):
-            raise InputError(f"--frames {part!r}: {bound} is outside the {count} frames of the source")
-    if len(numbers) == 1:
-        return [] if numbers[0] is None else [numbers[0] % count]
-    return list(range(count)[slice(*numbers)])
+        try:
+            return [*parse_frame_range(part, count, 0)] if part else []
+        except InputError as error:
+            raise InputError(f"--{error}; {ALLOWED}") from None
+    if not -count <= number < count:
+        raise InputError(f"--frames {part!r}: {number} is outside the {count} frames of the source")
+    return [number % count]
 
 
 def _seconds(part: str, recording: Recording) -> list[int]:

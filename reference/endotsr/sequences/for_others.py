@@ -51,7 +51,7 @@ def _lens_and_poses(recording: Recording) -> tuple[Lens, list[CameraPose]]:
 def _nerfstudio(folder: Path, recording: Recording) -> str:
     lens, poses = _lens_and_poses(recording)
     file = read_sequence_file(folder)
-    step = file.depth.scale * THOUSANDTHS * file.to_scene(file.depth.unit) if file.depth else 1.0
+    step = THOUSANDTHS * file.depth_scale if file.depth else 1.0
     if recording.masks is not None:
         (folder / KEPT).mkdir()
     frames = []

@@ -91,8 +91,7 @@ def from_files(folder: Path, source: Path, kind: Kind, scale: float) -> MadeDept
     """Depth from the files of another program, one per frame. Raises InputError as `from_pairs`."""
     contents, files = list_contents(folder), list_pictures(source, DEPTH_ENDINGS)
     check_pairing(contents.images, files)
-    lens = contents.file.camera.lens(folder)
-    baseline = contents.file.camera.baseline * contents.file.to_scene(contents.file.unit)
+    lens, baseline = contents.file.camera.lens(folder), contents.file.baseline
     frames = (
         _without_mark(depth_of_values(read_plane(file), kind, scale, lens, baseline, file), kind, file)
         for file in files

@@ -22,6 +22,11 @@ MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 ARBITRARY = "arbitrary"
 
 
+def scene_factor(unit: str) -> float:
+    """The factor from lengths in `unit` to scene units: millimetres, or the arbitrary unit itself."""
+    return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
+
+
 class Lens(NamedTuple):
     """Intrinsics of one camera, pixels; pixel edges at integers."""
 

@@ -43,7 +43,7 @@ import numpy as np
 from endotsr.config import Section, checked, refuse_unknown_keys
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, CameraPose, Lens, checked_lens
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, checked_lens, scene_factor
 from endotsr.untrusted.toml import read_toml, toml_text
 
 FILE_NAME = "sequence.toml"
@@ -128,9 +128,15 @@ class SequenceFile(Section, frozen=True, kw_only=True):
         assumed = f", {self.depth.assumed} of the depth assumed" if self.depth and self.depth.assumed else ""
         return f"arbitrary unit{assumed}" if self.arbitrary else "mm"
 
-    def to_scene(self, unit: str) -> float:
-        """The factor from lengths in `unit` to scene units: millimetres, or the arbitrary unit itself."""
-        return 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
+    @property
+    def depth_scale(self) -> float:
+        """Scene units per stored depth value; 1 without depth."""
+        return self.depth.scale * scene_factor(self.depth.unit) if self.depth else 1.0
+
+    @property
+    def baseline(self) -> float:
+        """Baseline of the rectified pair, scene units; 0 without stereo."""
+        return self.camera.baseline * scene_factor(self.unit)
 
 
 def read_sequence_file(folder: Path) -> SequenceFile:
@@ -208,7 +214,7 @@ def read_poses(found: SequenceFile, path: Path) -> list[CameraPose] | None:
     entry = found.poses
     if len(entry.matrices) != found.frames:
         raise InputError(f"{path}: poses.matrices: {len(entry.matrices)} rows for {found.frames} frames")
-    scale = found.to_scene(found.unit)
+    scale = scene_factor(found.unit)
     return [_pose(row, entry, scale, f"{path}: poses.matrices: frame {i}") for i, row in enumerate(entry.matrices)]
 
 
@@ -227,7 +233,7 @@ def read_poses_with_gaps(found: SequenceFile, path: Path) -> tuple[list[CameraPo
     faults = []
     for i, row in enumerate(found.poses.matrices):
         try:
-            poses.append(_pose(row, found.poses, found.to_scene(found.unit), f"{path}: poses.matrices: frame {i}"))
+            poses.append(_pose(row, found.poses, scene_factor(found.unit), f"{path}: poses.matrices: frame {i}"))
         except InputError as error:
             poses.append(None)
             faults.append(str(error))

@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
+from endotsr.kernels.arrays import FloatArray
 from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
 from endotsr.sequences.calibrations import lens_or_rig
 from endotsr.sequences.depth_files import DEPTH_ENDINGS, depth_plane, read_plane
 from endotsr.sequences.files import check_pairing, frame_numbers, list_pictures
+from endotsr.sequences.masks import MOST_SOFT_FRACTION
 from endotsr.sequences.recording import (
     ARBITRARY,
-    MILLIMETRES,
+    CameraPose,
     Lens,
     Picture,
     PicturePair,
@@ -26,12 +28,13 @@ from endotsr.sequences.recording import (
     checked_lens,
     colour_picture,
     grey_plane,
+    scene_factor,
 )
 from endotsr.sequences.smaller import nearest_pixels
 from endotsr.sequences.source_options import SourceOptions
+from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
 
 PROPOSAL = "proposal.json"  # beside a folder of masks: a program proposed them
-MOST_SOFT = 0.05  # of a mask: more pixels between black and white are no mask
 
 
 def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
@@ -41,6 +44,12 @@ def files_of(path: Path, endings: tuple[str, ...]) -> list[Path]:
             raise InputError(f"{path}: allowed: a file that ends in {', '.join(endings)}, or a folder of such files")
         return [path]
     return list_pictures(path, endings)
+
+
+def size_of(files: list[Path]) -> tuple[int, int]:
+    """Width and height of the first picture. Raises InputError."""
+    height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
+    return width, height
 
 
 def split_pair(picture: Picture, stereo: str, where: object) -> PicturePair:
@@ -98,7 +107,7 @@ def mask_reader(
             return None
         plane = grey_plane(read_picture(path), path)
         values = np.unique(plane)
-        if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT:
+        if len(values) > 2 and np.isin(plane, values[[0, -1]]).mean() < 1 - MOST_SOFT_FRACTION:
             raise InputError(f"{path}: {len(values)} different values: this is not a mask; allowed: two values")
         white = plane > values[-1] / 2
         tissue = ~white if excluded_value == "white" else white
@@ -175,8 +184,12 @@ def stated_depth(
         return None
     files = files_of(options.depth, DEPTH_ENDINGS)
     paired = numbered(files, frames) if isinstance(frames, int) else beside(frames, files)
-    factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
-    return depth_reader(paired, options.depth_scale * factor)
+    return depth_reader(paired, depth_step(options))
+
+
+def depth_step(options: SourceOptions) -> float:
+    """Scene units per stored value of the files of `--depth`."""
+    return options.depth_scale * scene_factor(options.depth_unit)
 
 
 def with_stated(recording: Recording, options: SourceOptions) -> Recording:
@@ -212,6 +225,18 @@ def stated_camera(options: SourceOptions, width: int, height: int, where: object
         return None, None
     fx, fy, cx, cy = options.camera
     return checked_lens(Lens(fx, fy, cx, cy, width, height, options.distortion), where), None
+
+
+def stated_poses(
+    options: SourceOptions, count: int, rate: float | None, times: FloatArray | None = None
+) -> tuple[list[CameraPose | None] | None, list[str]]:
+    """The poses of `--trajectory`, and a note; (None, []) without it. See `poses_of_frames`. Raises InputError."""
+    if options.trajectory is None:
+        return None, []
+    unit = options.trajectory_unit or "m"
+    trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
+    poses, how = poses_of_frames(trajectory, count, rate, times)
+    return poses, [f"{options.trajectory.name}: {how}; positions in {unit}"]
 
 
 def unit_of(options: SourceOptions, otherwise: str = "mm") -> str:

@@ -8,6 +8,7 @@ split counts frames. It does not depend on their pictures or times.
 import numpy as np
 from numpy.typing import NDArray
 
+from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import IndexArray
 
@@ -114,8 +115,18 @@ def split_frames(count: int, split: str, block_length: int) -> tuple[IndexArray,
     return train, test
 
 
-def parse_frame_range(text: str, count: int) -> range:
-    """Frames selected by "start:stop[:step]" in Python's slice notation; "" selects all.
+def selected_frames(config: SequenceConfig, count: int, where: object) -> range:
+    """The frames that a configuration selects. Raises InputError naming `where`, also for an impossible split."""
+    try:
+        frames = parse_frame_range(config.frames, count)
+        split_frames(len(frames), config.split, config.block_length)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return frames
+
+
+def parse_frame_range(text: str, count: int, least: int = LEAST_FRAMES) -> range:
+    """At least `least` of `count` frames, selected by "start:stop[:step]" in Python's slice notation; "" selects all.
 
     Negative numbers count from the end. Unlike a Python slice, an end beyond the sequence is refused rather than
     cut off, and the step is at least 1.
@@ -123,9 +134,8 @@ def parse_frame_range(text: str, count: int) -> range:
     """
     if not text.strip():
         return range(count)
-    parts = text.split(":")
     try:
-        numbers = [int(part) if part.strip() else None for part in parts]
+        numbers = [int(part) if part.strip() else None for part in text.split(":")]
     except ValueError:
         numbers = []
     if len(numbers) not in (2, 3):
@@ -137,8 +147,6 @@ def parse_frame_range(text: str, count: int) -> range:
         if bound is not None and not -count <= bound <= count:
             raise InputError(f"frames {text!r}: {bound} is outside the {count} frames of the sequence")
     chosen = range(count)[slice(start, stop, step)]
-    if len(chosen) < LEAST_FRAMES:
-        raise InputError(
-            f"frames {text!r}: selects {len(chosen)} of {count} frames; at least {LEAST_FRAMES} are needed"
-        )
+    if len(chosen) < least:
+        raise InputError(f"frames {text!r}: selects {len(chosen)} of {count} frames; at least {least} are needed")
     return chosen

@@ -23,14 +23,14 @@ from endotsr.sequences.checks.depth import (
     light_finding,
     mark_finding,
     unit_finding,
+    usual_depth,
 )
-from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
+from endotsr.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
 from endotsr.sequences.checks.kinds import Finding
 from endotsr.sequences.recording import ARBITRARY, Recording
 
 NAMES = re.compile(r"dispar|(?<![a-z])disp(?![a-z])|inverse|inv_?depth|relative|midas|depth_?anything|(?<![a-z])dpt")
 LOOKED_AT = 8  # frames
-MATCHED = 128  # px: narrower stereo pairs are not matched
 REMEDY = (
     "a disparity is read by `endotsr depth FOLDER --given FILES --kind disparity` after a prepare without --depth, a"
     " relative inverse depth with --kind relative; --trust-depth reads the files as lengths anyway"
@@ -76,8 +76,10 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
             tissue = masks(i) if masks else None
             light.append(light_correlation(pair.left, plane, tissue))
             shading += filter(None, [shading_fit(pair.left, plane, tissue)])
-            if len(planes) == 1 and recording.rig is None and pair.right is not None and plane.shape[1] > MATCHED:
-                found = stereo_finding(plane, _disparity(pair.left, pair.right), where, i)
+            right = pair.right if recording.rig is None and len(planes) == 1 else None
+            disparity = None if right is None else agreed_disparity(pair.left, right)
+            if disparity is not None:
+                found = stereo_finding(plane, disparity, where, i)
                 _refuse_flipped(found, stated.path)
                 if found:
                     return found[0].what
@@ -89,8 +91,7 @@ def _of_values(recording: Recording, frames: list[int]) -> str:
         raise InputError(f"{stated.path}: {marked[0].what}: {marked[0].why}; {marked[0].remedy}, or --trust-depth")
     if len(planes) > 2 and (full := _full_scale([plane / stated.step for plane in planes])):
         return full
-    usual = float(np.median([fact.median for fact in facts]))
-    unit = [] if recording.unit == ARBITRARY else unit_finding(usual, where)
+    unit = [] if recording.unit == ARBITRARY else unit_finding(usual_depth(facts), where)
     if unit:
         return f"{unit[0].what}; another unit is stated with --depth-unit and --depth-scale"
     found = light_finding(light, where)
@@ -110,10 +111,3 @@ def _full_scale(stored: list[NDArray[np.float32]]) -> str:
     if all(0.99 <= value <= 1.0 for value in highest):
         return "the largest number of every frame is 1: the frames are stretched to the full range"
     return ""
-
-
-def _disparity(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
-    from endotsr.opencv.stereo import match_pair
-
-    match = match_pair(left, right, 0, 64, smooth=False)
-    return np.where(match.disagreement <= 1, match.raw, np.nan)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, CameraPose
+from endotsr.sequences.recording import CameraPose, scene_factor
 from endotsr.sequences.sequence_file import OPENGL, inverse_pose
 from endotsr.untrusted.files import read_text
 
@@ -48,8 +48,7 @@ def read_trajectory(path: Path, unit: str, direction: str = "camera_to_world", a
     if repeated.size:
         first = lines[order[repeated[0] + 1]]
         raise InputError(f"{path}: line {first}: the stamp {rows[repeated[0], 0]:.12g} occurs twice")
-    scale = 1.0 if unit == ARBITRARY else MILLIMETRES[unit]
-    poses = [_pose(row, scale, direction, axes) for row in rows]
+    poses = [_pose(row, scene_factor(unit), direction, axes) for row in rows]
     return Trajectory(rows[:, 0].astype(np.float64), poses, Path(path))
 
 

@@ -20,7 +20,7 @@ from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.slit import make_slit
 from endotsr.simulator.surface import PULL_CENTRE, PULSATION_CENTRE, make_surface, surface_point
 from endotsr.simulator.texture import half_extent
-from endotsr.simulator.views import see_rays, to_camera
+from endotsr.simulator.views import pixel_of, see_rays
 
 GRID = (9, 8)  # rays across and down the picture
 SMALLEST = 1e-6  # a size at which an effect has no extent
@@ -88,11 +88,8 @@ def _points_fit(settings: SimulatorSettings, points: Points) -> bool:
     """Whether the material points lie in the picture at every frame."""
     surface, times = make_surface(settings), time_stamps(settings.frames)
     for camera, t in zip(make_cameras(settings, times), times):
-        x, y, z = to_camera(camera, surface_point(surface, points(settings), float(t)))
-        if z.min() <= 0:
-            return False
-        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-        if min(u.min(), v.min(), camera.width - u.max(), camera.height - v.max()) < 0:
+        u, v, z = pixel_of(camera, surface_point(surface, points(settings), float(t)))
+        if z.min() <= 0 or min(u.min(), v.min(), camera.width - u.max(), camera.height - v.max()) < 0:
             return False
     return True
 

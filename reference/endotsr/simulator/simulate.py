@@ -15,7 +15,7 @@ from endotsr.sequences.splits import split_frames
 from endotsr.simulator.frames import make_scene, simulated_frames
 from endotsr.simulator.settings import SimulatorSettings
 from endotsr.simulator.surface import Surface, surface_point
-from endotsr.simulator.views import to_camera
+from endotsr.simulator.views import pixel_of
 
 UNIT = "mm"
 
@@ -51,10 +51,8 @@ class SimulatedSequence:
         NaN where frame `source` shows the wound of a slit.
         """
         camera = self.sequence.cameras[target]
-        seen = to_camera(camera, self.true_positions(source, target))
-        u = camera.fx * seen[0] / seen[2] + camera.cx - (np.arange(camera.width) + 0.5)
-        v = camera.fy * seen[1] / seen[2] + camera.cy - (np.arange(camera.height) + 0.5)[:, None]
-        return np.stack([u, v])
+        u, v, _ = pixel_of(camera, self.true_positions(source, target))
+        return np.stack([u - (np.arange(camera.width) + 0.5), v - (np.arange(camera.height) + 0.5)[:, None]])
 
 
 def simulate(settings: SimulatorSettings | None = None) -> SimulatedSequence:

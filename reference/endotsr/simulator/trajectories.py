@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from endotsr.kernels.arrays import FloatArray
 from endotsr.simulator.simulate import SimulatedSequence
 from endotsr.simulator.surface import Surface, surface_point
-from endotsr.simulator.views import see_rays, to_camera
+from endotsr.simulator.views import pixel_of, see_rays
 from endotsr.splatting.camera import Camera
 
 
@@ -72,10 +72,8 @@ def follow(
 ) -> None:
     """Fill frame i of the tracks. covered (H, W): the pixels that an instrument covers."""
     tracks.position[i] = surface_point(surface, tracks.material, t)
-    x, y, z = to_camera(camera, tracks.position[i])
-    in_front = np.where(z > 0, z, np.nan)
-    tracks.pixel[i] = camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy
-    tracks.depth[i] = z
+    found = pixel_of(camera, tracks.position[i])
+    tracks.pixel[i], tracks.depth[i] = found[:2], found[2]
     tracks.visible[i] = _visible(tracks.pixel[i], covered)
 
 

@@ -181,6 +181,13 @@ def to_camera(camera: Camera, point: FloatArray) -> FloatArray:
     return rotate(camera.rotation, point) + camera.translation.reshape(3, *[1] * (point.ndim - 1))
 
 
+def pixel_of(camera: Camera, point: FloatArray) -> FloatArray:
+    """Image position u, v in pixels and view-space z of world positions, (3, ...) each; u and v are NaN if z <= 0."""
+    x, y, z = to_camera(camera, point)
+    in_front = np.where(z > 0, z, np.nan)
+    return np.stack([camera.fx * x / in_front + camera.cx, camera.fy * y / in_front + camera.cy, z])
+
+
 def _start(surface: Surface, camera: Camera, ray_x: FloatArray, ray_y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Material coordinates at which the rays meet the plane z = distance."""
     direction = rotate(camera.rotation.T, np.stack([ray_x, ray_y, np.ones_like(ray_x)]))

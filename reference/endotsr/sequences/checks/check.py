@@ -24,8 +24,9 @@ from endotsr.sequences.checks.depth import (
     depth_findings,
     light_correlation,
     light_finding,
+    usual_depth,
 )
-from endotsr.sequences.checks.flips import Fit, shading_finding, shading_fit, stereo_finding
+from endotsr.sequences.checks.flips import Fit, agreed_disparity, shading_finding, shading_fit, stereo_finding
 from endotsr.sequences.checks.frames import (
     FrameFacts,
     frame_facts,
@@ -108,12 +109,11 @@ def check_sequence(path: Path, config: Config) -> Checked:
     if run.samples:
         _check_masks(parts, run, config)
     config = _of_length(parts, config, run)
-    usual = float(np.median([fact.median for fact in run.depth if fact.median] or [0.0]))
     if size:
         facts |= {"width": size[1], "height": size[0]}
         cameras = run.tried(lambda: parts.cameras(size[1], size[0]), "cameras", parts.camera_file)
         if cameras:
-            run.findings += camera_findings(cameras, usual, str(parts.camera_file))
+            run.findings += camera_findings(cameras, usual_depth(run.depth), str(parts.camera_file))
         facts["cost"] = _cost(parts, size, config, run)._asdict()
     return Checked(str(path), worst_first(run.findings), facts, run.pictures)
 
@@ -205,12 +205,11 @@ def _sample(run: _Pass, file: Path, picture: NDArray, tissue: NDArray | None, de
 
 def _against_stereo(parts: Parts, run: _Pass, picture: NDArray, depth: NDArray, file: Path | None) -> None:
     """The depth of the first frame against the disparity of its stereo pair."""
-    from endotsr.opencv.stereo import match_pair
-
     right = run.tried(lambda: read_picture(parts.right[0]), "picture", parts.right[0], 0)
-    if right is not None and right.shape == picture.shape and picture.shape[1] > 128:
-        match = match_pair(picture, right, 0, 64, smooth=False)
-        disparity = np.where(match.disagreement <= 1, match.raw, np.nan)
+    if right is None or right.shape != picture.shape:
+        return
+    disparity = agreed_disparity(picture, right)
+    if disparity is not None:
         run.findings += stereo_finding(depth, disparity, str(file), 0)
 
 

@@ -66,7 +66,7 @@ def depth_findings(
     with_depth = [fact for fact in facts if fact.median > 0]
     if not with_depth:
         return [finding("no-depth", where, "no pixel of any frame has depth")]
-    usual = float(np.median([fact.median for fact in with_depth]))
+    usual = usual_depth(facts)
     found = _numbers(with_depth, where)
     if assumed:
         found = [finding("assumed-depth", where, f"not measured of the depth: its {assumed}")]
@@ -79,6 +79,11 @@ def depth_findings(
     if coverage < LITTLE:
         found.append(finding("little-depth", where, f"{coverage:.1%} of the tissue has depth"))
     return found
+
+
+def usual_depth(facts: list[DepthFacts]) -> float:
+    """The median over the frames with depth of their median depth; 0 without any."""
+    return float(np.median([fact.median for fact in facts if fact.median] or [0.0]))
 
 
 def _of_frame(fact: DepthFacts, usual: float, where: str, i: int) -> list[Finding]:

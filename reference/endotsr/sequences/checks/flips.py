@@ -20,6 +20,7 @@ FEWEST = 100  # cells of a comparison
 LEAST, GAIN = 0.3, 0.2  # of a shading; right clips have 0.55 to 0.69 as stored, and at most 0.21 turned
 FITS, BETTER = 0.8, 0.1  # of the correlation with a stereo pair; right clips have 0.90 to 0.98
 INVERTED = -0.5
+NARROW = 128  # px
 
 
 class Fit(NamedTuple):
@@ -83,6 +84,16 @@ def shading_finding(fits: list[Fit], where: str) -> list[Finding]:
         return []
     what = f"over {len(fits)} frames the depth fits the light {flip} ({value:.2f}; as stored {usual.stored:.2f})"
     return [finding("flipped-depth", where, what)]
+
+
+def agreed_disparity(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32] | None:
+    """Disparity (H, W) of a pair, px; NaN where matching from left and right disagrees; None for narrow pictures."""
+    from endotsr.opencv.stereo import match_pair
+
+    if left.shape[1] <= NARROW:
+        return None
+    match = match_pair(left, right, 0, 64, smooth=False)
+    return np.where(match.disagreement <= 1, match.raw, np.float32(np.nan))
 
 
 def stereo_finding(depth: Array, disparity: Array, where: str, frame: int) -> list[Finding]:

@@ -5,47 +5,31 @@ of the sequence, or an `InputError` in the words of the finding.
 """
 
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endotsr.errors import InputError
 from endotsr.sequences.checks.cameras import camera_findings
-from endotsr.sequences.checks.depth import DepthFacts, depth_findings
-from endotsr.sequences.checks.frames import FrameFacts, frame_findings, gap_findings, time_findings
+from endotsr.sequences.checks.depth import DepthFacts, depth_findings, usual_depth
+from endotsr.sequences.checks.frames import frame_findings, gap_findings, time_findings
 from endotsr.sequences.checks.kinds import Finding, worst_first
+from endotsr.sequences.read_frames import FrameFiles, Frames
 from endotsr.splatting.camera import Camera
 
 SAID_ALREADY = ("assumed-depth", "far-from-origin", "frame-without-depth", "frame-without-tissue")  # in other notes
 MOST = 5  # notes of one kind
 
 
-def guarded(
-    images: list[Path],
-    facts: tuple[list[FrameFacts], list[DepthFacts]],
-    cameras: list[Camera],
-    depth_folder: Path,
-    arbitrary: bool,
-    near: float,
-    seconds: NDArray[np.float64] | None = None,
-    assumed: str = "",
-) -> list[str]:
-    """Notes on what the checks of pictures, depth and cameras find.
-
-    images   the files of the frames, in time order
-    facts    of pictures and of depth, one per frame
-    seconds  of the frames, where they are not evenly spaced
-    assumed  what is not measured of the depth
-
-    Raises:  InputError for the first refusal.
-    """
-    pictures, depth = facts
-    found = gap_findings(images) + time_findings(seconds, str(images[0].parents[1]))
-    found += frame_findings(pictures, str(images[0].parent))
-    found += depth_findings(depth, str(depth_folder), arbitrary, near, assumed)
-    usual = float(np.median([fact.median for fact in depth if fact.median] or [0.0]))
-    found += camera_findings(cameras, usual, str(images[0].parents[1]))
+def guarded(files: FrameFiles, frames: Frames, cameras: list[Camera], near: float) -> list[str]:
+    """Notes on the findings of the checks of pictures, depth and cameras. Raises InputError for the first refusal."""
+    pictures, depth = frames.facts
+    depth = with_coverage(depth, frames.depth, frames.masks)
+    folder = str(files.images[0].parents[1])
+    found = gap_findings(files.images) + time_findings(files.seconds, folder)
+    found += frame_findings(pictures, str(files.images[0].parent))
+    found += depth_findings(depth, str(files.depth[0].parent), files.arbitrary, near, files.assumed)
+    found += camera_findings(cameras, usual_depth(depth), folder)
     return notes_of([finding for finding in found if finding.code not in SAID_ALREADY])
 
 

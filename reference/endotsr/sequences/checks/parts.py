@@ -16,7 +16,7 @@ from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.endonerf import NO_MASKS
 from endotsr.sequences.files import list_pictures
 from endotsr.sequences.layouts import readable_layout
-from endotsr.sequences.poses import cameras_from_rows, find_pose_file, read_pose_rows
+from endotsr.sequences.poses import POSE_FILES, cameras_from_rows, find_pose_file, read_pose_rows
 from endotsr.sequences.sequence_file import FILE_NAME, IMAGES, RIGHT, SequenceFile, read_poses, read_sequence_file
 from endotsr.splatting.camera import Camera
 
@@ -69,7 +69,7 @@ def _endonerf_parts(folder: Path, config: SequenceConfig, findings: list[Finding
         rows = read_pose_rows(file, len(images))
         return cameras_from_rows(rows, width, height, file, range(len(images)))
 
-    where = next((folder / n for n in ("poses_bounds.npy", "pose_bounds.npy") if (folder / n).exists()), folder)
+    where = next((folder / name for name in POSE_FILES if (folder / name).exists()), folder)
     return Parts(folder, images, masks, depth, right, config.excluded_value, 1.0, False, where, cameras)
 
 
@@ -96,13 +96,12 @@ def _common_parts(folder: Path, config: SequenceConfig, findings: list[Finding])
             raise InputError(f"{where}: frames = {file.frames}, but images/ holds {len(images)} pictures")
         return cameras_of(Contents(folder, file, images, right, masks, depth, read_poses(file, where)))
 
-    scale = file.depth.scale * file.to_scene(file.depth.unit) if file.depth else 1.0
     excluded, stated_in = polarity(file, folder, config)
     seconds = None if file.times is None else np.array(file.times, np.float64)
     assumed = file.depth.assumed if file.depth else ""
     return Parts(
-        folder, images, masks, depth, right, excluded, scale, file.arbitrary, where, cameras, seconds, stated_in,
-        assumed,
+        folder, images, masks, depth, right, excluded, file.depth_scale, file.arbitrary, where, cameras, seconds,
+        stated_in, assumed,
     )  # fmt: skip
 
 

@@ -15,10 +15,10 @@ from typing import NamedTuple
 from endotsr.config import SequenceConfig
 from endotsr.errors import InputError
 from endotsr.sequences.calibration_formats import HALF_A_PIXEL
-from endotsr.sequences.recording import ARBITRARY, MILLIMETRES, Recording, StatedDepth
+from endotsr.sequences.recording import Recording, StatedDepth
 from endotsr.sequences.sequence import Sequence
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import masks_are_proposed
+from endotsr.sequences.sources import depth_step, masks_are_proposed
 
 # What a user may state of a source and only some layouts read; the others follow from these.
 STATEMENTS = (
@@ -77,8 +77,7 @@ def open_recording(path: Path, options: SourceOptions) -> Recording:
         said = f"{options.calibration.name}: {HALF_A_PIXEL}"
         recording = replace(recording, notes=[*recording.notes, said])
     if options.depth is not None:
-        factor = 1.0 if options.depth_unit == ARBITRARY else MILLIMETRES[options.depth_unit]
-        stated = StatedDepth(options.depth, options.depth_scale * factor, options.trust_depth)
+        stated = StatedDepth(options.depth, depth_step(options), options.trust_depth)
         recording = replace(recording, stated_depth=stated)
     return replace(recording, proposed=True) if masks_are_proposed(options) else recording
 

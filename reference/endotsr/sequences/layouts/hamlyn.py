@@ -9,14 +9,14 @@ intrinsics.txt       K of the rectified pictures, three lines of three or four n
 from pathlib import Path
 
 from endotsr.errors import InputError
-from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.opencv.pictures import PICTURE_ENDINGS
 from endotsr.sequences.calibration_formats import HALF_A_PIXEL, read_matrix
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import Recording, colour_picture, lens_of_matrix
+from endotsr.sequences.recording import Recording, lens_of_matrix
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, with_stated
+from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, size_of, with_stated
 
 CAMERA = "intrinsics.txt"
 LEFT, RIGHT, DEPTH = ("color", "image01"), ("image02",), ("depth", "depth01")
@@ -40,7 +40,7 @@ def open_hamlyn(path: Path, options: SourceOptions) -> Recording:
     right = list_pictures(right_folder, PICTURE_ENDINGS) if right_folder else []
     if right:
         check_pairing(left, right)
-    height, width = colour_picture(read_picture(left[0]), left[0]).shape[:2]
+    width, height = size_of(left)
     depth = depth_reader(beside(left, list_pictures(depth_folder, DEPTH_ENDINGS)), 1.0) if depth_folder else None
     recording = Recording(
         layout="hamlyn",

@@ -11,14 +11,13 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.kernels.arrays import FloatArray
-from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.checks.frames import gap_findings
 from endotsr.sequences.files import time_order
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, Recording, checked_lens, colour_picture
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Lens, Recording, checked_lens
 from endotsr.sequences.sequence_file import OPENGL, checked_rotation, inverse_pose
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import depth_reader, mask_reader, pictures_from_files, stated_masks
+from endotsr.sequences.sources import depth_reader, mask_reader, pictures_from_files, size_of, stated_masks
 from endotsr.untrusted.files import read_bytes
 from endotsr.untrusted.json import integer, listed, number, read_json
 from endotsr.untrusted.names import relative_path
@@ -84,7 +83,7 @@ def open_nerfstudio(path: Path, options: SourceOptions) -> Recording:
     files, entries = [files[i] for i in order], [entries[i] for i in order]
     masked, planes = ([_named(folder, entry.get(key), f"{file}: {key}") for entry in entries]
                       for key in ("mask_path", "depth_file_path"))  # fmt: skip
-    height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
+    width, height = size_of(files)
     lenses = {read_lens(data, entry, (width, height), f"{file}: frame {i}") for i, entry in enumerate(entries)}
     if len(lenses) > 1:
         raise InputError(f"{file}: {len(lenses)} different cameras; allowed: one for all frames")

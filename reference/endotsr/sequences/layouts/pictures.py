@@ -9,22 +9,23 @@ import re
 from pathlib import Path
 
 from endotsr.errors import InputError
-from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.opencv.pictures import PICTURE_ENDINGS
 from endotsr.sequences.checks.frames import gap_findings, profile_findings
 from endotsr.sequences.files import check_pairing, frame_numbers
 from endotsr.sequences.layouts import STATEMENTS, Layout
-from endotsr.sequences.recording import CameraPose, Recording, colour_picture
+from endotsr.sequences.recording import Recording
 from endotsr.sequences.source_options import SourceOptions
 from endotsr.sequences.sources import (
     files_of,
     halves,
     pictures_from_files,
+    size_of,
     stated_camera,
     stated_depth,
     stated_masks,
+    stated_poses,
     unit_of,
 )
-from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
 
 PAIRS = (("left", "right"), ("images", "images_right"), ("image_0", "image_1"), ("left_images", "right_images"),
          ("Left", "Right"), ("cam0", "cam1"), ("image01", "image02"))  # fmt: skip
@@ -80,16 +81,9 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
     stereo = "none" if options.stereo == "auto" else options.stereo
     if right and stereo != "none":
         raise InputError(f"{path}: a folder of right pictures and --stereo {stereo}: allowed: one of them")
-    stored = colour_picture(read_picture(left[0]), left[0])
-    width, height = halves(stored.shape[1], stored.shape[0], stereo)
+    width, height = halves(*size_of(left), stereo)
     lens, rig = stated_camera(options, width, height, path)
-    poses: list[CameraPose | None] | None = None
-    notes = [found.line for found in profile_findings(left[0]) + gap_findings(left)]
-    if options.trajectory is not None:
-        unit = options.trajectory_unit or "m"
-        trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
-        poses, how = poses_of_frames(trajectory, len(left), options.rate)
-        notes.append(f"{options.trajectory.name}: {how}; positions in {unit}")
+    poses, notes = stated_poses(options, len(left), options.rate)
     return Recording(
         layout="pictures",
         where=path,
@@ -103,7 +97,7 @@ def open_pictures(path: Path, options: SourceOptions) -> Recording:
         baseline=options.baseline,
         poses=poses,
         rate=options.rate,
-        notes=notes,
+        notes=[found.line for found in profile_findings(left[0]) + gap_findings(left)] + notes,
     )
 
 

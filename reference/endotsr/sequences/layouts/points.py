@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.opencv.pictures import PICTURE_ENDINGS
 from endotsr.sequences.files import frame_numbers, list_pictures
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import ARBITRARY, CameraPose, Recording, colour_picture, lens_of_matrix
+from endotsr.sequences.recording import ARBITRARY, CameraPose, Recording, lens_of_matrix
 from endotsr.sequences.sequence_file import checked_rotation
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import mask_reader, pictures_from_files
+from endotsr.sequences.sources import mask_reader, pictures_from_files, size_of
 from endotsr.untrusted.arrays import read_npz
 
 CAMERAS = "cameras_points.npz"
@@ -52,7 +52,7 @@ def open_points(path: Path, options: SourceOptions) -> Recording:
     """The folder as a recording. Raises InputError."""
     frames = list_pictures(path / "images", PICTURE_ENDINGS)
     found = read_cameras(path / CAMERAS, frames)
-    height, width = colour_picture(read_picture(frames[0]), frames[0]).shape[:2]
+    width, height = size_of(frames)
     where = path / CAMERAS
     poses: list[CameraPose | None] = [
         CameraPose(checked_rotation(matrix[:3, :3], f"{where}: w2c: frame {i}"), matrix[:3, 3].astype(np.float64))

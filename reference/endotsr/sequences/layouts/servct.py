@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.opencv.pictures import PICTURE_ENDINGS, read_picture
+from endotsr.opencv.pictures import PICTURE_ENDINGS
 from endotsr.sequences.calibration_formats import HALF_A_PIXEL
 from endotsr.sequences.depth_files import DEPTH_ENDINGS
 from endotsr.sequences.files import check_pairing, list_pictures
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import Lens, Recording, colour_picture, lens_of_matrix
+from endotsr.sequences.recording import Lens, Recording, lens_of_matrix
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, with_stated
+from endotsr.sequences.sources import beside, depth_reader, pictures_from_files, size_of, with_stated
 from endotsr.untrusted.json import read_json
 from endotsr.untrusted.yaml import matrix
 
@@ -43,7 +43,7 @@ def open_servct(path: Path, options: SourceOptions) -> Recording:
     """The experiment as a recording. Raises InputError for pairs whose cameras differ."""
     left, right = (list_pictures(path / name, PICTURE_ENDINGS) for name in (LEFT, RIGHT))
     check_pairing(left, right)
-    height, width = colour_picture(read_picture(left[0]), left[0]).shape[:2]
+    width, height = size_of(left)
     files = list_pictures(path / CAMERAS, (".json",))
     cameras = [read_camera(file, width, height) for file in files]
     numbers = np.array([[*lens[:4], baseline] for lens, baseline in cameras])

@@ -10,11 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from endotsr.errors import InputError
-from endotsr.opencv.pictures import read_picture
 from endotsr.sequences.layouts import Layout
-from endotsr.sequences.recording import CameraPose, Lens, Recording, colour_picture
+from endotsr.sequences.recording import CameraPose, Lens, Recording
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import depth_reader, pictures_from_files, stated_camera, stated_depth, stated_masks
+from endotsr.sequences.sources import (
+    depth_reader,
+    pictures_from_files,
+    size_of,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+)
 from endotsr.sequences.trajectory import poses_at, read_trajectory
 from endotsr.untrusted.files import read_text
 from endotsr.untrusted.names import relative_path
@@ -54,7 +60,7 @@ def read_list(path: Path) -> tuple[np.ndarray, list[Path]]:
 def open_tum(path: Path, options: SourceOptions) -> Recording:
     """The folder as a recording. Raises InputError."""
     times, files = read_list(path / LIST)
-    height, width = colour_picture(read_picture(files[0]), files[0]).shape[:2]
+    width, height = size_of(files)
     lens, _ = stated_camera(options, width, height, path)
     notes = []
     if lens is None and (width, height) == (640, 480):

@@ -7,10 +7,17 @@ import numpy as np
 
 from endotsr.errors import InputError
 from endotsr.sequences.layouts import STATEMENTS, Layout
-from endotsr.sequences.recording import CameraPose, Picture, PicturePair, Recording
+from endotsr.sequences.recording import Picture, PicturePair, Recording
 from endotsr.sequences.source_options import SourceOptions
-from endotsr.sequences.sources import halves, split_pair, stated_camera, stated_depth, stated_masks, unit_of
-from endotsr.sequences.trajectory import poses_of_frames, read_trajectory
+from endotsr.sequences.sources import (
+    halves,
+    split_pair,
+    stated_camera,
+    stated_depth,
+    stated_masks,
+    stated_poses,
+    unit_of,
+)
 from endotsr.sequences.video_file import VIDEO_ENDINGS, VideoFacts, video_facts, video_pictures
 
 
@@ -29,16 +36,11 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
     rate = options.rate or facts.rate
     times = None if options.rate else facts.times
     lens, rig = stated_camera(options, width, height, path)
-    poses: list[CameraPose | None] | None = None
     notes = _notes(facts, rate, path)
     if facts.turn:
         done = f"turned by {facts.turn} degrees counter-clockwise" if quarters else "taken as stored"
         notes.append(f"{path.name} states a rotation: pictures {done}; intrinsics, masks and depth are of these")
-    if options.trajectory is not None:
-        unit = options.trajectory_unit or "m"
-        trajectory = read_trajectory(options.trajectory, unit, options.direction, options.axes)
-        poses, how = poses_of_frames(trajectory, facts.count, rate, times)
-        notes.append(f"{options.trajectory.name}: {how}; positions in {unit}")
+    poses, note = stated_poses(options, facts.count, rate, times)
 
     def pictures(wanted: list[int]) -> Iterator[PicturePair]:
         for i, picture in zip(wanted, video_pictures(path, wanted)):
@@ -59,7 +61,7 @@ def open_video(path: Path, options: SourceOptions) -> Recording:
         poses=poses,
         rate=rate,
         times=times,
-        notes=notes,
+        notes=notes + note,
     )
 
 
